@@ -1,0 +1,1 @@
+"""The city: what is fixed during an episode."""

@@ -1,0 +1,125 @@
+"""City: the read-only arrays of a city, built once and shared by every world that runs in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float64Array = NDArray[np.float64]
+Float32Array = NDArray[np.float32]
+Int64Array = NDArray[np.int64]
+Int32Array = NDArray[np.int32]
+UInt8Array = NDArray[np.uint8]
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Footprints:
+    """What a map says of its n buildings. Lengths in whole millimetres, as in official files."""
+
+    building_id: Int64Array  # (n,)
+    refuge: UInt8Array  # (n,) 1 where tanks are refilled
+    outline_ptr: Int32Array  # (n+1,) start of each building's corners
+    outline_mm: Int32Array  # (corners, 2) x, y; the closing corner is not repeated
+    centroid_mm: Int32Array  # (n, 2)
+    floors: Int32Array  # (n,)
+    material: UInt8Array  # (n,) 0 wood, 1 steel, 2 concrete
+    ground_area_m2: Float32Array  # (n,)
+    inflammable: UInt8Array  # (n,)
+
+
+@dataclass(frozen=True)
+class StreetMap:
+    """What a map says of its streets: a graph with m nodes and k streets."""
+
+    node_mm: Int32Array  # (m, 2)
+    street: Int32Array  # (k, 2) the two nodes of each street; straight between them
+    hydrant_node: Int32Array  # (h,) nodes with a hydrant
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A city as drawn: what a generator makes and a city file holds. `build_city` turns it into a City."""
+
+    name: str
+    footprints: Footprints
+    streets: StreetMap
+
+
+@dataclass(frozen=True)
+class AirCells:
+    """The air grid and how much of which cell each building covers (CSR over buildings)."""
+
+    origin_mm: tuple[int, int]
+    cell_mm: int
+    shape: tuple[int, int]  # cells along x, along y
+    ptr: Int32Array  # (n+1,)
+    x: Int32Array  # (covers,) x outer, y inner within a building
+    y: Int32Array  # (covers,)
+    percent: Int32Array  # (covers,) 1..100
+
+
+@dataclass(frozen=True)
+class Links:
+    """A relation between buildings as CSR; neighbours in rising order."""
+
+    ptr: Int32Array  # (n+1,)
+    building: Int32Array  # (links,)
+    share: Float32Array  # (links,) radiation: share of the rays; neighbourhood: all 1
+
+
+@dataclass(frozen=True)
+class Streets:
+    """The street graph ready for driving: positions, neighbours and shortest paths, all in whole millimetres.
+
+    A building is reached from the point of a street that is nearest to its centroid.
+    """
+
+    node_mm: Int32Array  # (m, 2)
+    street: Int32Array  # (k, 2)
+    street_length_mm: Int64Array  # (k,) at least 1
+    distance_mm: Int64Array  # (m, m) shortest way, -1 where there is none
+    next_node: Int32Array  # (m, m) [from, to] the next node on the shortest way (ties: lowest index), -1 none
+    hydrant_node: Int32Array  # (h,)
+    access_street: Int32Array  # (n,) street from which each building is reached
+    access_offset_mm: Int64Array  # (n,) way from that street's first node to the access point
+    access_mm: Int32Array  # (n, 2) the access point
+
+
+@dataclass(frozen=True)
+class City:
+    """A city ready to burn: n buildings with their physics, air cells, radiation links and streets."""
+
+    name: str
+    footprints: Footprints
+    volume_m3: Float32Array  # (n,)
+    heat_capacity: Float32Array  # (n,) energy per degree
+    initial_fuel: Float32Array  # (n,) energy
+    ignition_point: Float32Array  # (n,) degrees above ambient
+    wall_area_m2: Float64Array  # (n,) without the closing wall
+    order: Int32Array  # (n,) in which the official program visits the buildings
+    air: AirCells
+    links: Links
+    near: Links  # pairs of one fire site: linked in either direction or outlines closer than 30 m
+    streets: Streets
+
+    @property
+    def n_buildings(self) -> int:
+        """Number of buildings."""
+        return len(self.footprints.building_id)
+
+    @property
+    def middle_mm(self) -> tuple[float, float]:
+        """Centre of the bounding box of all buildings, x and y."""
+        low, high = self.footprints.outline_mm.min(axis=0), self.footprints.outline_mm.max(axis=0)
+        return (int(low[0]) + int(high[0])) / 2, (int(low[1]) + int(high[1])) / 2
+
+    @property
+    def half_diagonal_mm(self) -> float:
+        """Half the diagonal of the bounding box of all buildings."""
+        low, high = self.footprints.outline_mm.min(axis=0), self.footprints.outline_mm.max(axis=0)
+        width, height = int(high[0]) - int(low[0]), int(high[1]) - int(low[1])
+        return float(np.sqrt(float(width * width + height * height))) / 2

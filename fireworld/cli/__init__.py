@@ -1,0 +1,65 @@
+"""The command line: one module per command, imported only when its command is called."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from typing import Final
+
+import click
+
+COMMANDS: Final = {
+    "run": "Run a scenario and record it.",
+    "scenarios": "List the scenarios, or draw one.",
+    "info": "Say what a recording holds and how far it is good.",
+    "diff": "Compare two recordings step by step.",
+    "verify": "Replay a recording and compare every step.",
+    "recover": "Rescue the committed steps of a damaged recording.",
+    "view": "Open recordings in Rerun.",
+    "conformance": "Check the fire model against traces of another simulator.",
+}
+
+
+class LazyGroup(click.Group):
+    """A group that knows its commands' names and summaries without importing them."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Name the commands in the order a newcomer needs them."""
+        del ctx
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import the module of one command."""
+        del ctx
+        if cmd_name not in COMMANDS:
+            return None
+        module = importlib.import_module(f"fireworld.cli.{cmd_name}")
+        command: click.Command = module.command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the list of commands from the table, so that --help imports none of them."""
+        del ctx
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.group(
+    cls=LazyGroup,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Start with `fireworld run --record out.mcap`, then `fireworld view out.mcap`.",
+)
+@click.version_option(package_name="fireworld")
+def root() -> None:
+    """Run, record, view and compare teams of fire brigades."""
+
+
+def main() -> None:
+    """Run the command line; a user's mistake ends in one line and exit code 2."""
+    from fireworld.errors import FireworldError
+
+    try:
+        root.main(standalone_mode=True)
+    except FireworldError as error:
+        click.echo(f"fireworld: {error}", err=True)
+        sys.exit(2)

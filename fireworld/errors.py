@@ -1,0 +1,52 @@
+"""Errors that are a user's to mend; each writes its own one-line message."""
+
+from __future__ import annotations
+
+
+class FireworldError(Exception):
+    """Base of every error that a user's input, file or flag can cause."""
+
+
+class ScenarioError(FireworldError):
+    """A scenario that cannot be read or makes no sense."""
+
+
+class CityError(FireworldError):
+    """A city or map that cannot be read or cannot be simulated."""
+
+
+class TraceError(FireworldError):
+    """A reference trace that cannot be read or does not fit its city."""
+
+
+class PolicyError(FireworldError):
+    """A policy that cannot be found, loaded or asked for a decision."""
+
+
+class LogError(FireworldError):
+    """A recording that cannot be read, written, compared or replayed."""
+
+
+class ViewError(FireworldError):
+    """A view that cannot be made here: no viewer, no display, cities that differ."""
+
+
+class OutputError(FireworldError):
+    """An output that cannot be written: it exists, its folder does not, the disk is full."""
+
+
+def expected(where: str, key: str, wanted: str, got: object, hint: str = "") -> str:
+    """Word a complaint the way every fireworld error is worded.
+
+    Args:
+        where: the file (or flag) at fault.
+        key: the key inside it, as a dotted path; empty for the whole file.
+        wanted: what would have been right.
+        got: what was found; shown as Python writes it, shortened.
+        hint: what to try, if there is something to try.
+    """
+    shown = got if isinstance(got, str) and " " in got else repr(got)
+    if len(shown) > 80:
+        shown = shown[:77] + "..."
+    place = f"{where}: {key}" if key else where
+    return f"{place}: expected {wanted}, got {shown}" + (f"; {hint}" if hint else "")

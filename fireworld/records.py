@@ -1,0 +1,372 @@
+"""Everything that a log or a viewer ever sees of a run: frozen records of arrays.
+
+This module is the one place where the recorded topics, their fields, wire types, units and shapes are
+named. The recorder derives its schemas, and the log-format page of the docs, from the field metadata here.
+A field number is for ever: a field may be added with a new number, never renumbered or given another type.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Final, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+Wire = Literal["double", "float", "sfixed32", "fixed64", "uint8", "bool", "string", "bytes"]
+
+FORMAT: Final = "fireworld-log/1"
+STEP_SECONDS: Final = 60
+SNAPSHOT_EVERY_STEPS: Final = 50
+
+ACTIONS: Final = ("easiest", "nearest-to-civilian", "nearest-to-center", "nearest-to-me")
+"""The paper's four actions; an action is recorded as its index here, -1 is no action."""
+
+ACTIVITIES: Final = ("idle", "driving", "spraying", "driving-to-refuge", "refilling", "dead")
+"""What a brigade did in a step."""
+
+EVENT_KINDS: Final = (
+    "ignited",
+    "extinguished",
+    "burnt-out",
+    "civilian-hurt",
+    "civilian-died",
+    "tank-empty",
+    "refilled",
+    "site-out",
+    "brigade-hurt",
+    "brigade-died",
+)
+"""Kinds of events. The entity of the first three is a building, then civilians, brigades, a fire site, brigades."""
+
+FIERYNESS: Final = (
+    "unburnt",
+    "heating",
+    "burning",
+    "inferno",
+    "water-damaged",
+    "minor-damage",
+    "moderate-damage",
+    "severe-damage",
+    "burnt-out",
+)
+"""The official fieryness codes 0 to 8; 1 to 3 burn, 5 to 7 are extinguished."""
+
+MATERIALS: Final = ("wood", "steel", "concrete")
+LEVELS: Final = ("low", "medium", "high")
+VOLUMES: Final = ("very-low", "low", "medium", "high", "very-high", "huge")
+SIDES: Final = ("N", "E", "S", "W")
+DTYPES: Final[Mapping[str, str]] = {
+    "double": "<f8",
+    "float": "<f4",
+    "sfixed32": "<i4",
+    "fixed64": "<u8",
+    "uint8": "|u1",
+}
+"""numpy type of an array field, by wire type ("uint8" travels as packed uint32 varints below 128)."""
+
+
+def column(number: int, wire: Wire, doc: str) -> Any:
+    """Declare a packed repeated field: a one-dimensional array."""
+    return field(metadata={"number": number, "wire": wire, "repeated": True, "doc": doc})
+
+
+def value(number: int, wire: Wire, doc: str) -> Any:
+    """Declare a single value."""
+    return field(metadata={"number": number, "wire": wire, "repeated": False, "doc": doc})
+
+
+@dataclass(frozen=True)
+class RunHeader:
+    """What identifies a run; recorded as the metadata `fireworld.run` and as attachments."""
+
+    scenario: str
+    scenario_digest: str
+    seed: int
+    policy: str
+    policy_digest: str
+    fireworld_version: str
+    n_steps_max: int
+    forked_from: str = ""
+    """Digest and step of the recording this run branched off, "" for a run of its own."""
+    attachments: Mapping[str, bytes] = field(default_factory=dict)
+    """Files that a replay needs, by name: scenario.yaml always, city.json, policy.npz where used."""
+
+
+@dataclass(frozen=True)
+class CityRecord:
+    """The city, recorded once. Lengths in metres; n buildings, in the order every per-building array keeps."""
+
+    topic: ClassVar[str] = "/city"
+    name: str = value(1, "string", "name of the city")
+    building_id: Array = column(2, "sfixed32", "(n,) identifier of each building in its source")
+    outline_ptr: Array = column(3, "sfixed32", "(n+1,) start of each building's corners in outline_x_m")
+    outline_x_m: Array = column(4, "double", "corners, x; the closing corner is not repeated")
+    outline_y_m: Array = column(5, "double", "corners, y")
+    center_x_m: Array = column(6, "double", "(n,) centroid, x")
+    center_y_m: Array = column(7, "double", "(n,) centroid, y")
+    floors: Array = column(8, "sfixed32", "(n,) storeys of 3 m")
+    material: Array = column(9, "uint8", "(n,) 0 wood, 1 steel, 2 concrete")
+    inflammable: Array = column(10, "uint8", "(n,) 1 if it can burn")
+    ground_area_m2: Array = column(11, "float", "(n,)")
+    volume_m3: Array = column(12, "float", "(n,)")
+    initial_fuel: Array = column(13, "float", "(n,) energy units")
+    heat_capacity: Array = column(14, "float", "(n,) energy units per degree")
+    ignition_point: Array = column(15, "float", "(n,) degrees above ambient")
+    wall_area_m2: Array = column(16, "double", "(n,) radiating wall")
+    link_ptr: Array = column(17, "sfixed32", "(n+1,) start of each building's radiation links")
+    link_building: Array = column(18, "sfixed32", "index of the building a link leads to")
+    link_share: Array = column(19, "float", "share of the emitted radiation that reaches it")
+    node_x_m: Array = column(20, "double", "street nodes, x")
+    node_y_m: Array = column(21, "double", "street nodes, y")
+    street_from: Array = column(22, "sfixed32", "first node of each street")
+    street_to: Array = column(23, "sfixed32", "second node of each street")
+    refuge_building: Array = column(24, "sfixed32", "index of each refuge's building")
+    hydrant_x_m: Array = column(25, "double", "hydrants, x")
+    hydrant_y_m: Array = column(26, "double", "hydrants, y")
+    civilian_x_m: Array = column(27, "double", "(n_civilians,) position, x")
+    civilian_y_m: Array = column(28, "double", "(n_civilians,) position, y")
+    civilian_building: Array = column(29, "sfixed32", "(n_civilians,) building a civilian is in, -1 outdoors")
+    civilian_hp: Array = column(30, "sfixed32", "(n_civilians,) health points at the start")
+    brigade_tank_litres: Array = column(31, "sfixed32", "(n_brigades,) size of the tank")
+    brigade_power_litres: Array = column(32, "sfixed32", "(n_brigades,) most litres sprayed in a step")
+    brigade_range_m: Array = column(33, "double", "(n_brigades,) reach of the water jet")
+    air_origin_x_m: float = value(34, "double", "west edge of the air grid")
+    air_origin_y_m: float = value(35, "double", "south edge of the air grid")
+    air_cell_m: float = value(36, "double", "side of an air cell")
+    air_nx: int = value(37, "sfixed32", "air cells along x")
+    air_ny: int = value(38, "sfixed32", "air cells along y")
+    middle_x_m: float = value(39, "double", "centre of the city, x")
+    middle_y_m: float = value(40, "double", "centre of the city, y")
+
+
+@dataclass(frozen=True)
+class Draws:
+    """The luck of a step: two runs with other draws differ for that reason."""
+
+    topic: ClassVar[str] = "/draws"
+    key: int = value(1, "fixed64", "hash of seed and step: equal keys, equal luck")
+    burn_rate_sum: float = value(2, "double", "sum of the burn rates drawn for the burning buildings")
+    health_sum: float = value(3, "double", "sum of the damage draws of the people exposed or hurt")
+
+
+@dataclass(frozen=True)
+class Observations:
+    """What each brigade saw before it chose; then the fire sites of the moment."""
+
+    topic: ClassVar[str] = "/observations"
+    site: Array = column(1, "sfixed32", "(n_brigades,) fire site the brigade belongs to, -1 none")
+    free_edges: Array = column(2, "uint8", "(n_brigades,) sides of the site over which fire can spread, 0..4")
+    distance_from_center: Array = column(3, "uint8", "(n_brigades,) 0 low, 1 medium, 2 high")
+    distance_from_civilian: Array = column(4, "uint8", "(n_brigades,) 0 low, 1 medium, 2 high")
+    volume: Array = column(5, "uint8", "(n_brigades,) burning volume, 0 very low .. 5 huge")
+    others_easiest: Array = column(6, "uint8", "(n_brigades,) 1 if another brigade does `easiest`")
+    others_nearest_to_civilian: Array = column(7, "uint8", "(n_brigades,) the same for `nearest-to-civilian`")
+    others_nearest_to_center: Array = column(8, "uint8", "(n_brigades,) the same for `nearest-to-center`")
+    others_nearest_to_me: Array = column(9, "uint8", "(n_brigades,) the same for `nearest-to-me`")
+    state_index: Array = column(10, "sfixed32", "(n_brigades,) 0..4319, mixed radix of the eight features; -1 none")
+    site_id: Array = column(11, "sfixed32", "(n_sites,) fire sites that burn, by rising number")
+    site_free_sides: Array = column(12, "uint8", "(n_sites,) bits 0 N, 1 E, 2 S, 3 W: free sides")
+    site_n_burning: Array = column(13, "sfixed32", "(n_sites,) burning buildings")
+    site_volume_m3: Array = column(14, "double", "(n_sites,) volume of the burning buildings")
+    site_west_m: Array = column(15, "double", "(n_sites,) bounding box of the burning buildings")
+    site_south_m: Array = column(16, "double", "(n_sites,)")
+    site_east_m: Array = column(17, "double", "(n_sites,)")
+    site_north_m: Array = column(18, "double", "(n_sites,)")
+
+
+@dataclass(frozen=True)
+class Decisions:
+    """What each brigade chose, and why."""
+
+    topic: ClassVar[str] = "/decisions"
+    action: Array = column(1, "sfixed32", "(n_brigades,) index of the action, -1 none (refilling, dead, nothing burns)")
+    target: Array = column(2, "sfixed32", "(n_brigades,) index of the building the action names, -1 none")
+    explored: Array = column(3, "uint8", "(n_brigades,) 1 if the action was an exploring draw")
+    q_values: Array = column(4, "double", "(n_brigades * 4,) values of the four actions, brigade by brigade; or empty")
+    epsilon: float = value(5, "double", "probability of exploring")
+    td_error: Array = column(6, "double", "(n_brigades,) SARSA's error of the last update; or empty")
+
+
+@dataclass(frozen=True)
+class Brigades:
+    """Where the brigades are after the step and what they did in it."""
+
+    topic: ClassVar[str] = "/brigades"
+    x_m: Array = column(1, "double", "(n_brigades,) position, x")
+    y_m: Array = column(2, "double", "(n_brigades,) position, y")
+    activity: Array = column(3, "uint8", "(n_brigades,) 0 idle, 1 driving, 2 spraying, 3 to refuge, 4 refilling, 5 dead")
+    tank_litres: Array = column(4, "sfixed32", "(n_brigades,) water in the tank")
+    sprayed_litres: Array = column(5, "sfixed32", "(n_brigades,) water sprayed in this step")
+    driven_m: Array = column(6, "double", "(n_brigades,) way driven in this step")
+    hp: Array = column(7, "sfixed32", "(n_brigades,) health points")
+    damage: Array = column(8, "double", "(n_brigades,) health points lost per step")
+
+
+@dataclass(frozen=True)
+class Buildings:
+    """The fire after the step."""
+
+    topic: ClassVar[str] = "/buildings"
+    temperature: Array = column(1, "float", "(n,) degrees above ambient, rounded to single precision")
+    energy: Array = column(2, "double", "(n,) heat, energy units, exact")
+    fuel: Array = column(3, "float", "(n,) fuel left, energy units")
+    water_litres: Array = column(4, "sfixed32", "(n,) water lying on the building")
+    fieryness: Array = column(5, "uint8", "(n,) official code 0..8")
+
+
+@dataclass(frozen=True)
+class Civilians:
+    """The civilians' health after the step."""
+
+    topic: ClassVar[str] = "/civilians"
+    hp: Array = column(1, "sfixed32", "(n_civilians,) health points, 0 dead")
+    damage: Array = column(2, "double", "(n_civilians,) health points lost per step")
+
+
+@dataclass(frozen=True)
+class Rewards:
+    """The team's reward of the step, term by term; `total` is their sum."""
+
+    topic: ClassVar[str] = "/rewards"
+    water_damaged: float = value(1, "double", "-1 for each water-damaged or extinguished building")
+    burning: float = value(2, "double", "-2 for each burning building")
+    burnt_out: float = value(3, "double", "-3 for each burnt-out building")
+    civilians: float = value(4, "double", "HP - full HP of each civilian")
+    total: float = value(5, "double", "reward of the step")
+    sum_so_far: float = value(6, "double", "undiscounted return up to this step")
+
+
+@dataclass(frozen=True)
+class Score:
+    """The outcome as it stands after the step."""
+
+    topic: ClassVar[str] = "/score"
+    score: float = value(1, "double", "official score of the paper's time")
+    score_max: float = value(2, "double", "number of civilians + 1")
+    score_now: float = value(3, "double", "the official score of today")
+    n_burning: int = value(4, "sfixed32", "buildings with codes 1-3")
+    n_water_damaged: int = value(5, "sfixed32", "buildings with codes 4-7")
+    n_burnt_out: int = value(6, "sfixed32", "buildings with code 8")
+    n_civilians_alive: int = value(7, "sfixed32", "civilians with HP > 0")
+    water_used_litres: float = value(8, "double", "sprayed by all brigades so far")
+
+
+@dataclass(frozen=True)
+class Events:
+    """What happened in the step, parallel arrays, in the order of the phases."""
+
+    topic: ClassVar[str] = "/events"
+    kind: Array = column(1, "uint8", "(n_events,) index into EVENT_KINDS")
+    entity: Array = column(2, "sfixed32", "(n_events,) index of the building, civilian or brigade; number of the site")
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Everything that replay needs to go on from after this step, as named arrays."""
+
+    topic: ClassVar[str] = "/snapshot"
+    arrays: Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class StepRecord:
+    """One committed step. Step 0 is the state before the first step: it has no draws, choices or rewards yet
+    (empty arrays and zeros), but buildings, brigades, civilians and score are there."""
+
+    step: int
+    draws: Draws
+    observations: Observations
+    decisions: Decisions
+    brigades: Brigades
+    buildings: Buildings
+    civilians: Civilians
+    rewards: Rewards
+    score: Score
+    events: Events
+    terminated: bool
+    truncated: bool
+    snapshot: Snapshot | None = None
+
+
+STEP_TOPICS: Final[tuple[type[Any], ...]] = (
+    Draws,
+    Observations,
+    Decisions,
+    Brigades,
+    Buildings,
+    Civilians,
+    Rewards,
+    Score,
+    Events,
+)
+"""The topics of a step in the order in which things happen (then /snapshot where due, then /commit)."""
+
+PHASES: Final[Mapping[str, str]] = {
+    "/city": "city",
+    "/draws": "draw",
+    "/observations": "observe",
+    "/decisions": "choose",
+    "/brigades": "act",
+    "/buildings": "fire",
+    "/civilians": "health",
+    "/rewards": "reward",
+    "/score": "reward",
+    "/events": "events",
+    "/snapshot": "state",
+}
+"""The phase of a step that each topic tells of."""
+
+
+class Recording(Protocol):
+    """A recorded run as a viewer or a table reads it."""
+
+    @property
+    def header(self) -> RunHeader: ...
+    @property
+    def city(self) -> CityRecord: ...
+    @property
+    def steps(self) -> Array:
+        """(k,) int64: the committed steps, rising."""
+        ...
+
+    def __iter__(self) -> Iterator[StepRecord]: ...
+
+    def column(self, topic: str, name: str) -> Array:
+        """Return one field over all steps: (k, width) of an array field, (k,) of a value.
+
+        Fields whose length changes from step to step (sites, events) raise ValueError; use `ragged`.
+        """
+        ...
+
+    def ragged(self, topic: str, name: str) -> Sequence[Array]:
+        """Return one array field over all steps as a list of k arrays."""
+        ...
+
+
+class MemoryRecording:
+    """A recording held in memory: the steps of a run that was not written to a file."""
+
+    def __init__(self, header: RunHeader, city: CityRecord, records: Sequence[StepRecord]) -> None:
+        self.header = header
+        self.city = city
+        self._records = list(records)
+
+    @property
+    def steps(self) -> Array:
+        """(k,) int64: the steps held, rising."""
+        return np.array([record.step for record in self._records], dtype=np.int64)
+
+    def __iter__(self) -> Iterator[StepRecord]:
+        return iter(self._records)
+
+    def column(self, topic: str, name: str) -> Array:
+        """Return one field over all steps: (k, width) of an array field, (k,) of a value."""
+        values = [getattr(getattr(record, topic.lstrip("/")), name) for record in self._records]
+        return np.array(values)
+
+    def ragged(self, topic: str, name: str) -> Sequence[Array]:
+        """Return one array field over all steps as a list of k arrays."""
+        return [getattr(getattr(record, topic.lstrip("/")), name) for record in self._records]
