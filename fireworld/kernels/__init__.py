@@ -1,1 +1,40 @@
-"""Compiled kernels: plain functions of arrays."""
+"""Compiled kernels: plain functions of arrays, and the folder where their machine code is kept.
+
+numba keys its cache by the file that defines a function, so an edit in another kernel file would leave stale code
+behind. The folder is therefore named after the digest of all kernel sources and of numba's version.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+from pathlib import Path
+
+import numba
+
+FOLDER = Path(__file__).parent
+
+
+def sources_digest() -> str:
+    """Digest all kernel sources, data files and the versions that shape the machine code."""
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]}".encode())
+    for path in sorted(FOLDER.iterdir()):
+        if path.suffix in {".py", ".npy"}:
+            digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def cache_folder() -> Path:
+    """Name the folder of compiled kernels: below NUMBA_CACHE_DIR, else the user's cache folder."""
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    base = Path(chosen) if chosen else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fireworld"
+    return base / f"kernels-{sources_digest()}"
+
+
+numba.config.CACHE_DIR = str(cache_folder())
+
+
+def is_cold() -> bool:
+    """Tell whether nothing is compiled yet, so that the first call will take a while."""
+    return not any(Path(numba.config.CACHE_DIR).glob("**/*.nbi"))

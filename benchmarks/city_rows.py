@@ -1,0 +1,75 @@
+"""Rows of the city: building it, and its radiation rays against plain numpy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from benchmarks.fires import CITY_SEED, LOTS, PARAMETERS, city_of, plan_of
+from benchmarks.plain_rays import random_rays, walls_hit
+from benchmarks.timing import Contender, Row, compare, measure
+from fireworld.city import links
+from fireworld.city.build import build_city
+from fireworld.city.walls import walls_of
+
+RAYS_COMPARED = 20_000
+
+
+def ray_row(size: int, *, seconds: float) -> Row:
+    """Time the search for the first wall on some of a city's rays; both ways must find the same walls."""
+    city = city_of(size)
+    walls = walls_of(city.footprints)
+    fire = PARAMETERS.fire
+    source, start, end = random_rays(walls, rays_per_mm=fire.ray_rate_per_mm, range_mm=fire.ray_range_mm, seed=1)
+    chosen = np.sort(np.random.default_rng(1).permutation(len(source))[:RAYS_COMPARED])
+    rays = {"source": source[chosen], "start_mm": start[chosen], "end_mm": end[chosen]}
+    visited = np.argsort(city.order)
+    rank = visited[walls.building] * len(walls.building) + np.arange(len(walls.building))
+
+    def compiled(_: None) -> object:
+        return links.walls_hit(city.footprints, city.order, **rays)
+
+    def in_numpy(_: None) -> object:
+        return walls_hit(walls, rank, **rays)
+
+    different = np.count_nonzero(np.asarray(compiled(None)) != np.asarray(in_numpy(None)))
+    assert different <= len(chosen) // 1000, "but for rays that graze a corner, both ways find the same walls"
+    label = f"{city.n_buildings} buildings, {len(chosen)} rays"
+    ours, baseline = Contender("grid", compiled), Contender("numpy, all walls", in_numpy)
+    return compare("city", "first wall on each ray", label, ours, baseline, seconds=seconds)
+
+
+def links_row(size: int, *, seconds: float) -> Row:
+    """Time all radiation links of a city."""
+    city = city_of(size)
+    n_rays = int(links.wall_table(city.footprints, city.order, PARAMETERS.fire).n_rays.sum())
+
+    def run(_: None) -> object:
+        return links.radiation_links(city.footprints, city.order, PARAMETERS.fire, seed=CITY_SEED)
+
+    label = f"{city.n_buildings} buildings, {n_rays} rays"
+    return measure("city", "radiation links", label, Contender("compiled", run), seconds=seconds)
+
+
+def build_row(size: int, *, seconds: float) -> Row:
+    """Time the whole construction of a city from its plan."""
+    plan = plan_of(size)
+
+    def run(_: None) -> object:
+        return build_city(plan, PARAMETERS.fire, seed=CITY_SEED)
+
+    label = f"{city_of(size).n_buildings} buildings"
+    return measure("city", "build a city", label, Contender("build_city", run), seconds=seconds)
+
+
+def rows(*, quick: bool) -> Iterator[Row]:
+    """Yield the rows of the city."""
+    seconds = 0.3 if quick else 2.0
+    sizes = list(LOTS)[:2] if quick else list(LOTS)
+    for size in sizes[:3]:
+        yield ray_row(size, seconds=seconds)
+    for size in sizes:
+        yield links_row(size, seconds=seconds)
+    for size in sizes:
+        yield build_row(size, seconds=seconds)

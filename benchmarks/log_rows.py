@@ -1,0 +1,97 @@
+"""Rows of the recorder: writing a step, and reading the history of a building back."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import zlib
+from collections.abc import Iterator
+from dataclasses import fields, replace
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.fires import city_of
+from benchmarks.runs import header, new_world, record_of, records, run_silently, write_log
+from benchmarks.timing import Contender, Row, compare, measure
+from fireworld.records import STEP_TOPICS, StepRecord
+from fireworld.world.world import World
+from recorder.reader import open_log
+from recorder.writer import LogWriter
+
+
+def as_json(record: StepRecord) -> bytes:
+    """Write a step the plain way: a line of JSON, compressed."""
+    topics: dict[str, Any] = {}
+    for topic in STEP_TOPICS:
+        part = getattr(record, topic.topic[1:])
+        values = {item.name: getattr(part, item.name) for item in fields(part)}
+        topics[topic.topic] = {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in values.items()}
+    return zlib.compress(json.dumps({"step": record.step} | topics).encode(), 1)
+
+
+def write_row(size: int, folder: Path, *, seconds: float) -> Row:
+    """Time the writing of one step against a line of compressed JSON. Both flush it to the system."""
+    world = new_world(size, 100)
+    *_, last = records(world)
+    record = replace(last, snapshot=None)
+    numbers = count()
+    with (folder / "lines.z").open("wb") as lines:
+        log = LogWriter(folder / "write.mcap", header(100), record_of(world))
+
+        def in_json(step: StepRecord) -> None:
+            lines.write(as_json(step))
+            lines.flush()
+
+        def fresh() -> StepRecord:
+            return replace(record, step=next(numbers))
+
+        ours, baseline = Contender("LogWriter", log.write, fresh), Contender("JSON", in_json, fresh)
+        row = compare("log", "write a step", f"{city_of(size).n_buildings} buildings", ours, baseline, seconds=seconds)
+        log.close()
+    return row
+
+
+def run_row(size: int, n_steps: int, folder: Path, *, seconds: float) -> Row:
+    """Time a run that is recorded against the same run that is not."""
+
+    def fresh() -> World:
+        return new_world(size, n_steps)
+
+    def recorded(world: World) -> None:
+        write_log(folder / "run.mcap", world)
+
+    ours, baseline = Contender("recorded", recorded, fresh), Contender("not recorded", run_silently, fresh)
+    label = f"{city_of(size).n_buildings} buildings"
+    return compare("log", f"run of {n_steps} steps", label, ours, baseline, seconds=seconds)
+
+
+def read_rows(size: int, n_steps: int, folder: Path, *, seconds: float) -> Iterator[Row]:
+    """Time the history of one building: its column against a pass over whole steps; and the opening of the log."""
+    path = folder / "read.mcap"
+    write_log(path, new_world(size, n_steps))
+    log = open_log(path)
+
+    def column(_: None) -> object:
+        return log.column("/buildings", "temperature")[:, 0]
+
+    def whole_steps(_: None) -> object:
+        return [record.buildings.temperature[0] for record in log]
+
+    label = f"{city_of(size).n_buildings} buildings, {len(log)} steps, {path.stat().st_size / 1e6:.1f} MB"
+    ours, baseline = Contender("column", column), Contender("whole steps", whole_steps)
+    yield compare("log", "history of a building", label, ours, baseline, seconds=seconds)
+    opening = Contender("open_log", lambda _: open_log(path))
+    yield measure("log", "open and check all of it", label, opening, seconds=seconds)
+
+
+def rows(*, quick: bool) -> Iterator[Row]:
+    """Yield the rows of the recorder."""
+    size, n_steps, seconds = (100, 50, 0.3) if quick else (1000, 300, 2.0)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        yield write_row(size, folder, seconds=seconds)
+        yield run_row(size, n_steps, folder, seconds=seconds)
+        yield from read_rows(size, n_steps, folder, seconds=seconds)

@@ -1,0 +1,105 @@
+"""Worlds with a team, and recordings of them, for the benchmarks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from benchmarks.fires import city_of, ignited
+from fireworld.city.record import city_record
+from fireworld.kernels.arrays import CityTables
+from fireworld.parameters import PAPER
+from fireworld.policy.kernel import KernelPolicy, each_another
+from fireworld.records import CityRecord, RunHeader, StepRecord
+from fireworld.world.observer import Observer
+from fireworld.world.tables import city_tables
+from fireworld.world.world import World
+from recorder.writer import LogWriter
+
+N_BRIGADES: Final = 4
+N_CIVILIANS: Final = 12
+SEED: Final = 1
+
+
+@cache
+def tables_of(size: int) -> CityTables:
+    """Build the kernels' tables of a city once."""
+    return city_tables(city_of(size), PAPER.fire)
+
+
+def new_world(size: int, n_steps: int) -> World:
+    """Put four brigades and twelve civilians into a city of which every eighth building burns."""
+    city = city_of(size)
+    inflammable = np.flatnonzero(city.footprints.inflammable)
+    civilians = inflammable[:: len(inflammable) // N_CIVILIANS][:N_CIVILIANS]
+    refuges = np.flatnonzero(city.footprints.refuge)
+    return World(
+        city,
+        PAPER,
+        ignited=ignited(city, "hot"),
+        civilian_building=civilians,
+        civilian_mm=city.footprints.centroid_mm[civilians],
+        brigade_refuge=refuges[np.arange(N_BRIGADES) % len(refuges)],
+        seed=SEED,
+        n_steps_max=n_steps,
+        tables=tables_of(size),
+    )
+
+
+def ready_policy(world: World) -> KernelPolicy:
+    """Return a policy that has begun: brigade b always takes action b."""
+    policy = each_another()
+    policy.begin(world.tables, world.n_brigades, world.seed)
+    return policy
+
+
+def run_silently(world: World) -> None:
+    """Run a world step by step without looking at it."""
+    policy = ready_policy(world)
+    while not (world.terminated or world.truncated):
+        world.step(policy)
+
+
+def records(world: World) -> Iterator[StepRecord]:
+    """Run a world step by step and tell of every step."""
+    policy, observer = ready_policy(world), Observer(world)
+    yield observer.record()
+    while not (world.terminated or world.truncated):
+        yield observer.record(world.step(policy))
+
+
+def header(n_steps: int) -> RunHeader:
+    """Make a header for a benchmark's log."""
+    return RunHeader(
+        scenario="benchmark",
+        scenario_digest="",
+        seed=SEED,
+        policy="each-another",
+        policy_digest="",
+        fireworld_version="0",
+        n_steps_max=n_steps,
+    )
+
+
+def record_of(world: World) -> CityRecord:
+    """Make the city record of a world."""
+    people = world.arrays.civilians
+    return city_record(
+        world.city,
+        civilian_mm=np.stack([people.x, people.y], axis=1),
+        civilian_building=people.building,
+        civilian_hp=people.hp,
+        n_brigades=world.n_brigades,
+        brigades=world.parameters.brigades,
+    )
+
+
+def write_log(path: Path, world: World) -> None:
+    """Run a world and record it."""
+    with LogWriter(path, header(world.n_steps_max), record_of(world), force=True) as log:
+        for record in records(world):
+            log.write(record)

@@ -1,0 +1,120 @@
+"""Radiation links: the share of a building's radiation that reaches each other building, found by sending rays."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from fireworld.city.city import Array, Footprints, Int32Array, Int64Array, Links
+from fireworld.city.walls import walls_of
+from fireworld.kernels.rays import WallGrid, WallTable, count_hits, first_hits
+from fireworld.parameters import FireParameters
+
+MARGIN_MM: Final = 1
+"""A wall is registered in every cell that it comes this close to."""
+CELL_SIDE_MIN_MM: Final = 1000
+
+
+def radiation_links(footprints: Footprints, order: Int32Array, fire: FireParameters, *, seed: int) -> Links:
+    """Send every building's rays; a link's share is its hits over all rays, self-hits and misses included.
+
+    Args:
+        footprints: the buildings.
+        order: (n,) in which the official program visits the buildings.
+        fire: gives the number and the length of the rays.
+        seed: of the rays.
+    """
+    walls = wall_table(footprints, order, fire)
+    ptr, building, n_hits = count_hits(walls, wall_grid(walls), footprints.building_id, seed, fire.ray_range_mm)
+    n_rays = np.bincount(walls.building, weights=walls.n_rays)
+    emitter = np.repeat(np.arange(len(n_rays)), np.diff(ptr))
+    rising = np.lexsort((building, emitter))
+    return Links(
+        ptr=ptr.astype(np.int32),
+        building=building[rising].astype(np.int32),
+        share=(n_hits[rising] / n_rays[emitter]).astype(np.float32),
+    )
+
+
+def walls_hit(
+    footprints: Footprints,
+    order: Int32Array,
+    *,
+    source: Array,
+    start_mm: Array,
+    end_mm: Array,
+) -> Int64Array:
+    """Find the first wall that each given ray meets, -1 where there is none: for checking against traces.
+
+    Args:
+        footprints: the buildings.
+        order: (n,) in which the official program visits the buildings.
+        source: (r,) wall that each ray leaves from, an index into `walls_of(footprints)`.
+        start_mm: (r, 2) start of each ray.
+        end_mm: (r, 2) end of each ray.
+    """
+    walls = wall_table(footprints, order, FireParameters())
+    rays = (source.astype(np.int64), start_mm.astype(np.int64), end_mm.astype(np.int64))
+    hits: Int64Array = first_hits(walls, wall_grid(walls), *rays)
+    return hits
+
+
+def wall_table(footprints: Footprints, order: Int32Array, fire: FireParameters) -> WallTable:
+    """Lay out the walls for the ray caster; a wall sends ceil(length * rate) rays.
+
+    Where walls of two buildings coincide, a ray meets the one whose building the official program visits first.
+    """
+    walls = walls_of(footprints)
+    visited = np.empty(len(order), dtype=np.int64)
+    visited[order] = np.arange(len(order))
+    index = np.arange(len(walls.building))
+    span = walls.end_mm - walls.start_mm
+    return WallTable(
+        building=walls.building.astype(np.int64),
+        rank=visited[walls.building] * len(index) + index,
+        x=np.ascontiguousarray(walls.start_mm[:, 0]),
+        y=np.ascontiguousarray(walls.start_mm[:, 1]),
+        dx=np.ascontiguousarray(span[:, 0]),
+        dy=np.ascontiguousarray(span[:, 1]),
+        n_rays=np.ceil(walls.length_mm * fire.ray_rate_per_mm).astype(np.int64),
+    )
+
+
+def wall_grid(walls: WallTable) -> WallGrid:
+    """Sort the walls into square cells, about as many cells as walls.
+
+    A slanted wall is entered column by column of cells, so that a long one costs its length and not its square.
+    """
+    low_x, high_x = np.minimum(walls.x, walls.x + walls.dx), np.maximum(walls.x, walls.x + walls.dx)
+    low_y, high_y = np.minimum(walls.y, walls.y + walls.dy), np.maximum(walls.y, walls.y + walls.dy)
+    x_mm, y_mm = int(low_x.min()) - MARGIN_MM, int(low_y.min()) - MARGIN_MM
+    width, height = int(high_x.max()) + MARGIN_MM - x_mm, int(high_y.max()) + MARGIN_MM - y_mm
+    side = max(CELL_SIDE_MIN_MM, math.isqrt(width * height // len(walls.x)))
+
+    wall, column = _ranges((low_x - MARGIN_MM - x_mm) // side, (high_x + MARGIN_MM - x_mm) // side)
+    left = np.maximum(low_x[wall], x_mm + column * side - MARGIN_MM)
+    right = np.minimum(high_x[wall], x_mm + (column + 1) * side + MARGIN_MM)
+    run = np.where(walls.dx[wall] == 0, 1, walls.dx[wall])
+    rise = np.where(walls.dx[wall] == 0, 0, walls.dy[wall])
+    y_left = walls.y[wall] + (left - walls.x[wall]) * rise // run
+    y_right = walls.y[wall] + (right - walls.x[wall]) * rise // run
+    upright = walls.dx[wall] == 0
+    low = np.where(upright, low_y[wall], np.minimum(y_left, y_right))
+    high = np.where(upright, high_y[wall], np.maximum(y_left, y_right) + 1)
+    piece, row = _ranges((low - MARGIN_MM - y_mm) // side, (high + MARGIN_MM - y_mm) // side)
+
+    nx, ny = width // side + 1, height // side + 1
+    cell = column[piece] * ny + row
+    ptr = np.zeros(nx * ny + 1, dtype=np.int64)
+    np.cumsum(np.bincount(cell, minlength=nx * ny), out=ptr[1:])
+    return WallGrid(x_mm, y_mm, side, nx, ny, ptr, wall[piece][np.argsort(cell, kind="stable")])
+
+
+def _ranges(first: Int64Array, last: Int64Array) -> tuple[Int64Array, Int64Array]:
+    """List the pairs (k, number) for every number from first[k] to last[k], both included."""
+    length = last - first + 1
+    k = np.repeat(np.arange(len(length)), length)
+    number = np.arange(len(k)) - np.repeat(np.cumsum(length) - length, length) + first[k]
+    return k, number

@@ -1,0 +1,64 @@
+"""Buildings as a generator or a file describes them one by one, and their assembly into arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import chain
+
+import numpy as np
+
+from fireworld.city.city import Footprints
+
+Corner = tuple[int, int]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Building:
+    """One building of a plan; lengths in mm."""
+
+    building_id: int
+    corners_mm: Sequence[Corner]
+    centroid_mm: Corner
+    floors: int
+    material: int
+    ground_area_m2: float
+    inflammable: bool
+    refuge: bool
+
+
+def assemble(buildings: Sequence[Building]) -> Footprints:
+    """Lay out the buildings as arrays, in the order given."""
+    n_corners = [len(building.corners_mm) for building in buildings]
+    return Footprints(
+        building_id=np.array([building.building_id for building in buildings], dtype=np.int64),
+        refuge=np.array([building.refuge for building in buildings], dtype=np.uint8),
+        outline_ptr=np.concatenate([[0], np.cumsum(n_corners)]).astype(np.int32),
+        outline_mm=np.array(list(chain.from_iterable(building.corners_mm for building in buildings)), dtype=np.int32),
+        centroid_mm=np.array([building.centroid_mm for building in buildings], dtype=np.int32),
+        floors=np.array([building.floors for building in buildings], dtype=np.int32),
+        material=np.array([building.material for building in buildings], dtype=np.uint8),
+        ground_area_m2=np.array([building.ground_area_m2 for building in buildings], dtype=np.float32),
+        inflammable=np.array([building.inflammable for building in buildings], dtype=np.uint8),
+    )
+
+
+def doubled_area_mm2(corners: Sequence[Corner]) -> int:
+    """Return twice the area that a polygon encloses, exactly; positive counterclockwise, negative clockwise."""
+    return sum(x * next_y - next_x * y for (x, y), (next_x, next_y) in _sides(corners))
+
+
+def centroid_mm(corners: Sequence[Corner]) -> Corner:
+    """Return the centroid of a polygon with an area, rounded down to whole mm."""
+    x_moment = y_moment = 0
+    for (x, y), (next_x, next_y) in _sides(corners):
+        cross = x * next_y - next_x * y
+        x_moment += (x + next_x) * cross
+        y_moment += (y + next_y) * cross
+    area = 3 * doubled_area_mm2(corners)
+    return x_moment // area, y_moment // area
+
+
+def _sides(corners: Sequence[Corner]) -> list[tuple[Corner, Corner]]:
+    """Pair every corner with the next one, the last with the first."""
+    return list(zip(corners, [*corners[1:], corners[0]], strict=True))

@@ -1,0 +1,236 @@
+"""City files: JSON to Plan and back, every mistake named by file, building and key.
+
+The layout is the one of the official traces: `buildings`, each with id, apexes and more; optional `streets` and
+`hydrants`. What a trace's city says of a run (ignitions, water, brigades) is left to who replays it.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Final, Never
+
+import numpy as np
+
+from fireworld.city.city import Footprints, Int64Array, Plan, StreetMap
+from fireworld.city.fields import Fields
+from fireworld.city.footpaths import footpaths
+from fireworld.city.freeze import freeze
+from fireworld.city.outlines import Building, Corner, assemble, centroid_mm, doubled_area_mm2
+from fireworld.errors import CityError, expected
+
+READ_KEYS: Final = ("name", "buildings", "streets", "hydrants")
+IGNORED_KEYS: Final = (
+    "brigade_moves",
+    "brigades",
+    "civilians",
+    "comment",
+    "extinguish",
+    "ignitions",
+    "later_ignitions",
+    "seed",
+    "steps",
+    "units",
+    "water",
+)
+BUILDING_KEYS: Final = ("id", "type", "apexes", "floors", "code", "ground_area", "x", "y", "inflammable")
+BUILDING_TYPES: Final = ("building", "refuge", "firestation", "ambulancecentre", "policeoffice", "gasstation")
+"""Official types, in any spelling of case, spaces and underscores; fireworld knows refuges from the rest."""
+COORDINATE_MAX_MM: Final = 1_000_000_000
+"""A thousand kilometres from the origin: squares of distances still fit 64 bits."""
+ID_MAX: Final = 2**31 - 1
+FLOORS_MAX: Final = 500
+GROUND_AREA_MAX_M2: Final = 10_000_000
+
+
+def load_plan(path: Path) -> Plan:
+    """Read a city file.
+
+    Raises:
+        CityError: it cannot be read or makes no city.
+    """
+    try:
+        text = path.read_bytes()
+    except OSError as error:
+        raise CityError(expected(str(path), "", "a city file that can be read", error.strerror or str(error))) from None
+    return parse_plan(text, where=str(path), name=path.stem)
+
+
+def parse_plan(text: bytes, *, where: str, name: str = "city") -> Plan:
+    """Read the contents of a city file.
+
+    Args:
+        text: JSON.
+        where: what to call the file in complaints.
+        name: name of a city that does not say its own.
+
+    Raises:
+        CityError: it makes no city.
+    """
+    document = Fields(where, "", _parse_json(text, where))
+    document.allow_only(*READ_KEYS, *IGNORED_KEYS)
+    items = document.array("buildings")
+    if not items:
+        document.refuse("buildings", "at least one building", "none")
+    buildings: list[Building] = []
+    taken: set[int] = set()
+    for index, item in enumerate(items):
+        building = _building(Fields(where, f"buildings.{index}.", item))
+        if building.building_id in taken:
+            document.refuse(f"buildings.{index}.id", "an identifier of its own", building.building_id)
+        taken.add(building.building_id)
+        buildings.append(building)
+    _refuse_crossing_outlines(document, buildings)
+    footprints = assemble(buildings)
+    streets = _streets(document, footprints)
+    return freeze(Plan(name=document.text("name", default=name), footprints=footprints, streets=streets))
+
+
+def dump_plan(plan: Plan) -> dict[str, Any]:
+    """Turn a plan into a city document: `parse_plan` of its JSON gives the same plan.
+
+    Hydrants get identifiers after the buildings' highest.
+    """
+    footprints, streets = plan.footprints, plan.streets
+    corners, ptr = footprints.outline_mm.ravel().tolist(), (2 * footprints.outline_ptr).tolist()
+    next_id = int(footprints.building_id.max()) + 1
+    return {
+        "name": plan.name,
+        "buildings": [
+            {
+                "id": int(footprints.building_id[b]),
+                "type": "refuge" if footprints.refuge[b] else "building",
+                "apexes": corners[ptr[b] : ptr[b + 1]],
+                "floors": int(footprints.floors[b]),
+                "code": int(footprints.material[b]),
+                "ground_area": int(footprints.ground_area_m2[b]),
+                "x": int(footprints.centroid_mm[b, 0]),
+                "y": int(footprints.centroid_mm[b, 1]),
+                "inflammable": bool(footprints.inflammable[b]),
+            }
+            for b in range(len(footprints.building_id))
+        ],
+        "streets": {"nodes": streets.node_mm.tolist(), "edges": streets.street.tolist()},
+        "hydrants": [
+            {"id": next_id + k, "x": int(streets.node_mm[node, 0]), "y": int(streets.node_mm[node, 1])}
+            for k, node in enumerate(streets.hydrant_node.tolist())
+        ],
+    }
+
+
+def _parse_json(text: bytes, where: str) -> Any:
+    """Parse JSON, refusing what Python would let pass: repeated keys, NaN and infinities."""
+
+    def pairs(items: list[tuple[str, Any]]) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for key, item in items:
+            if key in found:
+                raise CityError(expected(where, key, "each key once", "two of them"))
+            found[key] = item
+        return found
+
+    def constant(literal: str) -> Never:
+        raise CityError(expected(where, "", "finite numbers", literal))
+
+    try:
+        return json.loads(text.decode("utf-8"), object_pairs_hook=pairs, parse_constant=constant)
+    except json.JSONDecodeError as error:
+        got = f"{error.msg} at line {error.lineno}, column {error.colno}"
+        raise CityError(expected(where, "", "JSON", got)) from None
+    except UnicodeDecodeError as error:
+        raise CityError(expected(where, "", "JSON in UTF-8", f"another byte at offset {error.start}")) from None
+    except (ValueError, RecursionError):  # an integer of thousands of digits, arrays in arrays in arrays
+        raise CityError(expected(where, "", "JSON with numbers of sane size", "something larger")) from None
+
+
+def _building(item: Fields) -> Building:
+    """Read one building."""
+    building_id = item.integer("id", low=0, high=ID_MAX)
+    item = Fields(item.where, f"building {building_id}: ", item.value)
+    item.allow_only(*BUILDING_KEYS)
+    kind = item.text("type", default="building").lower().replace(" ", "").replace("_", "")
+    if kind not in BUILDING_TYPES:
+        item.refuse("type", f"one of {', '.join(BUILDING_TYPES)}", item.value["type"])
+    refuge = kind == "refuge"
+    corners = _corners(item)
+    doubled_area = abs(doubled_area_mm2(corners))
+    if doubled_area < 2_000_000:
+        item.refuse("apexes", "an area of at least 1 m2", f"{doubled_area / 2_000_000:.6f} m2")
+    middle = centroid_mm(corners)
+    span = (-COORDINATE_MAX_MM, COORDINATE_MAX_MM)
+    return Building(
+        building_id=building_id,
+        corners_mm=corners,
+        centroid_mm=(
+            item.integer("x", low=span[0], high=span[1], default=middle[0]),
+            item.integer("y", low=span[0], high=span[1], default=middle[1]),
+        ),
+        floors=item.integer("floors", low=1, high=FLOORS_MAX, default=1),
+        material=item.integer("code", low=0, high=2, default=0),
+        ground_area_m2=item.integer(
+            "ground_area", low=1, high=GROUND_AREA_MAX_M2, default=min(doubled_area // 2_000_000, GROUND_AREA_MAX_M2)
+        ),
+        inflammable=item.flag("inflammable", default=not refuge),
+        refuge=refuge,
+    )
+
+
+def _corners(item: Fields) -> list[Corner]:
+    """Read an outline: [x0, y0, x1, y1, ...], repeated corners and a repeated first one at the end left out."""
+    numbers = item.integers("apexes", low=-COORDINATE_MAX_MM, high=COORDINATE_MAX_MM)
+    if len(numbers) % 2:
+        item.refuse("apexes", "as many y as x", f"{len(numbers)} numbers")
+    listed = list(zip(numbers[::2], numbers[1::2], strict=True))
+    corners = [corner for index, corner in enumerate(listed) if index == 0 or corner != listed[index - 1]]
+    while len(corners) > 1 and corners[0] == corners[-1]:
+        corners.pop()
+    if len(set(corners)) < 3:
+        item.refuse("apexes", "at least 3 distinct corners", f"{len(set(corners))} of them")
+    return corners
+
+
+def _refuse_crossing_outlines(document: Fields, buildings: list[Building]) -> None:
+    """Refuse the first building whose outline crosses or touches itself."""
+    import shapely
+
+    corners = np.array([corner for building in buildings for corner in building.corners_mm], dtype=np.float64)
+    owner = np.repeat(np.arange(len(buildings)), [len(building.corners_mm) for building in buildings])
+    polygons: Any = shapely.polygons(shapely.linearrings(corners, indices=owner))
+    valid = shapely.is_valid(polygons)
+    if not valid.all():
+        index = int(np.argmin(valid))
+        place = shapely.is_valid_reason(polygons[index])
+        culprit = Fields(document.where, f"building {buildings[index].building_id}: ", {})
+        culprit.refuse("apexes", "an outline that does not cross or touch itself", f"{place} mm")
+
+
+def _streets(document: Fields, footprints: Footprints) -> StreetMap:
+    """Read the streets, or lay footpaths where the file has none."""
+    span = {"low": -COORDINATE_MAX_MM, "high": COORDINATE_MAX_MM}
+    hydrants: list[Corner] = []
+    for index, value in enumerate(document.array("hydrants", default=[])):
+        item = Fields(document.where, f"hydrants.{index}.", value)
+        item.allow_only("id", "x", "y")
+        item.integer("id", low=0, high=ID_MAX, default=0)
+        hydrants.append((item.integer("x", **span), item.integer("y", **span)))
+    if "streets" not in document.object():
+        return footpaths(footprints, hydrants)
+    streets = Fields(document.where, "streets.", document.object()["streets"])
+    streets.allow_only("nodes", "edges")
+    nodes = streets.pairs("nodes", **span)
+    edges = streets.pairs("edges", low=0, high=len(nodes) - 1)
+    for index, (start, end) in enumerate(edges):
+        if start == end:
+            streets.refuse(f"edges.{index}", "two different nodes", [start, end])
+    node = np.array(nodes, dtype=np.int64)
+    return StreetMap(
+        node_mm=node.astype(np.int32),
+        street=np.array(edges, dtype=np.int32),
+        hydrant_node=np.array([_nearest_node(node, hydrant) for hydrant in hydrants], dtype=np.int32),
+    )
+
+
+def _nearest_node(node: Int64Array, point: Corner) -> int:
+    """Find the street node nearest to a point; ties go to the lowest."""
+    away = node - np.array(point, dtype=np.int64)
+    return int(np.argmin((away * away).sum(axis=1)))

@@ -1,0 +1,178 @@
+"""`fireworld run`: run a scenario, show its outcome and record it."""
+
+from __future__ import annotations
+
+import json
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from fireworld.records import StepRecord
+    from fireworld.runs import Run
+
+INTERRUPTED: Final = 130
+POLICIES_HELP: Final = (
+    "easiest, nearest-to-civilian, nearest-to-center, nearest-to-me, each-another, random, chief, "
+    "or MODULE:CLASS of your own."
+)
+
+
+@click.command()
+@click.argument("scenario", default="default")
+@click.option("--policy", default="chief", show_default=True, help=POLICIES_HELP)
+@click.option("--seed", default=1, show_default=True, type=click.IntRange(0, 2**32 - 1), help="Seed of all luck.")
+@click.option("--steps", type=click.IntRange(min=1), help="Stop after this step.  [default: the scenario's]")
+@click.option(
+    "--record", "output", metavar="FILE.mcap", type=click.Path(path_type=Path), help="Record every step to a file."
+)
+@click.option("--force", is_flag=True, help="Replace an existing recording.")
+@click.option("--set", "settings", metavar="KEY=VALUE", multiple=True, help="Set a key of the scenario; repeatable.")
+@click.option("--json", "as_json", is_flag=True, help="Write the outcome as JSON.")
+@click.pass_context
+def command(
+    context: click.Context,
+    *,
+    scenario: str,
+    policy: str,
+    seed: int,
+    steps: int | None,
+    output: Path | None,
+    force: bool,
+    settings: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """Run SCENARIO (a shipped name or a YAML file; `default` if left out) and show how it ended.
+
+    \b
+    fireworld run                                    the default scenario
+    fireworld run test-1 --policy easiest --seed 3   another fire, policy and luck
+    fireworld run quick --set brigades.n=4           with a changed scenario
+    fireworld run --record out.mcap                  and every step recorded
+
+    Exit code: 0 run, 2 could not run, 130 interrupted (the recording keeps every step done).
+    """
+    if force and output is None:
+        raise click.UsageError("--force goes with --record.")
+    _announce_compilation()
+    from fireworld.policy.names import load_policy
+    from fireworld.runs import prepare_run
+    from fireworld.scenario import load_scenario, split_settings
+    from fireworld.world.stage import build_stage
+    from recorder.chain import Digest
+    from recorder.writer import LogWriter
+
+    named = load_policy(policy)
+    chosen = load_scenario(scenario).with_settings(split_settings(settings))
+    run = prepare_run(build_stage(chosen), named, seed=seed, n_steps_max=steps)
+    last: StepRecord | None = None
+    with ExitStack() as stack:
+        if output is not None:
+            sink: LogWriter | Digest = stack.enter_context(LogWriter(output, run.header, run.city, force=force))
+        else:
+            sink = Digest(run.city)
+        write = sink.write if isinstance(sink, LogWriter) else sink.add
+        try:
+            for record in _with_progress(run, quiet=as_json):
+                write(record)
+                last = record
+            interrupted = False
+        except KeyboardInterrupt:
+            interrupted = True
+    assert last is not None  # noqa: S101 - a run yields its start before anything else
+    outcome = _outcome(run, last, digest=sink.digest, output=output, interrupted=interrupted)
+    if as_json:
+        click.echo(json.dumps(outcome, indent=2))
+    else:
+        _show(outcome)
+    context.exit(INTERRUPTED if interrupted else 0)
+
+
+def _announce_compilation() -> None:
+    """Say what is going on before the first-ever compilation, which takes a while."""
+    from fireworld import kernels
+
+    if kernels.is_cold():
+        click.echo("compiling the simulator for this machine, once; this takes about 10 seconds ...", err=True)
+
+
+def _with_progress(run: Run, *, quiet: bool) -> Iterator[StepRecord]:
+    """Yield the steps of a run, under a progress display where people watch."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    if quiet or not console.is_terminal:
+        yield from run
+        return
+    columns = (
+        TextColumn("step {task.completed:.0f} of at most {task.total:.0f}"),
+        BarColumn(),
+        TextColumn("{task.fields[burning]} burning, score {task.fields[score]:.2f}"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task("run", total=run.header.n_steps_max, burning=0, score=0.0)
+        for record in run:
+            score = record.score
+            progress.update(task, completed=record.step, burning=score.n_burning, score=score.score)
+            yield record
+
+
+def _outcome(run: Run, last: StepRecord, *, digest: str, output: Path | None, interrupted: bool) -> dict[str, Any]:
+    """Collect how a run ended."""
+    score = last.score
+    ended = "terminated" if last.terminated else "interrupted" if interrupted else "truncated"
+    return {
+        "scenario": run.header.scenario,
+        "policy": run.header.policy,
+        "seed": run.header.seed,
+        "ended": ended,
+        "steps": last.step,
+        "time_to_complete": last.step if last.terminated else None,
+        "score": score.score,
+        "score_max": score.score_max,
+        "score_now": score.score_now,
+        "n_buildings": len(run.city.building_id),
+        "n_burning": score.n_burning,
+        "n_burnt_out": score.n_burnt_out,
+        "n_water_damaged": score.n_water_damaged,
+        "n_civilians": len(run.city.civilian_x_m),
+        "n_civilians_alive": score.n_civilians_alive,
+        "return": last.rewards.sum_so_far,
+        "water_used_litres": score.water_used_litres,
+        "digest": digest,
+        "recording": str(output) if output is not None else None,
+    }
+
+
+def _show(outcome: dict[str, Any]) -> None:
+    """Show the outcome as a table."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=f"{outcome['scenario']}, {outcome['policy']}, seed {outcome['seed']}", show_header=False)
+    table.add_column(style="bold")
+    table.add_column(justify="right")
+    complete = outcome["time_to_complete"]
+    time = f"{complete} steps" if complete is not None else f"not within {outcome['steps']} steps"
+    table.add_row("score", f"{outcome['score']:.3f} of {outcome['score_max']:.0f}")
+    table.add_row("time to complete", time)
+    table.add_row("burnt out", f"{outcome['n_burnt_out']} of {outcome['n_buildings']} buildings")
+    table.add_row("still burning", str(outcome["n_burning"]))
+    table.add_row("water-damaged", str(outcome["n_water_damaged"]))
+    table.add_row("civilians alive", f"{outcome['n_civilians_alive']} of {outcome['n_civilians']}")
+    table.add_row("return", f"{outcome['return']:,.0f}")
+    table.add_row("water used", f"{outcome['water_used_litres']:,.0f} litres")
+    table.add_row("digest", outcome["digest"])
+    console = Console()
+    console.print(table)
+    if outcome["ended"] == "interrupted":
+        click.echo(f"interrupted after step {outcome['steps']}", err=True)
+    if outcome["recording"] is not None:
+        name = outcome["recording"]
+        click.echo(f"recorded to {name}; look at it with `fireworld view {name}`")

@@ -1,0 +1,117 @@
+"""`fireworld scenarios`: list the scenarios that come with fireworld, or draw one."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from fireworld.scenario import Scenario
+
+
+@click.group(invoke_without_command=True)
+@click.option("--json", "as_json", is_flag=True, help="Write JSON instead of a table.")
+@click.pass_context
+def command(context: click.Context, *, as_json: bool) -> None:
+    """List the scenarios that come with fireworld.
+
+    `fireworld scenarios show NAME` draws one.
+    """
+    if context.invoked_subcommand is not None:
+        if as_json:
+            raise click.UsageError("--json goes with the list of scenarios, not with a command below it.")
+        return
+    from fireworld.scenario import load_scenario, scenario_names
+
+    scenarios = [load_scenario(name) for name in scenario_names()]
+    if as_json:
+        click.echo(json.dumps([_summary(scenario) for scenario in scenarios], indent=2))
+    else:
+        _print_table(scenarios)
+
+
+@command.command()
+@click.argument("scenario", metavar="SCENARIO")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="PNG to write.  [default: NAME.png]")
+@click.option("--force", is_flag=True, help="Replace an existing file.")
+@click.option("--yaml", "as_yaml", is_flag=True, help="Write the scenario with every value, instead of a map.")
+@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Change a value, as in brigades.n=7.")
+def show(*, scenario: str, output: Path | None, force: bool, as_yaml: bool, settings: Sequence[str]) -> None:
+    """Draw SCENARIO: its city, fires, civilians, refuges and brigades.
+
+    SCENARIO is the name of one that comes with fireworld, or a YAML file.
+    """
+    from fireworld.scenario import load_scenario, split_settings
+
+    if as_yaml and output is not None:
+        raise click.UsageError("--yaml writes to the terminal; -o goes with the map.")
+    chosen = load_scenario(scenario).with_settings(split_settings(settings))
+    if as_yaml:
+        click.echo(chosen.to_yaml(), nl=False)
+        return
+    _draw(chosen, output or Path(Path(f"{chosen.name}.png").name), force=force)
+
+
+def _draw(scenario: Scenario, path: Path, *, force: bool) -> None:
+    """Draw the map of a scenario at its start."""
+    import numpy as np
+
+    from fireworld.city.build import build_city
+    from fireworld.city.record import city_record
+    from fireworld.placement import place, scenario_plan
+    from viewer.maps import draw_map, save_figure
+
+    plan = scenario_plan(scenario)
+    setup = place(scenario, plan)
+    parameters = scenario.parameters
+    city = build_city(plan, parameters.fire, seed=scenario.city.ray_seed)
+    record = city_record(
+        city,
+        civilian_mm=setup.civilian_mm,
+        civilian_building=setup.civilian_building,
+        civilian_hp=np.full(len(setup.civilian_building), parameters.health.initial_hp),
+        n_brigades=len(setup.brigade_refuge),
+        brigades=parameters.brigades,
+    )
+    fieryness = np.zeros(city.n_buildings, dtype=np.uint8)
+    fieryness[setup.ignited] = 1
+    brigades_xy = city.streets.access_mm[setup.brigade_refuge] / 1000.0
+    title = ": ".join(part for part in (scenario.name, scenario.description) if part)
+    save_figure(draw_map(record, fieryness=fieryness, brigades_xy=brigades_xy, title=title), path, force=force)
+    click.echo(f"{path}: {city.n_buildings} buildings, {len(setup.ignited)} burning")
+
+
+def _summary(scenario: Scenario) -> dict[str, Any]:
+    """Return what the list says of a scenario."""
+    return {
+        "name": scenario.name,
+        "description": scenario.description,
+        "city": scenario.city.summary,
+        "n_brigades": scenario.brigades.n,
+        "n_civilians": scenario.civilians.count,
+        "steps": scenario.steps,
+        "digest": scenario.digest,
+    }
+
+
+def _print_table(scenarios: Sequence[Scenario]) -> None:
+    """Write the list as a table."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    table.add_column("name", no_wrap=True)
+    table.add_column("description")
+    table.add_column("city", no_wrap=True)
+    for heading in ("brigades", "civilians", "steps"):
+        table.add_column(heading, justify="right")
+    for scenario in scenarios:
+        row = _summary(scenario)
+        cells = [row[key] for key in ("name", "description", "city", "n_brigades", "n_civilians", "steps")]
+        table.add_row(*(Text(str(cell)) for cell in cells))
+    Console(highlight=False).print(table)

@@ -1,0 +1,82 @@
+"""`fireworld view`: open recordings in Rerun, or save them for it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from fireworld.records import Recording
+
+
+def _building_ids(context: click.Context, parameter: click.Parameter, value: str | None) -> tuple[int, ...]:
+    """Turn "369,42" into (369, 42), each id once."""
+    if value is None:
+        return ()
+    try:
+        return tuple(dict.fromkeys(int(part) for part in value.split(",")))
+    except ValueError:
+        raise click.BadParameter(f"expected building ids like 369,42, got {value!r}", context, parameter) from None
+
+
+@click.command()
+@click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--save", "output", metavar="F.rrd", type=click.Path(path_type=Path), help="Write a Rerun file instead.")
+@click.option("--force", is_flag=True, help="Replace an existing file.")
+@click.option("--web", is_flag=True, help="Serve the view to browsers on this machine.")
+@click.option("--port", type=click.IntRange(1, 65535), help="Port of the page that --web serves.  [default: 9090]")
+@click.option("--focus", callback=_building_ids, metavar="IDS", help="Plot these buildings' temperatures.")
+@click.option("--from", "first", type=click.IntRange(min=0), metavar="N", help="First step to show.")
+@click.option("--to", "last", type=click.IntRange(min=0), metavar="N", help="Last step to show.")
+@click.option("--every", type=click.IntRange(min=1), default=1, metavar="N", help="Show every N-th step.")
+def command(
+    *,
+    logs: tuple[Path, ...],
+    output: Path | None,
+    force: bool,
+    web: bool,
+    port: int | None,
+    focus: tuple[int, ...],
+    first: int | None,
+    last: int | None,
+    every: int,
+) -> None:
+    """Open one recording in Rerun, or two of the same city side by side.
+
+    A recording that was cut off or damaged is shown as far as it is good.
+    """
+    if len(logs) > 2:
+        raise click.UsageError(f"Expected one or two recordings, got {len(logs)}.")
+    if web and output is not None:
+        raise click.UsageError("--save and --web exclude each other.")
+    if port is not None and not web:
+        raise click.UsageError("--port goes with --web.")
+    if force and output is None:
+        raise click.UsageError("--force goes with --save.")
+    from viewer import app
+    from viewer.selection import select_steps
+
+    recordings = [select_steps(_open(path), first=first, last=last, every=every) for path in logs]
+    if output is not None:
+        app.save(recordings, output, focus=focus, force=force)
+        click.echo(f"wrote {output}; open it with `rerun {output}`")
+    elif web:
+        app.serve(recordings, focus=focus, port=port or app.WEB_PORT, announce=_announce)
+    else:
+        app.show(recordings, focus=focus)
+
+
+def _open(path: Path) -> Recording:
+    """Open a log as far as it is good; say so where that is not to its end."""
+    from recorder.reader import open_log
+
+    log = open_log(path, partial=True)
+    if log.damage is not None:
+        click.echo(f"{path}: {log.damage}; showing {len(log.steps)} committed steps", err=True)
+    return log
+
+
+def _announce(address: str) -> None:
+    click.echo(f"Open {address} in a browser; Ctrl-C ends it.")

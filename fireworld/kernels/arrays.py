@@ -1,0 +1,254 @@
+"""The arrays that kernels work on, grouped by concern; n buildings, m street nodes.
+
+Named tuples of arrays, because numba compiles and caches them ahead (a jitclass is not cached across processes).
+"Tables" are fixed during an episode, "State" is what a step may change.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+
+class BuildingTables(NamedTuple):
+    """What is fixed of each building, (n,)."""
+
+    order: Array  # uint32, in which the air exchange visits the buildings
+    capacity: Array  # float64, energy per degree (a float32 number)
+    initial_fuel: Array  # float32, energy
+    ignition_point: Array  # float64, degrees above ambient
+    emission: Array  # float64, energy radiated a step per K^4: wall_area * coefficient * Stefan-Boltzmann
+    inflammable: Array  # uint8
+
+
+class CoverTables(NamedTuple):
+    """Each building's block of air cells: rows along x, cells along y; rows padded to a multiple of four cells."""
+
+    x0: Array  # (n,) uint32, first row in the padded grid
+    y0: Array  # (n,) uint32, first cell in the padded grid
+    rows: Array  # (n,) uint32
+    width: Array  # (n,) uint32, multiple of 4
+    ptr: Array  # (n,) uint32, start in weight
+    weight: Array  # float64, energy per degree of difference: flow * cover * cell size; 0 where not covered
+
+
+class LinkTables(NamedTuple):
+    """Radiation links as CSR over the emitting buildings."""
+
+    ptr: Array  # (n+1,) uint32
+    building: Array  # uint32
+    share: Array  # float64 (a float32 number)
+
+
+class FireConstants(NamedTuple):
+    """The scalars of the fire model; parameters.FireParameters says what they mean."""
+
+    burn_rate_mean: float
+    burn_rate_sd: float
+    air_to_air_flow: float
+    air_heat_kept: float
+    cell_share: float  # degrees a cell loses per unit of energy it gives: 1 / (air heat capacity * cell size)
+    water_heat_burning: float
+    water_heat_unburnt: float
+    flush_temperature: float
+
+
+class FireState(NamedTuple):
+    """What burns: changed by every step."""
+
+    energy: Array  # (n,) float64
+    fuel: Array  # (n,) float32
+    water: Array  # (n,) int32, litres lying on the building
+    watered: Array  # (n,) uint8, 1 once water has reached it
+    fieryness: Array  # (n,) uint8, official code
+    air: Array  # (nx + 2, pitch) float64, degrees; a border of zeros around the nx * ny cells
+    reach: Array  # (nx + 2, 2) int32, per row of air: first cell and end of what may differ from zero
+    rate: Array  # (n,) float64, burn rate of the step where a building burns
+    emitted: Array  # (n,) float64, scratch
+    scratch: Array  # (3, pitch) float64, scratch
+
+
+class GeometryTables(NamedTuple):
+    """Where the buildings are and how big they are, (n,) float64; lengths in millimetres."""
+
+    building_id: Array  # int64, breaks ties
+    x: Array  # centroid
+    y: Array
+    west: Array  # bounding box of the outline
+    south: Array
+    east: Array
+    north: Array
+    center_square: Array  # squared distance of the centroid from the city's centre
+    volume: Array  # m3
+    floor_area: Array  # m2, ground area * floors
+
+
+class NearTables(NamedTuple):
+    """Which buildings belong to one fire site when both burn, as CSR."""
+
+    ptr: Array  # (n+1,) uint32
+    building: Array  # uint32
+
+
+class StreetTables(NamedTuple):
+    """The street graph; lengths in whole millimetres."""
+
+    node_x: Array  # (m,) float64
+    node_y: Array  # (m,) float64
+    first: Array  # (k,) int32, first node of each street
+    second: Array  # (k,) int32
+    length: Array  # (k,) int64
+    distance: Array  # (m, m) int64, -1 where there is no way
+    next_node: Array  # (m, m) int32
+    arc_ptr: Array  # (m+1,) int32, streets at each node, as CSR
+    arc_node: Array  # (2k,) int32, node at the other end
+    arc_street: Array  # (2k,) int32
+    access_street: Array  # (n,) int32, where each building is reached
+    access_offset: Array  # (n,) int64, from that street's first node
+    refuge: Array  # (refuges,) int32, buildings where tanks are refilled
+    hydrant_node: Array  # (hydrants,) int32
+
+
+class CityTables(NamedTuple):
+    """Everything fixed of a city."""
+
+    buildings: BuildingTables
+    cover: CoverTables
+    links: LinkTables
+    geometry: GeometryTables
+    near: NearTables
+    streets: StreetTables
+
+
+class HealthConstants(NamedTuple):
+    """The scalars of the damage model; parameters.HealthParameters says what they mean."""
+
+    slight_damage: float
+    slight_below: float  # the three outcomes exclude each other: one uniform draw, cumulative bounds
+    serious_damage: float
+    serious_below: float
+    critical_damage: float
+    critical_below: float
+    growth: float
+    constant: float
+    noise_mean: float
+    noise_sd: float
+    brigade_share: float
+
+
+class BrigadeConstants(NamedTuple):
+    """The scalars of a brigade; lengths in millimetres."""
+
+    tank: int
+    power: int
+    refuge_refill: int
+    hydrant_refill: int
+    range_square: float
+    speed: int
+
+
+class ObservationConstants(NamedTuple):
+    """Thresholds of what a brigade sees; squares of millimetres, and the unit volume in m3."""
+
+    center_low_square: float
+    center_medium_square: float
+    civilian_low_square: float
+    civilian_medium_square: float
+    unit_volume: float
+
+
+class Constants(NamedTuple):
+    """All scalars of a world."""
+
+    fire: FireConstants
+    health: HealthConstants
+    brigades: BrigadeConstants
+    observation: ObservationConstants
+    reward_change: bool  # reward the step's change of the stock instead of the stock
+
+
+class CivilianState(NamedTuple):
+    """The civilians, (c,); they stay where they are."""
+
+    building: Array  # int32, -1 outdoors
+    x: Array  # float64, mm
+    y: Array  # float64, mm
+    full_hp: Array  # int32
+    hp: Array  # int32
+    damage: Array  # float64, health points lost per step
+
+
+class BrigadeState(NamedTuple):
+    """The brigades, (b,)."""
+
+    street: Array  # int32, the street a brigade stands on
+    offset: Array  # int64, mm from that street's first node
+    x: Array  # float64, mm
+    y: Array  # float64, mm
+    tank: Array  # int32, litres
+    refilling: Array  # uint8, 1 from an empty tank until it is full again
+    action: Array  # int32, last choice, -1 none: what the others see
+    target: Array  # int32, building, -1 none
+    site: Array  # int32, number of the fire site, 0 none
+    activity: Array  # uint8, index into records.ACTIVITIES
+    refuge: Array  # int32, refuge building a brigade stands at when the step begins, -1 none
+    hydrant: Array  # int32, hydrant it stands at when the step begins, -1 none
+    inside: Array  # int32, building it is in, -1 on the street
+    sprayed: Array  # int32, litres in the last step
+    driven: Array  # int64, mm in the last step
+    hp: Array  # int32
+    damage: Array  # float64
+
+
+class SiteState(NamedTuple):
+    """Fire sites: connected sets of burning buildings. At most n of them; counts[0] says how many are in use."""
+
+    counts: Array  # (3,) int32: sites in use, last number given, burning buildings
+    label: Array  # (n,) int32, number of the site of each burning building, 0 none: kept from step to step
+    place: Array  # (n,) int32, position of each burning building's site in the arrays below, -1 none
+    member: Array  # (n,) uint32, burning buildings, site after site
+    start: Array  # (n+1,) int32, start of each site in member
+    number: Array  # (n,) int32
+    volume: Array  # (n,) float64, m3
+    west: Array  # (n,) float64, mm, bounding box of the burning buildings
+    south: Array
+    east: Array
+    north: Array
+    center_square: Array  # (n,) float64, nearest burning building to the city's centre
+    civilian_square: Array  # (n,) float64, nearest burning building to an unreached civilian; inf if there is none
+    free_sides: Array  # (n,) uint8, bits N, E, S, W
+    building_civilian_square: Array  # (n,) float64, per burning building
+
+
+class Outcome(NamedTuple):
+    """What a step was worth, as one array each of float64."""
+
+    reward: Array  # (6,) water_damaged, burning, burnt_out, civilians, total, sum so far
+    stock: Array  # (4,) the four terms as a stock
+    score: Array  # (3,) score, score_max, score_now
+    counts: Array  # (4,) int32: burning, water-damaged, burnt out, civilians alive
+    water: Array  # (1,) litres sprayed so far
+    draws: Array  # (2,) sums of burn rates and of damage draws
+
+
+class WorldArrays(NamedTuple):
+    """Everything that a step may change."""
+
+    fire: FireState
+    civilians: CivilianState
+    brigades: BrigadeState
+    sites: SiteState
+    outcome: Outcome
+
+
+class PolicyTables(NamedTuple):
+    """A policy that the kernels can follow by themselves, per brigade."""
+
+    kind: Array  # (b,) int32: 0 always one action, 1 random, 2 greedy in a table
+    action: Array  # (b,) int32, the action of kind 0
+    table_of: Array  # (b,) int32, the table of kind 2
+    tables: Array  # (tables, states, 4) float64
+    epsilon: Array  # (1,) float64, probability of a random action instead of the greedy one

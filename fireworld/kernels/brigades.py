@@ -1,0 +1,288 @@
+"""Brigades: refilling, spraying and driving along the streets."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fireworld.kernels.arrays import (
+    Array,
+    BrigadeConstants,
+    BrigadeState,
+    CityTables,
+    FireState,
+    GeometryTables,
+    StreetTables,
+)
+
+IDLE, DRIVING, SPRAYING, TO_REFUGE, REFILLING, DEAD = 0, 1, 2, 3, 4, 5
+ACCEPTED, UNKNOWN_BRIGADE, OVER_POWER, TANK_TOO_LOW, OUT_OF_RANGE, NEGATIVE = 1, -1, -2, -3, -4, -5
+NOWHERE = np.int64(1) << 60
+NO_TARGET = np.int64(-1)
+
+
+@njit(cache=True, nogil=True)
+def judge_request(
+    litres: int, sprayed: int, tank: int, distance_square: float, constants: BrigadeConstants
+) -> int:
+    """Return the official result code of an extinguish request of a known brigade; MODEL 2.2.
+
+    Args:
+        litres: water asked for.
+        sprayed: litres of this brigade's requests already accepted in this step.
+        tank: litres in its tank.
+        distance_square: squared distance from the brigade to the building's centroid, mm^2.
+        constants: power, range.
+    """
+    if sprayed + litres > constants.power:
+        return OVER_POWER
+    if litres > tank:
+        return TANK_TOO_LOW
+    if distance_square > constants.range_square:
+        return OUT_OF_RANGE
+    return NEGATIVE if litres < 0 else ACCEPTED
+
+
+@njit(cache=True, nogil=True)
+def distance_square(x: float, y: float, b: int, geometry: GeometryTables) -> float:
+    """Return the squared distance from a point to the centroid of building b, mm^2."""
+    dx, dy = geometry.x[b] - x, geometry.y[b] - y
+    return dx * dx + dy * dy
+
+
+@njit(cache=True, nogil=True)
+def locate(street: int, offset: int, streets: StreetTables) -> tuple[float, float]:
+    """Return the point at an offset along a street, mm."""
+    first, second = streets.first[street], streets.second[street]
+    part = offset / streets.length[street]
+    x, y = streets.node_x[first], streets.node_y[first]
+    return x + (streets.node_x[second] - x) * part, y + (streets.node_y[second] - y) * part
+
+
+@njit(cache=True, nogil=True)
+def way(street: int, offset: int, goal_street: int, goal_offset: int, streets: StreetTables) -> tuple[int, int, int]:
+    """Return the shortest way to a point of another street: its length, the node to leave by, the node to arrive at.
+
+    Lengths in mm; NOWHERE and nodes -1 where there is no way. On the same street: the way along it, nodes -1.
+    """
+    if street == goal_street:
+        return abs(goal_offset - offset), np.int64(-1), np.int64(-1)
+    best, best_leave, best_arrive = NOWHERE, np.int64(-1), np.int64(-1)
+    for end in range(2):
+        leave = np.int64(streets.first[street] if end == 0 else streets.second[street])
+        out = offset if end == 0 else streets.length[street] - offset
+        for goal_end in range(2):
+            arrive = np.int64(streets.first[goal_street] if goal_end == 0 else streets.second[goal_street])
+            between = streets.distance[leave, arrive]
+            if between >= 0:
+                last = goal_offset if goal_end == 0 else streets.length[goal_street] - goal_offset
+                total = out + between + last
+                if total < best:
+                    best, best_leave, best_arrive = total, leave, arrive
+    return best, best_leave, best_arrive
+
+
+@njit(cache=True, nogil=True)
+def street_between(node: int, other: int, streets: StreetTables) -> int:
+    """Return the shortest street that joins two neighbouring nodes (ties: lowest index)."""
+    best, best_length = np.int64(-1), NOWHERE
+    for k in range(streets.arc_ptr[node], streets.arc_ptr[node + 1]):
+        street = np.int64(streets.arc_street[k])
+        if streets.arc_node[k] == other and streets.length[street] < best_length:
+            best, best_length = street, streets.length[street]
+    return best
+
+
+@njit(cache=True, nogil=True)
+def end_offset(street: int, node: int, streets: StreetTables) -> int:
+    """Return the offset of a street's end at a node."""
+    return np.int64(0) if node == streets.first[street] else streets.length[street]
+
+
+@njit(cache=True, nogil=True)
+def stop_in_range(
+    street: int,
+    offset: int,
+    goal: int,
+    target: int,
+    range_square: float,
+    geometry: GeometryTables,
+    streets: StreetTables,
+) -> int:
+    """Return the offset of the first whole millimetre from `offset` towards `goal` within range of the target.
+
+    `goal` itself if no point on the way is within range. Works on the straight street: the root of a quadratic.
+    """
+    if target < 0 or goal == offset:
+        return goal
+    x, y = locate(street, offset, streets)
+    goal_x, goal_y = locate(street, goal, streets)
+    span = float(abs(goal - offset))
+    ux, uy = (goal_x - x) / span, (goal_y - y) / span
+    dx, dy = geometry.x[target] - x, geometry.y[target] - y
+    along = dx * ux + dy * uy
+    rest = range_square - (dx * dx + dy * dy - along * along)
+    if rest < 0.0:
+        return goal
+    reach = np.int64(max(0.0, along - np.sqrt(rest))) + 1
+    if along < 0.0 or reach >= span:
+        return goal
+    return offset + reach if goal > offset else offset - reach
+
+
+@njit(cache=True, nogil=True)
+def drive(
+    brigade: int, goal_building: int, target: int, brigades: BrigadeState, city: CityTables, constants: BrigadeConstants
+) -> None:
+    """Drive a brigade along the shortest way to where a building is entered, one step's worth at most.
+
+    It stops early where the target (a building, -1 for none) comes into range. Without a way it stays.
+    """
+    streets, geometry = city.streets, city.geometry
+    goal_street, goal_offset = np.int64(streets.access_street[goal_building]), streets.access_offset[goal_building]
+    left = constants.speed
+    street, offset = np.int64(brigades.street[brigade]), brigades.offset[brigade]
+    while left > 0:
+        length, leave, arrive = way(street, offset, goal_street, goal_offset, streets)
+        if length >= NOWHERE:
+            break
+        if length == 0:  # there, perhaps at a crossing that the goal's street shares
+            street, offset = goal_street, goal_offset
+            break
+        goal = goal_offset if leave < 0 else end_offset(street, leave, streets)
+        if goal == offset:  # at the node by which to leave: turn into the next street
+            if leave == arrive:
+                street, goal = goal_street, goal_offset
+            else:
+                node = np.int64(streets.next_node[leave, arrive])
+                street = street_between(leave, node, streets)
+                goal = end_offset(street, node, streets)
+            offset = end_offset(street, leave, streets)
+        ahead = min(left, abs(goal - offset))
+        stop = offset + ahead if goal > offset else offset - ahead
+        reached = stop_in_range(street, offset, stop, target, constants.range_square, geometry, streets)
+        left -= abs(reached - offset)
+        brigades.driven[brigade] += abs(reached - offset)
+        offset = reached
+        if reached != stop:
+            break
+        if target >= 0:
+            x, y = locate(street, offset, streets)
+            if distance_square(x, y, target, geometry) <= constants.range_square:
+                break
+    brigades.street[brigade], brigades.offset[brigade] = street, offset
+    brigades.x[brigade], brigades.y[brigade] = locate(street, offset, streets)
+
+
+@njit(cache=True, nogil=True)
+def refuge_at(street: int, offset: int, streets: StreetTables) -> int:
+    """Return the refuge building that is entered from a point of a street, -1 if none."""
+    for k in range(len(streets.refuge)):
+        b = streets.refuge[k]
+        if streets.access_street[b] == street and streets.access_offset[b] == offset:
+            return np.int64(b)
+    return np.int64(-1)
+
+
+@njit(cache=True, nogil=True)
+def nearest_refuge(street: int, offset: int, streets: StreetTables) -> int:
+    """Return the refuge building with the shortest way (ties: first listed), -1 if none can be reached."""
+    best, best_length = np.int64(-1), NOWHERE
+    for k in range(len(streets.refuge)):
+        b = np.int64(streets.refuge[k])
+        length, _, _ = way(street, offset, np.int64(streets.access_street[b]), streets.access_offset[b], streets)
+        if length < best_length:
+            best, best_length = b, length
+    return best
+
+
+@njit(cache=True, nogil=True)
+def refill(refuge: Array, hydrant: Array, hp: Array, tank: Array, constants: BrigadeConstants) -> None:
+    """Fill the tanks of the brigades at a refuge, and of the lowest one at each hydrant; MODEL 2.1.
+
+    Args:
+        refuge: (b,) int32, the refuge building a brigade stands at, -1 none.
+        hydrant: (b,) int32, the hydrant it stands at, -1 none.
+        hp: (b,) int32; the dead do nothing.
+        tank: (b,) int32 litres; changed.
+        constants: rates and size of the tank.
+    """
+    for brigade in range(len(tank)):
+        if hp[brigade] <= 0:
+            continue
+        if refuge[brigade] >= 0:
+            tank[brigade] = min(tank[brigade] + constants.refuge_refill, constants.tank)
+        elif hydrant[brigade] >= 0:
+            first = True
+            for other in range(brigade):
+                first = first and not (hp[other] > 0 and hydrant[other] == hydrant[brigade])
+            if first:
+                tank[brigade] = min(tank[brigade] + constants.hydrant_refill, constants.tank)
+
+
+@njit(cache=True, nogil=True)
+def find_stations(brigades: BrigadeState, streets: StreetTables) -> None:
+    """Find the refuge and the hydrant that every brigade stands at."""
+    for brigade in range(len(brigades.tank)):
+        street, offset = np.int64(brigades.street[brigade]), brigades.offset[brigade]
+        brigades.refuge[brigade] = refuge_at(street, offset, streets)
+        brigades.hydrant[brigade] = -1
+        for k in range(len(streets.hydrant_node)):
+            node = streets.hydrant_node[k]
+            if brigades.x[brigade] == streets.node_x[node] and brigades.y[brigade] == streets.node_y[node]:
+                brigades.hydrant[brigade] = k
+
+
+@njit(cache=True, nogil=True)
+def spray(brigade: int, target: int, litres: int, brigades: BrigadeState, fire: FireState) -> None:
+    """Move litres from a brigade's tank onto a building."""
+    brigades.tank[brigade] -= litres
+    brigades.sprayed[brigade] += litres
+    fire.water[target] += litres
+    fire.watered[target] = 1
+
+
+@njit(cache=True, nogil=True)
+def act(brigades: BrigadeState, fire: FireState, city: CityTables, constants: BrigadeConstants) -> int:
+    """Let every brigade do what it chose: refill, spray, or drive; return the litres sprayed. MODEL 2.1-2.2 and 4."""
+    streets, geometry = city.streets, city.geometry
+    find_stations(brigades, streets)
+    refill(brigades.refuge, brigades.hydrant, brigades.hp, brigades.tank, constants)
+    total = 0
+    for brigade in range(len(brigades.tank)):
+        brigades.sprayed[brigade] = 0
+        brigades.driven[brigade] = 0
+        target = np.int64(brigades.target[brigade])
+        brigades.activity[brigade] = IDLE
+        if brigades.hp[brigade] <= 0:
+            brigades.activity[brigade] = DEAD
+        elif brigades.refilling[brigade] != 0:
+            if brigades.refuge[brigade] >= 0:
+                brigades.activity[brigade] = REFILLING
+            else:
+                refuge = nearest_refuge(np.int64(brigades.street[brigade]), brigades.offset[brigade], streets)
+                if refuge >= 0:
+                    brigades.activity[brigade] = TO_REFUGE
+                    drive(brigade, refuge, NO_TARGET, brigades, city, constants)
+        elif target >= 0:
+            square = distance_square(brigades.x[brigade], brigades.y[brigade], target, geometry)
+            litres = min(constants.power, brigades.tank[brigade])
+            if litres > 0 and judge_request(litres, 0, brigades.tank[brigade], square, constants) == ACCEPTED:
+                brigades.activity[brigade] = SPRAYING
+                spray(brigade, target, litres, brigades, fire)
+                total += litres
+            elif square > constants.range_square:
+                brigades.activity[brigade] = DRIVING
+                drive(brigade, target, target, brigades, city, constants)
+        if brigades.tank[brigade] == 0:
+            brigades.refilling[brigade] = 1
+        elif brigades.tank[brigade] == constants.tank:
+            brigades.refilling[brigade] = 0
+    return total
+
+
+@njit(cache=True, nogil=True)
+def shelter(brigades: BrigadeState) -> None:
+    """Note the building each brigade is in: its refuge while it refills there, else none."""
+    for brigade in range(len(brigades.tank)):
+        brigades.inside[brigade] = brigades.refuge[brigade] if brigades.activity[brigade] == REFILLING else -1

@@ -1,0 +1,54 @@
+"""How the kernels choose by themselves: a fixed action, a random one, or epsilon-greedy in a table."""
+
+from __future__ import annotations
+
+from numba import njit
+
+from fireworld.draws import ACTION, EXPLORE
+from fireworld.kernels.arrays import Array, PolicyTables
+from fireworld.kernels.draws import below, uniform
+from fireworld.kernels.observation import N_ACTIONS
+
+FIXED, RANDOM, TABLE = 0, 1, 2
+
+
+@njit(cache=True, nogil=True)
+def greedy(values: Array) -> int:
+    """Return the action with the highest value (ties: lowest action). values: (4,) float64."""
+    best = 0
+    for action in range(1, N_ACTIONS):
+        if values[action] > values[best]:
+            best = action
+    return best
+
+
+@njit(cache=True, nogil=True)
+def explores(brigade: int, policy: PolicyTables, seed: int, step: int) -> bool:
+    """Tell whether a brigade takes a random action in this step instead of the one its table prefers."""
+    epsilon = policy.epsilon[0]
+    return policy.kind[brigade] == TABLE and epsilon > 0.0 and uniform(seed, EXPLORE, brigade, step) < epsilon
+
+
+@njit(cache=True, nogil=True)
+def choose(brigade: int, state: int, policy: PolicyTables, seed: int, step: int) -> int:
+    """Return the action a brigade picks in a state.
+
+    Args:
+        brigade: who chooses.
+        state: 0..4319, or 0..269 where the tables have 270 states (the flags are then left out).
+        policy: kinds and tables.
+        seed: seed of the run.
+        step: simulated step.
+    """
+    kind = policy.kind[brigade]
+    if kind == FIXED:
+        return policy.action[brigade]
+    if kind == RANDOM or explores(brigade, policy, seed, step):
+        return below(seed, ACTION, brigade, step, N_ACTIONS)
+    return greedy(policy.tables[policy.table_of[brigade], table_state(state, policy.tables.shape[1])])
+
+
+@njit(cache=True, nogil=True)
+def table_state(state: int, n_states: int) -> int:
+    """Return the row of a table for a state of 4320: tables of 270 rows leave out the four flags."""
+    return state if n_states == 4320 else state // 16

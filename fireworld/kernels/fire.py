@@ -1,0 +1,256 @@
+"""The official fire model: burning, water, air and radiation, one function a phase.
+
+MODEL section 2 in the docs has every equation. All temperatures are degrees above ambient.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import float32, njit
+
+from fireworld.draws import BURN_RATE
+from fireworld.kernels.arrays import BuildingTables, CoverTables, FireConstants, FireState, LinkTables
+from fireworld.kernels.draws import normal
+
+AMBIENT_KELVIN = 293.0
+STEFAN_BOLTZMANN = 5.6704e-8
+LEAST_SHARE = np.float32(0.005)
+
+
+@njit(cache=True, nogil=True)
+def is_burning(energy: float, capacity: float, ignition_point: float, fuel: float, inflammable: int) -> bool:
+    """Tell whether a building burns: hot enough, fuel left, inflammable (codes 1 to 3).
+
+    Takes numbers, not arrays: passing groups of arrays to a small function costs more than the function.
+    """
+    return energy / capacity >= ignition_point and fuel > 0.0 and inflammable != 0
+
+
+@njit(cache=True, nogil=True)
+def fieryness_of(burning: bool, fuel: float, full: float, inflammable: int, watered: int) -> int:
+    """Return the official code 0 to 8 of a building. fuel, full: energy left and at the start."""
+    if inflammable == 0:
+        return 0
+    if burning:
+        if fuel >= full * 0.66:
+            return 1
+        return 2 if fuel >= full * 0.33 else 3
+    if fuel == full:
+        return 4 if watered != 0 else 0
+    if fuel >= full * 0.66:
+        return 5
+    if fuel >= full * 0.33:
+        return 6
+    return 7 if fuel > 0.0 else 8
+
+
+@njit(cache=True, nogil=True)
+def draw_burn_rates(
+    buildings: BuildingTables, fire: FireState, constants: FireConstants, seed: int, step: int
+) -> float:
+    """Draw the burn rate of every burning building from N(mean, sd) and return their sum; MODEL 2.3.
+
+    Keyed by building and step: which other buildings burn changes nobody's luck.
+    """
+    total = 0.0
+    for b in range(len(fire.energy)):
+        hot = is_burning(
+            fire.energy[b], buildings.capacity[b], buildings.ignition_point[b], fire.fuel[b], buildings.inflammable[b]
+        )
+        if hot:
+            rate = constants.burn_rate_mean + constants.burn_rate_sd * normal(seed, BURN_RATE, b, step)
+            fire.rate[b] = rate
+            total += rate
+    return total
+
+
+@njit(cache=True, nogil=True)
+def burn(buildings: BuildingTables, fire: FireState) -> None:
+    """Turn fuel into heat in every burning building.
+
+    used = min(fuel, fuel0 * max(0.005, T/1000 * fuel/fuel0 * rate)); MODEL 2.3. `fire.rate` holds the step's draws.
+    """
+    for b in range(len(fire.energy)):
+        fuel = fire.fuel[b]
+        capacity = buildings.capacity[b]
+        if is_burning(fire.energy[b], capacity, buildings.ignition_point[b], fuel, buildings.inflammable[b]):
+            temperature = fire.energy[b] / capacity
+            full = buildings.initial_fuel[b]
+            share = float32(float32(temperature / 1000.0) * (fuel / full) * fire.rate[b])
+            used = min(fuel, full * max(share, LEAST_SHARE))
+            fire.energy[b] += used
+            fire.fuel[b] = fuel - used
+
+
+@njit(cache=True, nogil=True)
+def cool(buildings: BuildingTables, fire: FireState, constants: FireConstants) -> None:
+    """Let the water lying on hot buildings take heat; MODEL 2.4."""
+    for b in range(len(fire.energy)):
+        litres = fire.water[b]
+        if litres <= 0:
+            continue
+        heat = fire.energy[b] / buildings.capacity[b] * buildings.capacity[b]  # rounds as T * capacity does
+        if heat > 0.0:
+            burning = is_burning(
+                fire.energy[b],
+                buildings.capacity[b],
+                buildings.ignition_point[b],
+                fire.fuel[b],
+                buildings.inflammable[b],
+            )
+            taken = litres * (constants.water_heat_burning if burning else constants.water_heat_unburnt)
+            used = litres
+            if taken > heat:
+                part = 1.0 - (taken - heat) / taken
+                taken *= part
+                used = int(litres * part)
+            fire.water[b] = litres - used
+            fire.energy[b] -= taken
+
+
+@njit(cache=True, nogil=True)
+def spread_air(fire: FireState, constants: FireConstants) -> None:
+    """Mix every air cell with its eight neighbours and lose some heat; MODEL 2.5. Only rows in reach are touched.
+
+    Works in place: two rows of `scratch` keep the row before and the row itself as they were, the third the sums of
+    three cells across the rows.
+    """
+    air, reach, scratch = fire.air, fire.reach, fire.scratch
+    rows, pitch = air.shape
+    flow, kept, flush = constants.air_to_air_flow, constants.air_heat_kept, constants.flush_temperature
+    before, here = 0, 1
+    for y in range(pitch):
+        scratch[0, y] = 0.0
+    before_first, before_end = 0, 0  # reach of the row before, as it was
+    for x in range(1, rows - 1):
+        first, end = before_first, before_end
+        before_first, before_end = reach[x, 0], reach[x, 1]
+        for row in range(x, x + 2):
+            if reach[row, 1] > reach[row, 0]:
+                first = min(first, reach[row, 0]) if end > first else reach[row, 0]
+                end = max(end, reach[row, 1])
+        for y in range(pitch):
+            scratch[here, y] = air[x, y]
+        if end <= first:
+            before, here = here, before
+            continue
+        low, high = max(1, first - 1), min(pitch - 4, end + 1)
+        for y in range(low - 1, high + 1):
+            scratch[2, y] = scratch[before, y] + scratch[here, y] + air[x + 1, y]
+        for y in range(low, high):
+            old = scratch[here, y]
+            mean = (scratch[2, y - 1] + scratch[2, y] + scratch[2, y + 1] - old) * 0.125
+            fresh = (old + (mean - old) * flow) * kept
+            air[x, y] = fresh if fresh > flush else 0.0
+        before, here = here, before
+        while low < high and air[x, low] == 0.0:
+            low += 1
+        while high > low and air[x, high - 1] == 0.0:
+            high -= 1
+        reach[x, 0], reach[x, 1] = low, high
+
+
+@njit(cache=True, nogil=True)
+def exchange_with_air(
+    buildings: BuildingTables, cover: CoverTables, fire: FireState, constants: FireConstants
+) -> None:
+    """Let each building in turn exchange heat with the air cells under it; MODEL 2.6.
+
+    q = (T_cell - T_building) * weight; the cell loses q * cell_share, the building gains the sum. A building without
+    heat over cells without heat is passed over: nothing would change.
+    """
+    air, reach = fire.air, fire.reach
+    share = constants.cell_share
+    for k in range(len(buildings.order)):
+        b = buildings.order[k]
+        x0, y0 = cover.x0[b], cover.y0[b]
+        x1, y1 = x0 + cover.rows[b], y0 + cover.width[b]
+        if fire.energy[b] == 0.0:
+            warm = False
+            for x in range(x0, x1):
+                if reach[x, 0] < y1 and reach[x, 1] > y0:
+                    warm = True
+            if not warm:
+                continue
+        temperature = fire.energy[b] / buildings.capacity[b]
+        p = cover.ptr[b]
+        gain_0 = gain_1 = gain_2 = gain_3 = 0.0
+        for x in range(x0, x1):
+            if reach[x, 1] <= reach[x, 0]:
+                reach[x, 0], reach[x, 1] = y0, y1
+            else:
+                reach[x, 0], reach[x, 1] = min(reach[x, 0], y0), max(reach[x, 1], y1)
+            cells = air[x]
+            for y in range(y0, y1, 4):
+                cell_0, cell_1, cell_2, cell_3 = cells[y], cells[y + 1], cells[y + 2], cells[y + 3]
+                q_0 = (cell_0 - temperature) * cover.weight[p]
+                q_1 = (cell_1 - temperature) * cover.weight[p + 1]
+                q_2 = (cell_2 - temperature) * cover.weight[p + 2]
+                q_3 = (cell_3 - temperature) * cover.weight[p + 3]
+                cells[y] = cell_0 - q_0 * share
+                cells[y + 1] = cell_1 - q_1 * share
+                cells[y + 2] = cell_2 - q_2 * share
+                cells[y + 3] = cell_3 - q_3 * share
+                gain_0 += q_0
+                gain_1 += q_1
+                gain_2 += q_2
+                gain_3 += q_3
+                p += 4
+        fire.energy[b] += (gain_0 + gain_1) + (gain_2 + gain_3)
+
+
+@njit(cache=True, nogil=True)
+def radiate(buildings: BuildingTables, links: LinkTables, fire: FireState) -> None:
+    """Send out every building's radiation and share it among the buildings it is linked to; MODEL 2.7.
+
+    emitted = min(E, (T + 293)^4 * emission), for all buildings before any receives.
+    """
+    n = len(fire.energy)
+    for b in range(n):
+        energy = fire.energy[b]
+        kelvin = energy / buildings.capacity[b] + AMBIENT_KELVIN
+        square = kelvin * kelvin
+        fire.emitted[b] = min(energy, square * square * buildings.emission[b])
+    for b in range(n):
+        emitted = fire.emitted[b]
+        if emitted != 0.0:
+            for k in range(links.ptr[b], links.ptr[b + 1]):
+                fire.energy[links.building[k]] += emitted * links.share[k]
+            fire.energy[b] -= emitted
+
+
+@njit(cache=True, nogil=True)
+def settle(buildings: BuildingTables, fire: FireState, constants: FireConstants) -> None:
+    """Flush tiny heat to zero where asked, then give every building its code; MODEL 2 and its codes."""
+    for b in range(len(fire.energy)):
+        capacity = buildings.capacity[b]
+        if fire.energy[b] < constants.flush_temperature * capacity:
+            fire.energy[b] = 0.0
+        inflammable, fuel = buildings.inflammable[b], fire.fuel[b]
+        burning = is_burning(fire.energy[b], capacity, buildings.ignition_point[b], fuel, inflammable)
+        fire.fieryness[b] = fieryness_of(burning, fuel, buildings.initial_fuel[b], inflammable, fire.watered[b])
+
+
+@njit(cache=True, nogil=True)
+def ignite(b: int, buildings: BuildingTables, fire: FireState) -> bool:
+    """Set building b on fire: E = capacity * ignition point * 1.5; only from code 0 or 4, and if inflammable."""
+    code = fire.fieryness[b]
+    if buildings.inflammable[b] == 0 or code not in (0, 4):
+        return False
+    fire.energy[b] = float32(buildings.capacity[b] * buildings.ignition_point[b]) * 1.5
+    fire.fieryness[b] = 1
+    return True
+
+
+@njit(cache=True, nogil=True)
+def advance_fire(
+    buildings: BuildingTables, cover: CoverTables, links: LinkTables, fire: FireState, constants: FireConstants
+) -> None:
+    """Run phases 3 to 8 of a step: burn, cool, air, exchange, radiation, cool; then the codes."""
+    burn(buildings, fire)
+    cool(buildings, fire, constants)
+    spread_air(fire, constants)
+    exchange_with_air(buildings, cover, fire, constants)
+    radiate(buildings, links, fire)
+    cool(buildings, fire, constants)
+    settle(buildings, fire, constants)

@@ -1,0 +1,92 @@
+"""Health of people: the damage model of the official "misc" simulator."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fireworld.draws import DAMAGE, DAMAGE_NOISE
+from fireworld.kernels.arrays import Array, BrigadeState, CivilianState, FireState, HealthConstants
+from fireworld.kernels.brigades import shelter
+from fireworld.kernels.draws import normal, uniform
+
+
+@njit(cache=True, nogil=True)
+def expose(uniform_draw: float, constants: HealthConstants) -> float:
+    """Return the damage that one step in a burning building adds: slight, serious, critical or none."""
+    if uniform_draw < constants.slight_below:
+        return constants.slight_damage
+    if uniform_draw < constants.serious_below:
+        return constants.serious_damage
+    return constants.critical_damage if uniform_draw < constants.critical_below else 0.0
+
+
+@njit(cache=True, nogil=True)
+def worsen(damage: float, noise: float, constants: HealthConstants) -> float:
+    """Let damage grow by one step: d + 0.00025 d^2 + 0.03 + noise; none stays none."""
+    return damage + constants.growth * damage * damage + constants.constant + noise if damage > 0.0 else 0.0
+
+
+@njit(cache=True, nogil=True)
+def harm(
+    building: Array,
+    hp: Array,
+    damage: Array,
+    fieryness: Array,
+    constants: HealthConstants,
+    share: float,
+    seed: int,
+    step: int,
+    first: int,
+) -> float:
+    """Hurt the people inside burning buildings and let all hurt people lose health; MODEL 3.
+
+    Args:
+        building: (p,) int32 building each person is in, -1 outdoors.
+        hp: (p,) int32 health points; changed.
+        damage: (p,) float64 health points lost per step; changed.
+        fieryness: (n,) codes of the buildings.
+        constants: the damage model.
+        share: part of the damage that these people take (brigades are protected).
+        seed: seed of the run.
+        step: simulated step.
+        first: entity number of the first person, for the draws.
+
+    Returns:
+        The sum of the damage draws and noise, which tells two runs' luck apart.
+    """
+    total = 0.0
+    for person in range(len(hp)):
+        if hp[person] <= 0:
+            continue
+        inside = building[person]
+        if inside >= 0 and 1 <= fieryness[inside] <= 3:
+            added = expose(uniform(seed, DAMAGE, first + person, step), constants) * share
+            damage[person] += added
+            total += added
+        if damage[person] > 0.0:
+            noise = constants.noise_mean + constants.noise_sd * normal(seed, DAMAGE_NOISE, first + person, step)
+            damage[person] = worsen(damage[person], noise, constants)
+            total += noise
+            hp[person] = max(0, hp[person] - int(damage[person] + 0.5))
+    return total
+
+
+@njit(cache=True, nogil=True)
+def harm_civilians(
+    civilians: CivilianState, fire: FireState, constants: HealthConstants, seed: int, step: int
+) -> float:
+    """Hurt the civilians; entities 0 to c-1 of the draws."""
+    return harm(civilians.building, civilians.hp, civilians.damage, fire.fieryness, constants, 1.0, seed, step, np.int64(0))
+
+
+@njit(cache=True, nogil=True)
+def harm_brigades(
+    brigades: BrigadeState, fire: FireState, constants: HealthConstants, seed: int, step: int, first: int
+) -> float:
+    """Hurt the brigades that refill inside a burning refuge; entities from `first` on of the draws."""
+    shelter(brigades)
+    share = constants.brigade_share
+    return harm(
+        brigades.inside, brigades.hp, brigades.damage, fire.fieryness, constants, share, seed, step, first
+    )

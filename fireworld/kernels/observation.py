@@ -1,0 +1,133 @@
+"""What a brigade sees, and which building an action names."""
+
+from __future__ import annotations
+
+from numba import njit
+
+from fireworld.kernels.arrays import (
+    Array,
+    BrigadeState,
+    BuildingTables,
+    FireState,
+    GeometryTables,
+    ObservationConstants,
+    SiteState,
+)
+
+N_ACTIONS = 4
+EASIEST, NEAREST_TO_CIVILIAN, NEAREST_TO_CENTER, NEAREST_TO_ME = 0, 1, 2, 3
+N_FEATURES = 8
+
+
+@njit(cache=True, nogil=True)
+def level(square: float, low: float, medium: float) -> int:
+    """Class a squared distance: 0 low, 1 medium, 2 high."""
+    if square < low:
+        return 0
+    return 1 if square < medium else 2
+
+
+@njit(cache=True, nogil=True)
+def volume_class(volume: float, unit: float) -> int:
+    """Class a burning volume: thresholds 1, 2, 4, 8, 16 times the unit volume."""
+    found = 0
+    bound = unit
+    for _ in range(5):
+        if volume >= bound:
+            found += 1
+        bound *= 2.0
+    return found
+
+
+@njit(cache=True, nogil=True)
+def state_index(features: Array) -> int:
+    """Return the state of eight features: mixed radix 5, 3, 3, 6, 2, 2, 2, 2, the first the most significant."""
+    index = features[0]
+    index = index * 3 + features[1]
+    index = index * 3 + features[2]
+    index = index * 6 + features[3]
+    for k in range(4, N_FEATURES):
+        index = index * 2 + features[k]
+    return index
+
+
+@njit(cache=True, nogil=True)
+def site_place(brigade: int, brigades: BrigadeState, sites: SiteState) -> int:
+    """Return the position of a brigade's site in the site arrays, -1 if it has none."""
+    for site in range(sites.counts[0]):
+        if sites.number[site] == brigades.site[brigade]:
+            return site
+    return -1
+
+
+@njit(cache=True, nogil=True)
+def observe(
+    brigade: int, brigades: BrigadeState, sites: SiteState, constants: ObservationConstants, features: Array
+) -> int:
+    """Write the eight features that a brigade sees and return its state; -1 (features 0) without a site. MODEL 5.
+
+    The flags tell what the other brigades chose: those before it in this step, those after it in the last one,
+    because choices are written into `brigades.action` one after another.
+
+    Args:
+        brigade: who looks.
+        brigades: the team.
+        sites: fire sites of the moment.
+        constants: thresholds.
+        features: (8,) int64, written.
+    """
+    for k in range(N_FEATURES):
+        features[k] = 0
+    site = site_place(brigade, brigades, sites)
+    if site < 0:
+        return -1
+    sides = sites.free_sides[site]
+    features[0] = (sides & 1) + (sides >> 1 & 1) + (sides >> 2 & 1) + (sides >> 3 & 1)
+    features[1] = level(sites.center_square[site], constants.center_low_square, constants.center_medium_square)
+    features[2] = level(sites.civilian_square[site], constants.civilian_low_square, constants.civilian_medium_square)
+    features[3] = volume_class(sites.volume[site], constants.unit_volume)
+    for other in range(len(brigades.action)):
+        if other != brigade and brigades.action[other] >= 0:
+            features[4 + brigades.action[other]] = 1
+    return state_index(features)
+
+
+@njit(cache=True, nogil=True)
+def find_target(
+    brigade: int,
+    action: int,
+    brigades: BrigadeState,
+    buildings: BuildingTables,
+    fire: FireState,
+    geometry: GeometryTables,
+    sites: SiteState,
+) -> int:
+    """Return the burning building of the brigade's site that an action names (ties: lowest id), -1 without a site."""
+    site = site_place(brigade, brigades, sites)
+    if site < 0:
+        return -1
+    best, best_measure = -1, 0.0
+    for k in range(sites.start[site], sites.start[site + 1]):
+        b = sites.member[k]
+        if action == EASIEST:
+            measure = fire.energy[b] / buildings.capacity[b]
+        elif action == NEAREST_TO_CIVILIAN:
+            measure = sites.building_civilian_square[b]
+        elif action == NEAREST_TO_CENTER:
+            measure = geometry.center_square[b]
+        else:
+            dx, dy = geometry.x[b] - brigades.x[brigade], geometry.y[b] - brigades.y[brigade]
+            measure = dx * dx + dy * dy
+        if (
+            best < 0
+            or measure < best_measure
+            or (measure == best_measure and geometry.building_id[b] < geometry.building_id[best])
+        ):
+            best, best_measure = b, measure
+    return best
+
+
+@njit(cache=True, nogil=True)
+def can_choose(brigade: int, brigades: BrigadeState, sites: SiteState) -> bool:
+    """Tell whether a brigade picks an action: alive, not refilling, something burns."""
+    return brigades.hp[brigade] > 0 and brigades.refilling[brigade] == 0 and sites.counts[0] > 0

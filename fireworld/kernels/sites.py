@@ -1,0 +1,213 @@
+"""Fire sites: which burning buildings belong together, how big they are and where they can still spread."""
+
+from __future__ import annotations
+
+from numba import njit
+
+from fireworld.kernels.arrays import (
+    BrigadeState,
+    BuildingTables,
+    CityTables,
+    CivilianState,
+    FireState,
+    GeometryTables,
+    LinkTables,
+    NearTables,
+    SiteState,
+)
+
+FAR = 1e300
+NORTH, EAST, SOUTH, WEST = 1, 2, 4, 8
+
+
+@njit(cache=True, nogil=True)
+def gather(fire: FireState, near: NearTables, sites: SiteState) -> None:
+    """Group the burning buildings into connected sets, in order of their lowest building index."""
+    n = len(fire.fieryness)
+    for b in range(n):
+        sites.place[b] = -1
+    n_sites, n_members = 0, 0
+    for b in range(n):
+        if not 1 <= fire.fieryness[b] <= 3 or sites.place[b] >= 0:
+            continue
+        sites.start[n_sites] = n_members
+        sites.place[b] = n_sites
+        sites.member[n_members] = b
+        head = n_members
+        n_members += 1
+        while head < n_members:
+            here = sites.member[head]
+            head += 1
+            for k in range(near.ptr[here], near.ptr[here + 1]):
+                there = near.building[k]
+                if 1 <= fire.fieryness[there] <= 3 and sites.place[there] < 0:
+                    sites.place[there] = n_sites
+                    sites.member[n_members] = there
+                    n_members += 1
+        n_sites += 1
+    sites.start[n_sites] = n_members
+    sites.counts[0] = n_sites
+    sites.counts[2] = n_members
+
+
+@njit(cache=True, nogil=True)
+def number_sites(sites: SiteState) -> None:
+    """Give every site its number: sites that merge keep the lowest, of a site that splits the largest part keeps it.
+
+    Numbers rise with age and are never used again. Equal parts: the one with the lowest building index keeps it.
+    """
+    n_sites = sites.counts[0]
+    for site in range(n_sites):
+        lowest = 0
+        for k in range(sites.start[site], sites.start[site + 1]):
+            label = sites.label[sites.member[k]]
+            if label > 0 and (lowest == 0 or label < lowest):
+                lowest = label
+        sites.number[site] = lowest
+    for site in range(n_sites):
+        claimed = sites.number[site]
+        if claimed <= 0:
+            continue
+        size = sites.start[site + 1] - sites.start[site]
+        for other in range(site + 1, n_sites):
+            if sites.number[other] == claimed:
+                other_size = sites.start[other + 1] - sites.start[other]
+                if other_size > size:
+                    sites.number[site] = 0
+                    break
+                sites.number[other] = 0
+    for site in range(n_sites):
+        if sites.number[site] == 0:
+            sites.counts[1] += 1
+            sites.number[site] = sites.counts[1]
+
+
+@njit(cache=True, nogil=True)
+def nearest_burning(x: float, y: float, geometry: GeometryTables, sites: SiteState) -> int:
+    """Return the burning building whose centroid is nearest to a point (ties: lowest id), -1 if nothing burns."""
+    best, best_square = -1, FAR
+    for k in range(sites.counts[2]):
+        b = sites.member[k]
+        dx, dy = geometry.x[b] - x, geometry.y[b] - y
+        square = dx * dx + dy * dy
+        closer = square < best_square or (
+            square == best_square and geometry.building_id[b] < geometry.building_id[best]
+        )
+        if closer:
+            best, best_square = b, square
+    return best
+
+
+@njit(cache=True, nogil=True)
+def assign_brigades(brigades: BrigadeState, geometry: GeometryTables, sites: SiteState) -> None:
+    """Keep every brigade with its site; follow a site that merged; send it to the nearest fire when its site is out.
+
+    Runs before the labels of the step before are overwritten: they tell where a merged site went.
+    """
+    for brigade in range(len(brigades.site)):
+        number = brigades.site[brigade]
+        kept = False
+        for site in range(sites.counts[0]):
+            kept = kept or sites.number[site] == number
+        if kept:
+            continue
+        brigades.site[brigade] = 0
+        if number > 0:
+            for k in range(sites.counts[2]):
+                b = sites.member[k]
+                if sites.label[b] == number:
+                    brigades.site[brigade] = sites.number[sites.place[b]]
+                    break
+        if brigades.site[brigade] == 0:
+            b = nearest_burning(brigades.x[brigade], brigades.y[brigade], geometry, sites)
+            if b >= 0:
+                brigades.site[brigade] = sites.number[sites.place[b]]
+
+
+@njit(cache=True, nogil=True)
+def relabel(sites: SiteState) -> None:
+    """Remember the site of every burning building for the next step."""
+    for b in range(len(sites.label)):
+        place = sites.place[b]
+        sites.label[b] = sites.number[place] if place >= 0 else 0
+
+
+@njit(cache=True, nogil=True)
+def civilian_squares(
+    civilians: CivilianState, fire: FireState, geometry: GeometryTables, sites: SiteState
+) -> None:
+    """Find each burning building's squared distance to the nearest living civilian who is in no burning building."""
+    for k in range(sites.counts[2]):
+        sites.building_civilian_square[sites.member[k]] = FAR
+    for civilian in range(len(civilians.hp)):
+        inside = civilians.building[civilian]
+        if civilians.hp[civilian] <= 0 or (inside >= 0 and 1 <= fire.fieryness[inside] <= 3):
+            continue
+        x, y = civilians.x[civilian], civilians.y[civilian]
+        for k in range(sites.counts[2]):
+            b = sites.member[k]
+            dx, dy = geometry.x[b] - x, geometry.y[b] - y
+            square = dx * dx + dy * dy
+            sites.building_civilian_square[b] = min(square, sites.building_civilian_square[b])
+
+
+@njit(cache=True, nogil=True)
+def measure_sites(geometry: GeometryTables, sites: SiteState) -> None:
+    """Measure every site: volume, bounding box, distance from the centre and from a civilian."""
+    for site in range(sites.counts[0]):
+        volume, center, civilian = 0.0, FAR, FAR
+        west, south, east, north = FAR, FAR, -FAR, -FAR
+        for k in range(sites.start[site], sites.start[site + 1]):
+            b = sites.member[k]
+            volume += geometry.volume[b]
+            center = min(center, geometry.center_square[b])
+            civilian = min(civilian, sites.building_civilian_square[b])
+            west, south = min(west, geometry.west[b]), min(south, geometry.south[b])
+            east, north = max(east, geometry.east[b]), max(north, geometry.north[b])
+        sites.volume[site] = volume
+        sites.center_square[site], sites.civilian_square[site] = center, civilian
+        sites.west[site], sites.south[site] = west, south
+        sites.east[site], sites.north[site] = east, north
+
+
+@njit(cache=True, nogil=True)
+def find_free_sides(
+    buildings: BuildingTables, links: LinkTables, geometry: GeometryTables, fire: FireState, sites: SiteState
+) -> None:
+    """Find the sides over which a site can spread: an unburnt linked building's centroid lies beyond them; MODEL 5.1."""
+    for site in range(sites.counts[0]):
+        sides = 0
+        west, south = sites.west[site], sites.south[site]
+        east, north = sites.east[site], sites.north[site]
+        for k in range(sites.start[site], sites.start[site + 1]):
+            b = sites.member[k]
+            for link in range(links.ptr[b], links.ptr[b + 1]):
+                there = links.building[link]
+                code = fire.fieryness[there]
+                if (code == 0 or code == 4) and buildings.inflammable[there] != 0:
+                    x, y = geometry.x[there], geometry.y[there]
+                    if y > north:
+                        sides |= NORTH
+                    if x > east:
+                        sides |= EAST
+                    if y < south:
+                        sides |= SOUTH
+                    if x < west:
+                        sides |= WEST
+            if sides == NORTH | EAST | SOUTH | WEST:
+                break
+        sites.free_sides[site] = sides
+
+
+@njit(cache=True, nogil=True)
+def find_sites(
+    city: CityTables, fire: FireState, civilians: CivilianState, brigades: BrigadeState, sites: SiteState
+) -> None:
+    """Find and measure the fire sites of the moment and settle which brigade belongs to which."""
+    gather(fire, city.near, sites)
+    number_sites(sites)
+    assign_brigades(brigades, city.geometry, sites)
+    relabel(sites)
+    civilian_squares(civilians, fire, city.geometry, sites)
+    measure_sites(city.geometry, sites)
+    find_free_sides(city.buildings, city.links, city.geometry, fire, sites)

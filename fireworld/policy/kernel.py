@@ -1,0 +1,94 @@
+"""Policies that the compiled episode can follow by itself: fixed actions, random, and tables."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from fireworld.kernels.arrays import Array, CityTables, PolicyTables
+from fireworld.kernels.choice import FIXED, RANDOM, TABLE, choose, explores, table_state
+from fireworld.policy.protocol import Decision, Observation
+from fireworld.records import ACTIONS
+
+NO_TABLES: Final = np.zeros((1, 1, 4))
+
+
+@dataclass
+class KernelPolicy:
+    """A policy as data, so that one implementation of the choice serves single steps and whole episodes.
+
+    Brigade b behaves as entry b modulo the length of `kinds`, so a policy fits any number of brigades.
+    """
+
+    kinds: tuple[int, ...]
+    actions: tuple[int, ...]
+    table_of: tuple[int, ...]
+    tables: Array
+    """(tables, states, 4) float64, states 4320 or 270."""
+    epsilon: float = 0.0
+    _ready: PolicyTables | None = field(default=None, init=False, repr=False, compare=False)
+
+    def for_brigades(self, n_brigades: int) -> PolicyTables:
+        """Spread the policy over a team."""
+        turn = np.arange(n_brigades) % len(self.kinds)
+        return PolicyTables(
+            kind=np.array(self.kinds, dtype=np.int32)[turn],
+            action=np.array(self.actions, dtype=np.int32)[turn],
+            table_of=np.array(self.table_of, dtype=np.int32)[turn],
+            tables=np.ascontiguousarray(self.tables, dtype=np.float64),
+            epsilon=np.array([self.epsilon]),
+        )
+
+    def begin(self, city: CityTables, n_brigades: int, seed: int) -> None:
+        """Get ready for a run of a team."""
+        del city, seed
+        self._ready = self.for_brigades(n_brigades)
+
+    def decide(self, observation: Observation) -> Decision:
+        """Choose as the compiled episode does."""
+        ready = self._ready
+        assert ready is not None, "begin() comes before decide()"  # noqa: S101 - a mistake of ours, not of a user
+        brigade, seed, step = observation.brigade, observation.seed, observation.step
+        action = int(choose(brigade, observation.state_index, ready, seed, step))
+        if ready.kind[brigade] != TABLE:
+            return Decision(action)
+        row = table_state(observation.state_index, ready.tables.shape[1])
+        values = ready.tables[ready.table_of[brigade], row]
+        return Decision(
+            action,
+            q_values=tuple(values.tolist()),
+            explored=bool(explores(brigade, ready, seed, step)),
+            epsilon=self.epsilon,
+        )
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of what the policy does."""
+        content = hashlib.sha256(repr((self.kinds, self.actions, self.table_of, self.epsilon)).encode())
+        content.update(repr(self.tables.shape).encode() + np.ascontiguousarray(self.tables, dtype="<f8").tobytes())
+        return content.hexdigest()
+
+
+def always(action: int) -> KernelPolicy:
+    """Return the policy that always takes one action."""
+    return KernelPolicy((FIXED,), (action,), (0,), NO_TABLES)
+
+
+def each_another() -> KernelPolicy:
+    """Return the policy in which brigade b always takes action b modulo 4."""
+    n = len(ACTIONS)
+    return KernelPolicy((FIXED,) * n, tuple(range(n)), (0,) * n, NO_TABLES)
+
+
+def at_random() -> KernelPolicy:
+    """Return the policy that takes every action with the same probability."""
+    return KernelPolicy((RANDOM,), (0,), (0,), NO_TABLES)
+
+
+def from_tables(tables: Array, *, epsilon: float = 0.0) -> KernelPolicy:
+    """Return the policy that follows one table per brigade. tables: (tables, 4320 or 270, 4)."""
+    n = len(tables)
+    return KernelPolicy((TABLE,) * n, (0,) * n, tuple(range(n)), tables, epsilon)

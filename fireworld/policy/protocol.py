@@ -1,0 +1,104 @@
+"""What a policy is: something that sees an Observation and answers with a Decision."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fireworld.kernels.arrays import CityTables, WorldArrays
+from fireworld.kernels.observation import find_target
+
+
+class Action(IntEnum):
+    """The paper's four actions; each names a burning building of the brigade's fire site."""
+
+    EASIEST = 0
+    """The one with the lowest temperature."""
+    NEAREST_TO_CIVILIAN = 1
+    NEAREST_TO_CENTER = 2
+    NEAREST_TO_ME = 3
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What one brigade does in one step, and why."""
+
+    action: int
+    q_values: Sequence[float] | None = None
+    """Values of the four actions, where the policy has them."""
+    explored: bool = False
+    epsilon: float = 0.0
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What one brigade sees before it decides: the eight features, and on demand everything the team knows."""
+
+    brigade: int
+    step: int
+    seed: int
+    state_index: int
+    """0..4319: mixed radix of the eight features."""
+    free_edges: int
+    """Sides of the fire site over which the fire can still spread, 0..4."""
+    distance_from_center: int
+    """0 low, 1 medium, 2 high."""
+    distance_from_civilian: int
+    """0 low, 1 medium, 2 high."""
+    volume: int
+    """Burning volume, 0 very low .. 5 huge."""
+    others: tuple[bool, bool, bool, bool]
+    """Whether another brigade does each of the four actions."""
+    city: CityTables
+    """The city's arrays; not to be changed."""
+    world: WorldArrays
+    """The world's arrays as they are before the step; not to be changed."""
+
+    @cached_property
+    def targets(self) -> tuple[int, int, int, int]:
+        """The building that each of the four actions names."""
+        named = [self._target(action) for action in range(4)]
+        return named[0], named[1], named[2], named[3]
+
+    def _target(self, action: int) -> int:
+        return int(
+            find_target(
+                self.brigade,
+                action,
+                self.world.brigades,
+                self.city.buildings,
+                self.world.fire,
+                self.city.geometry,
+                self.world.sites,
+            )
+        )
+
+    @cached_property
+    def temperature(self) -> NDArray[np.float64]:
+        """(n,) degrees above ambient."""
+        temperature: NDArray[np.float64] = self.world.fire.energy / self.city.buildings.capacity
+        return temperature
+
+
+@runtime_checkable
+class Policy(Protocol):
+    """Decides for every brigade, one after another in order of their numbers.
+
+    The simplest policy is a class with a method:
+
+        class AlwaysNear:
+            def decide(self, observation):
+                return Decision(Action.NEAREST_TO_ME)
+
+    A policy may also have `begin(city, n_brigades, seed)`, called before the first step of every run.
+    """
+
+    def decide(self, observation: Observation) -> Decision:
+        """Choose an action for one brigade."""
+        ...

@@ -1,0 +1,100 @@
+"""Replay: a recorded run again, from the scenario, seed and decisions in its recording alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from fireworld.errors import LogError, expected
+from fireworld.placement import CITY_ATTACHMENT, SCENARIO_ATTACHMENT
+from fireworld.policy.protocol import Decision, Observation
+from fireworld.records import Array, CityRecord, Recording, RunHeader, StepRecord
+from fireworld.scenario import parse_scenario
+from fireworld.world.observer import Observer
+from fireworld.world.stage import Stage, build_stage
+
+
+class RecordedPolicy:
+    """Decides as a recording says."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._records = iter(recording)
+        self._record = next(self._records, None)
+
+    def decide(self, observation: Observation) -> Decision:
+        """Return the decision recorded for this brigade and step.
+
+        Raises:
+            LogError: the recording has none, where the replay asks for one.
+        """
+        while self._record is not None and self._record.step < observation.step:
+            self._record = next(self._records, None)
+        made = self._record.decisions if self._record is not None else None
+        brigade = observation.brigade
+        if made is None or brigade >= len(made.action) or not 0 <= made.action[brigade] < 4:
+            # The replay has left the recorded path; an arbitrary action lets the comparison go on and name the step.
+            return Decision(0)
+        values = tuple(made.q_values[4 * brigade : 4 * brigade + 4].tolist()) or None
+        return Decision(
+            int(made.action[brigade]),
+            q_values=values,
+            explored=bool(made.explored[brigade]),
+            epsilon=made.epsilon,
+        )
+
+
+def recorded_stage(header: RunHeader) -> Stage:
+    """Build the stage of a recorded run from the files attached to its recording.
+
+    Raises:
+        LogError: the recording lacks its scenario.
+        ScenarioError: the scenario in it is not one.
+    """
+    text = header.attachments.get(SCENARIO_ATTACHMENT)
+    if text is None:
+        raise LogError(expected("recording", "attachments", SCENARIO_ATTACHMENT, sorted(header.attachments)))
+    scenario = parse_scenario(text, source=f"recording: {SCENARIO_ATTACHMENT}")
+    return build_stage(scenario, city_json=header.attachments.get(CITY_ATTACHMENT))
+
+
+class Replay:
+    """A recorded run, run again while it is walked through; a `Recording` that can only be iterated over."""
+
+    def __init__(self, recording: Recording) -> None:
+        """Build the recorded scenario again.
+
+        Raises:
+            LogError: the recording lacks its scenario.
+        """
+        self._recording = recording
+        self._stage = recorded_stage(recording.header)
+        self.city: CityRecord = self._stage.city_record()
+
+    @property
+    def header(self) -> RunHeader:
+        """The header of the recording."""
+        return self._recording.header
+
+    @property
+    def steps(self) -> Array:
+        """(k,) the recorded steps."""
+        return self._recording.steps
+
+    def __iter__(self) -> Iterator[StepRecord]:
+        """Yield the recorded steps, computed again with the recorded decisions."""
+        header = self.header
+        world = self._stage.world(seed=header.seed, n_steps_max=header.n_steps_max)
+        observer = Observer(world)
+        policy = RecordedPolicy(self._recording)
+        last = int(self.steps[-1]) if len(self.steps) else -1
+        if last >= 0:
+            yield observer.record()
+        while world.step_number < last and not (world.terminated or world.truncated):
+            yield observer.record(world.step(policy))
+
+    def column(self, topic: str, name: str) -> Array:
+        """Refuse: a replay is only walked through."""
+        raise NotImplementedError(f"{topic}.{name}: a replay is only walked through")
+
+    def ragged(self, topic: str, name: str) -> Sequence[Array]:
+        """Refuse: a replay is only walked through."""
+        raise NotImplementedError(f"{topic}.{name}: a replay is only walked through")

@@ -1,0 +1,63 @@
+"""Runs: a policy in a world, step by step, as records."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from fireworld.errors import PolicyError
+from fireworld.policy.names import NamedPolicy
+from fireworld.policy.protocol import Policy
+from fireworld.records import CityRecord, RunHeader, StepRecord
+from fireworld.world.observer import Observer
+from fireworld.world.stage import Stage
+from fireworld.world.world import World
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run that is about to happen: iterate over it to let it happen."""
+
+    header: RunHeader
+    city: CityRecord
+    world: World
+    policy: Policy
+
+    def __iter__(self) -> Iterator[StepRecord]:
+        """Yield the start and then every step, until nothing burns or the last step is done."""
+        begin(self.policy, self.world)
+        observer = Observer(self.world)
+        yield observer.record()
+        while not (self.world.terminated or self.world.truncated):
+            yield observer.record(self.world.step(self.policy))
+
+
+def prepare_run(stage: Stage, named: NamedPolicy, *, seed: int, n_steps_max: int | None = None) -> Run:
+    """Get a run ready.
+
+    Args:
+        stage: the scenario, built.
+        named: the policy.
+        seed: of the run's luck.
+        n_steps_max: last step; None: the scenario's.
+    """
+    world = stage.world(seed=seed, n_steps_max=n_steps_max)
+    header = stage.header(
+        seed=seed, policy=named.name, policy_digest=named.digest, n_steps_max=world.n_steps_max
+    )
+    return Run(header=header, city=stage.city_record(), world=world, policy=named.policy)
+
+
+def begin(policy: Any, world: World) -> None:
+    """Tell a policy that a run begins, if it wants to know.
+
+    Raises:
+        PolicyError: the policy's own `begin` fails.
+    """
+    if not hasattr(policy, "begin"):
+        return
+    try:
+        policy.begin(world.tables, world.n_brigades, world.seed)
+    except Exception as error:
+        raise PolicyError(f"policy: begin: {type(error).__name__}: {error}") from error

@@ -1,0 +1,271 @@
+"""The keys of a scenario file: their types, bounds, defaults and meaning, and the rules between them.
+
+The docs' field reference and the wording of errors are made from these types.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import fields, replace
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
+
+import msgspec
+from msgspec import Meta, Struct
+
+from fireworld.parameters import PRESETS, BrigadeParameters, FireParameters, HealthParameters, Parameters
+
+Preset = Literal["official-2011", "official-2013", "paper"]
+Reward = Literal["stock", "change"]
+Direction = Literal["N", "E", "S", "W"]
+DIRECTIONS: Final[tuple[Direction, ...]] = ("N", "E", "S", "W")
+
+Fraction = Annotated[float, Meta(ge=0, le=1)]
+Point = tuple[Fraction, Fraction]
+"""A place as fractions of the city's bounding box: x from west to east, y from south to north."""
+LOTS_MAX: Final = 20_000
+Seed = Annotated[int, Meta(ge=0, le=2**32 - 1)]
+BuildingIds = Annotated[tuple[int, ...], Meta(min_length=1)]
+Metres = Annotated[float, Meta(ge=0, le=1e6)]
+
+POSITIVE: Final = Meta(gt=0, le=1e9)
+SHARE: Final = Meta(ge=0, le=1)
+ANY_AMOUNT: Final = Meta(ge=0, le=10**9)
+BOUNDS: Final = {
+    "fuel_density_wood": POSITIVE,
+    "fuel_density_steel": POSITIVE,
+    "fuel_density_concrete": POSITIVE,
+    "heat_capacity_wood": POSITIVE,
+    "heat_capacity_steel": POSITIVE,
+    "heat_capacity_concrete": POSITIVE,
+    "ignition_point_wood": POSITIVE,
+    "ignition_point_steel": POSITIVE,
+    "ignition_point_concrete": POSITIVE,
+    "air_cell_mm": Meta(ge=1000, le=100_000),
+    "air_heat_capacity": POSITIVE,
+    "air_heat_kept": SHARE,
+    "ray_rate_per_mm": Meta(gt=0, le=1),
+    "ray_range_mm": Meta(ge=1, le=10_000_000),
+    "slight_probability": SHARE,
+    "serious_probability": SHARE,
+    "critical_probability": SHARE,
+    "initial_hp": Meta(ge=1, le=1_000_000),
+    "brigade_share": SHARE,
+    "tank_litres": Meta(ge=1, le=10**9),
+}
+"""Bounds of the physical parameters that are not simply zero or more."""
+
+
+def _overrides(section: type[Any], name: str) -> Any:
+    """Make the type of one section of overrides: every parameter, null (the default) for the preset's value."""
+    kinds = {"int": int, "float": float}
+    keys = [
+        (item.name, Annotated[kinds[str(item.type)], BOUNDS.get(item.name, ANY_AMOUNT)] | None, None)
+        for item in fields(section)
+    ]
+    return msgspec.defstruct(name, keys, frozen=True, kw_only=True, forbid_unknown_fields=True)
+
+
+if TYPE_CHECKING:
+    FireOverrides = Struct
+    HealthOverrides = Struct
+    BrigadeOverrides = Struct
+else:
+    FireOverrides = _overrides(FireParameters, "FireOverrides")
+    HealthOverrides = _overrides(HealthParameters, "HealthOverrides")
+    BrigadeOverrides = _overrides(BrigadeParameters, "BrigadeOverrides")
+
+
+class Overrides(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Physical parameters that differ from the preset."""
+
+    fire: FireOverrides = FireOverrides()
+    health: HealthOverrides = HealthOverrides()
+    brigades: BrigadeOverrides = BrigadeOverrides()
+
+
+class GeneratedCity(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A synthetic city."""
+
+    columns: Annotated[int, Meta(ge=1, le=200, description="Lots from west to east.")]
+    rows: Annotated[int, Meta(ge=1, le=200, description="Lots from south to north.")]
+    seed: Annotated[Seed, Meta(description="Another seed, another city of the same size.")] = 1
+    lot_m: Annotated[float, Meta(ge=5, le=100, description="Side of a square lot.")] = 14.0
+    block: Annotated[
+        tuple[Annotated[int, Meta(ge=1, le=200)], Annotated[int, Meta(ge=1, le=200)]],
+        Meta(description="Lots of a block, along x and along y."),
+    ] = (3, 2)
+    street_m: Annotated[float, Meta(ge=1, le=100, description="Width of a street.")] = 8.0
+    refuges: Annotated[
+        tuple[Point, ...], Meta(min_length=1, description="Where refuges stand: the lot nearest to each point.")
+    ] = ((0.15, 0.15), (0.85, 0.85))
+    fill: Annotated[
+        tuple[Annotated[float, Meta(ge=0.25, le=1)], Annotated[float, Meta(ge=0.25, le=1)]],
+        Meta(description="Least and greatest share of its lot that a building covers."),
+    ] = (0.7, 0.97)
+    hydrant_share: Annotated[Fraction, Meta(description="Share of the crossings that have a hydrant.")] = 0.0
+
+
+class CitySource(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Where the city comes from: exactly one of `generated` and `file`."""
+
+    generated: Annotated[GeneratedCity | None, Meta(description="A synthetic city.")] = None
+    file: Annotated[
+        str | None, Meta(description="A city file (JSON), relative to the folder of the scenario file.")
+    ] = None
+    sha256: Annotated[
+        Annotated[str, Meta(pattern="^[0-9a-f]{64}$")] | None,
+        Meta(description="Digest that the city file must have; null accepts any."),
+    ] = None
+    ray_seed: Annotated[Seed, Meta(description="Luck of the rays that measure radiation between buildings.")] = 1
+
+    @property
+    def summary(self) -> str:
+        """What city it is, in a few words."""
+        generated = self.generated
+        return PurePath(self.file or "").name if generated is None else f"{generated.columns} x {generated.rows} lots"
+
+
+class Fire(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Buildings that burn at the start: exactly one of `at` and `buildings`."""
+
+    at: Annotated[Point | None, Meta(description="Centre of the fire: x, y as fractions of the city, y to north.")] = (
+        None
+    )
+    n_buildings: Annotated[
+        Annotated[int, Meta(ge=1, le=100_000)] | None,
+        Meta(description="With `at`: how many of the inflammable buildings nearest to it burn; null is 1."),
+    ] = None
+    buildings: Annotated[BuildingIds | None, Meta(description="Ids of the buildings that burn.")] = None
+
+
+class Civilians(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """People indoors, at most one in a building: exactly one of `n` and `buildings`."""
+
+    n: Annotated[
+        Annotated[int, Meta(ge=0, le=100_000)] | None,
+        Meta(description="How many to place at random in inflammable buildings that do not burn at the start."),
+    ] = None
+    buildings: Annotated[BuildingIds | None, Meta(description="Ids of the buildings they are in.")] = None
+    around: Annotated[
+        Point | None, Meta(description="With `n`: point they are placed around; null is the centre of the first fire.")
+    ] = None
+    from_m: Annotated[Metres, Meta(description="With `n`: least distance from that point.")] = 0.0
+    to_m: Annotated[Metres | None, Meta(description="With `n`: greatest distance from it; null is any.")] = None
+    directions: Annotated[
+        tuple[Direction, ...],
+        Meta(min_length=1, description="With `n`: on which sides of that point, taken in turn."),
+    ] = DIRECTIONS
+    seed: Annotated[Seed, Meta(description="With `n`: luck of the placement.")] = 1
+
+    @property
+    def count(self) -> int:
+        """How many they are."""
+        return len(self.buildings or ()) + (self.n or 0)
+
+
+class BrigadeTeam(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The fire brigades; they start at the refuges in turn."""
+
+    n: Annotated[int, Meta(ge=1, le=1000, description="How many brigades.")] = 4
+
+
+class Document(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """All that a scenario file says."""
+
+    name: Annotated[str, Meta(description="Name of the scenario; by default the file's.")] = ""
+    description: Annotated[str, Meta(description="What is to see here, in one line.")] = ""
+    preset: Annotated[Preset, Meta(description="Physical parameters to start from.")] = "paper"
+    overrides: Annotated[
+        Overrides, Meta(description="Physical parameters that differ from the preset, by section.")
+    ] = msgspec.field(default=Overrides(), name="parameters")
+    city: Annotated[CitySource, Meta(description="The city.")]
+    fires: Annotated[tuple[Fire, ...], Meta(min_length=1, description="What burns at the start.")]
+    civilians: Annotated[Civilians, Meta(description="The people to save.")] = Civilians(n=0)
+    brigades: Annotated[BrigadeTeam, Meta(description="The team.")] = BrigadeTeam()
+    steps: Annotated[int, Meta(ge=1, le=100_000, description="Steps (minutes) after which the run ends.")] = 500
+    reward: Annotated[
+        Reward, Meta(description="`stock`, the paper's: the state's cost at every step; `change`: how it changed.")
+    ] = "stock"
+    unit_volume_m3: Annotated[
+        Annotated[float, POSITIVE] | None,
+        Meta(description="Unit of the burning volume a brigade sees; null is twice the mean building volume."),
+    ] = None
+
+
+Section = TypeVar("Section", FireParameters, HealthParameters, BrigadeParameters)
+
+
+def resolve_parameters(document: Document) -> Parameters:
+    """Return the preset's parameters with the document's overrides."""
+    preset, overrides = PRESETS[document.preset], document.overrides
+    return Parameters(
+        fire=_override(preset.fire, overrides.fire),
+        health=_override(preset.health, overrides.health),
+        brigades=_override(preset.brigades, overrides.brigades),
+    )
+
+
+def _override(preset: Section, overrides: Struct) -> Section:
+    """Return a section of parameters with those replaced that a scenario names."""
+    named = {key: value for key, value in msgspec.structs.asdict(overrides).items() if value is not None}
+    return replace(preset, **named)
+
+
+def broken_rules(document: Document) -> Iterator[tuple[str, str, object]]:
+    """Yield (key, what is expected, what was found) for every rule between keys that does not hold."""
+    yield from _broken_city_rules(document.city)
+    for index, fire in enumerate(document.fires):
+        if (fire.at is None) == (fire.buildings is None):
+            yield (
+                f"fires.{index}",
+                "exactly one of `at` and `buildings`",
+                "none of them" if fire.at is None else "both of them",
+            )
+        if fire.at is None and fire.n_buildings is not None:
+            yield f"fires.{index}.n_buildings", "null without `at`", fire.n_buildings
+        yield from _repeated(f"fires.{index}.buildings", fire.buildings or ())
+    civilians = document.civilians
+    if (civilians.n is None) == (civilians.buildings is None):
+        yield (
+            "civilians",
+            "exactly one of `n` and `buildings`",
+            "none of them" if civilians.n is None else "both of them",
+        )
+    if civilians.to_m is not None and civilians.to_m < civilians.from_m:
+        yield "civilians.to_m", f"at least from_m ({civilians.from_m})", civilians.to_m
+    yield from _repeated("civilians.buildings", civilians.buildings or ())
+    yield from _repeated("civilians.directions", civilians.directions)
+    health = resolve_parameters(document).health
+    probabilities = (health.slight_probability, health.serious_probability, health.critical_probability)
+    if math.fsum(probabilities) > 1:
+        yield "parameters.health", "slight, serious and critical probabilities of at most 1 together", probabilities
+
+
+def _broken_city_rules(city: CitySource) -> Iterator[tuple[str, str, object]]:
+    """Yield the rules between the keys of a city that do not hold."""
+    if (city.generated is None) == (city.file is None):
+        yield "city", "exactly one of `generated` and `file`", "none of them" if city.file is None else "both of them"
+    if city.file is None and city.sha256 is not None:
+        yield "city.sha256", "null without `file`", city.sha256
+    if city.generated is None:
+        return
+    columns, rows = city.generated.columns, city.generated.rows
+    refuges, fill = city.generated.refuges, city.generated.fill
+    if columns * rows > LOTS_MAX:
+        yield "city.generated", f"at most {LOTS_MAX} lots", f"{columns} x {rows}"
+    if columns * rows < len(refuges):
+        yield "city.generated.refuges", f"at most {columns * rows}, one a lot", len(refuges)
+    if fill[0] > fill[1]:
+        yield "city.generated.fill", "the least share before the greatest", f"the list {list(fill)}"
+
+
+def _repeated(key: str, values: tuple[object, ...]) -> Iterator[tuple[str, str, object]]:
+    """Find what a list says twice."""
+    seen: set[object] = set()
+    for value in values:
+        if value in seen:
+            yield key, "each entry once", f"{value} a second time"
+            return
+        seen.add(value)

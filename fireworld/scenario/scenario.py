@@ -1,0 +1,215 @@
+"""Scenario: a validated scenario file, its physical parameters and its digest."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+import msgspec.inspect
+
+from fireworld.errors import ScenarioError, expected
+from fireworld.parameters import Parameters
+from fireworld.scenario.document import Document, broken_rules, resolve_parameters
+from fireworld.scenario.explain import find_faults
+from fireworld.scenario.yaml_text import read_yaml, write_yaml
+
+SIZE_MAX_BYTES: Final = 1_000_000
+
+
+class Scenario(Document, frozen=True, kw_only=True):
+    """A scenario ready to be placed in its city.
+
+    `city.file` is an absolute path; or as written, where the city does not come from a file (see `parse_scenario`).
+    """
+
+    source: str
+    """The file (or flag) that errors name."""
+    city_sha256: str | None
+    """Digest of the city file, None for a generated city."""
+
+    @property
+    def parameters(self) -> Parameters:
+        """The physical parameters: the preset's with the scenario's overrides."""
+        return resolve_parameters(self)
+
+    @property
+    def resolved(self) -> dict[str, Any]:
+        """The scenario as plain values with nothing left to presets, defaults or the place of files."""
+        content = self._document()
+        content["parameters"] = asdict(self.parameters)
+        if self.city.file is not None:
+            content["city"] |= {"file": Path(self.city.file).name, "sha256": self.city_sha256}
+        resolved: dict[str, Any] = _without_nulls(content)
+        return resolved
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of everything that can change a run: all but names, the description and the preset's name."""
+        content = self.resolved
+        for key in ("name", "description", "preset"):
+            del content[key]
+        content["city"].pop("file", None)
+        return hashlib.sha256(json.dumps(content, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+    def to_yaml(self) -> str:
+        """Write the resolved scenario; read again, it has the same digest."""
+        return write_yaml(self.resolved)
+
+    def with_settings(self, settings: Mapping[str, str]) -> Scenario:
+        """Return the scenario with other values.
+
+        Args:
+            settings: YAML values by dotted key, as in {"brigades.n": "7", "fires.0.n_buildings": "12"}.
+
+        Raises:
+            ScenarioError: a key or value that a scenario file could not have either.
+        """
+        document = self._document()
+        for key, text in settings.items():
+            source = f"--set {key}"
+            _assign(document, key, read_yaml(text, source=source), source=source)
+        source = f"{self.source} with " + " ".join(f"--set {key}={text}" for key, text in settings.items())
+        return build_scenario(document, source=source if settings else self.source, folder=Path())
+
+    def _document(self) -> dict[str, Any]:
+        """Return what the scenario's file says, as plain values."""
+        content: dict[str, Any] = json.loads(msgspec.json.encode(self))
+        del content["source"], content["city_sha256"]
+        return content
+
+
+def parse_scenario(text: bytes | str, *, source: str, folder: Path | None = None) -> Scenario:
+    """Read a scenario from YAML.
+
+    Args:
+        text: the YAML.
+        source: the file to name in errors.
+        folder: where city files are relative to; None leaves their names as written, for a scenario whose city
+            comes with it in a recording.
+
+    Raises:
+        ScenarioError: broken YAML, or a scenario that makes no sense.
+    """
+    document = read_yaml(text, source=source)
+    if not isinstance(document, dict):
+        raise ScenarioError(expected(source, "", "a scenario (keys and values)", _kind_of(document)))
+    return build_scenario(document, source=source, folder=folder)
+
+
+def build_scenario(values: Mapping[str, Any], *, source: str, folder: Path | None) -> Scenario:
+    """Validate plain values as a scenario; arguments as for `parse_scenario`."""
+    try:
+        document = msgspec.convert(values, Document)
+    except msgspec.ValidationError as error:
+        for fault in find_faults(values, msgspec.inspect.type_info(Document)):
+            raise ScenarioError(expected(source, fault.key, fault.wanted, fault.got, fault.hint)) from None
+        raise ScenarioError(f"{source}: {error}") from None
+    for key, wanted, got in broken_rules(document):
+        raise ScenarioError(expected(source, key, wanted, got))
+    content = {item: getattr(document, item) for item in Document.__struct_fields__}
+    city = document.city
+    if city.file is not None and folder is not None:
+        content["city"] = msgspec.structs.replace(city, file=str((folder / city.file).absolute()))
+    scenario = Scenario(**content, source=source, city_sha256=city.sha256)
+    if city.file is None or city.sha256 is not None:
+        return scenario
+    return msgspec.structs.replace(scenario, city_sha256=hashlib.sha256(read_city_file(scenario)).hexdigest())
+
+
+def read_scenario(path: Path, *, source: str | None = None) -> Scenario:
+    """Read a scenario file; its name is the file's unless it says another.
+
+    Args:
+        path: the file.
+        source: what errors call it; by default its path.
+
+    Raises:
+        ScenarioError: no such file, broken YAML, or a scenario that makes no sense.
+    """
+    source = source or str(path)
+    try:
+        with path.open("rb") as file:
+            text = file.read(SIZE_MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        raise ScenarioError(expected(source, "", "a scenario file", _reason(error))) from None
+    if len(text) > SIZE_MAX_BYTES:
+        raise ScenarioError(expected(source, "", f"a scenario of at most {SIZE_MAX_BYTES} bytes", "more of them"))
+    scenario = parse_scenario(text, source=source, folder=path.parent)
+    return scenario if scenario.name else msgspec.structs.replace(scenario, name=path.stem)
+
+
+def read_city_file(scenario: Scenario) -> bytes:
+    """Read the city file that a scenario names.
+
+    Raises:
+        ScenarioError: it cannot be read.
+    """
+    try:
+        return Path(scenario.city.file or "").read_bytes()
+    except (OSError, ValueError) as error:
+        got = f"{_reason(error)}: {scenario.city.file}"
+        raise ScenarioError(expected(scenario.source, "city.file", "a city file", got)) from None
+
+
+def split_settings(settings: Iterable[str]) -> dict[str, str]:
+    """Split the command line's KEY=VALUE into what `Scenario.with_settings` takes.
+
+    Raises:
+        ScenarioError: no "=", or a key said twice.
+    """
+    values: dict[str, str] = {}
+    for setting in settings:
+        key, equals, text = setting.partition("=")
+        if not (key and equals):
+            raise ScenarioError(expected("--set", "", "KEY=VALUE", setting, "try brigades.n=7"))
+        if key in values:
+            raise ScenarioError(expected("--set", key, "each key once", f"{key} a second time"))
+        values[key] = text
+    return values
+
+
+def _assign(document: dict[str, Any], key: str, value: object, *, source: str) -> None:
+    """Set one value in a tree of dicts and lists by its dotted key."""
+    at: Any = document
+    *parents, last = key.split(".")
+    for depth, name in enumerate(parents):
+        index = _entry(at, name, key=".".join(parents[: depth + 1]), source=source)
+        at[index] = at[index] if at[index] is not None else {}
+        at = at[index]
+    at[_entry(at, last, key=key, source=source)] = value
+
+
+def _entry(at: Any, name: str, *, key: str, source: str) -> str | int:
+    """Return the key or index of an entry, making room for a new one; `key` is the whole path to it."""
+    if isinstance(at, dict):
+        at.setdefault(name, None)
+        return name
+    if not isinstance(at, list):
+        raise ScenarioError(expected(source, key, "a key of a scenario", "a part of a plain value"))
+    if not name.isdecimal() or int(name) > len(at):
+        raise ScenarioError(expected(source, key, f"a number from 0 to {len(at)}", name))
+    if int(name) == len(at):
+        at.append(None)
+    return int(name)
+
+
+def _without_nulls(value: Any) -> Any:
+    """Drop the keys that say nothing."""
+    if isinstance(value, dict):
+        return {key: _without_nulls(content) for key, content in value.items() if content is not None}
+    return [_without_nulls(item) for item in value] if isinstance(value, list) else value
+
+
+def _reason(error: OSError | ValueError) -> str:
+    """Say why a file cannot be read; a path with a null byte is a ValueError."""
+    return (error.strerror if isinstance(error, OSError) else None) or str(error)
+
+
+def _kind_of(document: object) -> str:
+    """Name what a file holds that is no scenario."""
+    return "nothing at all" if document is None else f"a {type(document).__name__} value"

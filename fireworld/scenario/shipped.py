@@ -1,0 +1,44 @@
+"""The scenarios that come with fireworld, and loading a scenario by name or path."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import fireworld
+from fireworld.errors import ScenarioError, expected
+from fireworld.scenario.explain import nearest
+from fireworld.scenario.scenario import Scenario, read_scenario
+
+
+def scenario_names() -> list[str]:
+    """Name the scenarios that come with fireworld, numbers in counting order."""
+    return sorted((path.stem for path in _folder().glob("*.yaml")), key=_counting_order)
+
+
+def load_scenario(name_or_path: str | Path) -> Scenario:
+    """Load a shipped scenario by its name, or a scenario file by its path.
+
+    Raises:
+        ScenarioError: nothing of that name, or a scenario that makes no sense.
+    """
+    names = scenario_names()
+    if str(name_or_path) in names:
+        return read_scenario(_folder() / f"{name_or_path}.yaml", source=str(name_or_path))
+    path = Path(name_or_path)
+    if path.suffix in {".yaml", ".yml"} or path.parent != Path() or path.is_file():
+        return read_scenario(path)
+    hint = nearest(str(name_or_path), names) or "try `fireworld scenarios`"
+    raise ScenarioError(expected("scenario", "", "the name of a scenario or a .yaml file", str(name_or_path), hint))
+
+
+def _folder() -> Path:
+    """Return the folder of the shipped scenarios: inside the package, or at the top of a checkout."""
+    package = Path(fireworld.__file__).parent
+    inside = package / "scenarios"
+    return inside if inside.is_dir() else package.parent / "scenarios"
+
+
+def _counting_order(name: str) -> list[tuple[int, str]]:
+    """Sort train-10 behind train-2."""
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", name)]

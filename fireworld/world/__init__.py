@@ -1,0 +1,1 @@
+"""The world: what a step changes, and the step itself."""

@@ -1,0 +1,224 @@
+"""Observer: turns what a world did in a step into a StepRecord, events included."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fireworld.draws import STEP, hash_key
+from fireworld.kernels.arrays import Array
+from fireworld.kernels.brigades import REFILLING
+from fireworld.records import (
+    EVENT_KINDS,
+    SNAPSHOT_EVERY_STEPS,
+    Brigades,
+    Buildings,
+    Civilians,
+    Decisions,
+    Draws,
+    Events,
+    Observations,
+    Rewards,
+    Score,
+    Snapshot,
+    StepRecord,
+)
+from fireworld.world.state import take_snapshot
+from fireworld.world.world import Choices, World
+
+KIND = {name: index for index, name in enumerate(EVENT_KINDS)}
+
+
+@dataclass(frozen=True)
+class _Before:
+    """What the events of the next step are told from."""
+
+    fieryness: Array
+    civilian_hp: Array
+    civilian_damage: Array
+    brigade_hp: Array
+    brigade_damage: Array
+    tank: Array
+    refilling: Array
+    sites: Array
+
+
+class Observer:
+    """Watches one world. Call `record` before the first step and after each one."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self._before = self._remember()
+
+    def record(self, choices: Choices | None = None) -> StepRecord:
+        """Return the record of the step just done, or of the start.
+
+        Args:
+            choices: what `World.step` returned; None before the first step.
+        """
+        world = self.world
+        outcome = world.arrays.outcome
+        events = self._events() if choices is not None else _events([])
+        snapshot_due = world.step_number % SNAPSHOT_EVERY_STEPS == 0
+        record = StepRecord(
+            step=world.step_number,
+            draws=Draws(
+                key=hash_key(world.seed, STEP, 0, world.step_number),
+                burn_rate_sum=float(outcome.draws[0]),
+                health_sum=float(outcome.draws[1]),
+            ),
+            observations=self._observations(choices),
+            decisions=self._decisions(choices),
+            brigades=self._brigades(),
+            buildings=self._buildings(),
+            civilians=Civilians(hp=world.arrays.civilians.hp.copy(), damage=world.arrays.civilians.damage.copy()),
+            rewards=Rewards(*outcome.reward.tolist()),
+            score=Score(
+                score=float(outcome.score[0]),
+                score_max=float(outcome.score[1]),
+                score_now=float(outcome.score[2]),
+                n_burning=int(outcome.counts[0]),
+                n_water_damaged=int(outcome.counts[1]),
+                n_burnt_out=int(outcome.counts[2]),
+                n_civilians_alive=int(outcome.counts[3]),
+                water_used_litres=float(outcome.water[0]),
+            ),
+            events=events,
+            terminated=world.terminated,
+            truncated=world.truncated,
+            snapshot=Snapshot(take_snapshot(world.arrays)) if snapshot_due else None,
+        )
+        self._before = self._remember()
+        return record
+
+    def _remember(self) -> _Before:
+        arrays = self.world.arrays
+        sites = arrays.sites
+        return _Before(
+            fieryness=arrays.fire.fieryness.copy(),
+            civilian_hp=arrays.civilians.hp.copy(),
+            civilian_damage=arrays.civilians.damage.copy(),
+            brigade_hp=arrays.brigades.hp.copy(),
+            brigade_damage=arrays.brigades.damage.copy(),
+            tank=arrays.brigades.tank.copy(),
+            refilling=arrays.brigades.refilling.copy(),
+            sites=sites.number[: sites.counts[0]].copy(),
+        )
+
+    def _observations(self, choices: Choices | None) -> Observations:
+        arrays = self.world.arrays
+        sites, n = arrays.sites, int(arrays.sites.counts[0])
+        if choices is None:
+            team = np.zeros((0, 8), dtype=np.uint8)
+            states, site, n = np.zeros(0, dtype=np.int32), np.zeros(0, dtype=np.int32), 0
+        else:
+            team = choices.features.astype(np.uint8)
+            states = choices.state_index.astype(np.int32)
+            site = np.where(arrays.brigades.site > 0, arrays.brigades.site, -1).astype(np.int32)
+        order = np.argsort(sites.number[:n], kind="stable")
+        sizes = np.diff(sites.start[: n + 1]).astype(np.int32) if n else np.zeros(0, dtype=np.int32)
+        return Observations(
+            site=site,
+            **{name: team[:, k].copy() for k, name in enumerate(FEATURES)},
+            state_index=states,
+            site_id=sites.number[:n][order],
+            site_free_sides=sites.free_sides[:n][order],
+            site_n_burning=sizes[order],
+            site_volume_m3=sites.volume[:n][order],
+            site_west_m=sites.west[:n][order] / 1000.0,
+            site_south_m=sites.south[:n][order] / 1000.0,
+            site_east_m=sites.east[:n][order] / 1000.0,
+            site_north_m=sites.north[:n][order] / 1000.0,
+        )
+
+    def _decisions(self, choices: Choices | None) -> Decisions:
+        if choices is None:
+            empty = np.zeros(0, dtype=np.int32)
+            return Decisions(empty, empty, empty.astype(np.uint8), np.zeros(0), 0.0, np.zeros(0))
+        brigades = self.world.arrays.brigades
+        decisions = choices.decisions
+        known = any(decision.q_values is not None for decision in decisions)
+        values = [decision.q_values or (0.0, 0.0, 0.0, 0.0) for decision in decisions] if known else []
+        return Decisions(
+            action=brigades.action.copy(),
+            target=brigades.target.copy(),
+            explored=np.array([decision.explored for decision in decisions], dtype=np.uint8),
+            q_values=np.array(values, dtype=np.float64).ravel(),
+            epsilon=max((float(decision.epsilon) for decision in decisions), default=0.0),
+            td_error=np.zeros(0),
+        )
+
+    def _brigades(self) -> Brigades:
+        brigades = self.world.arrays.brigades
+        return Brigades(
+            x_m=brigades.x / 1000.0,
+            y_m=brigades.y / 1000.0,
+            activity=brigades.activity.copy(),
+            tank_litres=brigades.tank.copy(),
+            sprayed_litres=brigades.sprayed.copy(),
+            driven_m=brigades.driven / 1000.0,
+            hp=brigades.hp.copy(),
+            damage=brigades.damage.copy(),
+        )
+
+    def _buildings(self) -> Buildings:
+        fire = self.world.arrays.fire
+        return Buildings(
+            temperature=(fire.energy / self.world.tables.buildings.capacity).astype(np.float32),
+            energy=fire.energy.copy(),
+            fuel=fire.fuel.copy(),
+            water_litres=fire.water.copy(),
+            fieryness=fire.fieryness.copy(),
+        )
+
+    def _events(self) -> Events:
+        """Tell what changed, in the order of the phases."""
+        before, arrays = self._before, self.world.arrays
+        brigades, civilians, sites = arrays.brigades, arrays.civilians, arrays.sites
+        code, code_before = arrays.fire.fieryness, before.fieryness
+        burns, burnt_before = _is_burning(code), _is_burning(code_before)
+        site_out = np.setdiff1d(before.sites, sites.number[: sites.counts[0]])
+        refilled = (before.refilling == 1) & (brigades.refilling == 0) & (brigades.activity == REFILLING)
+        return _events(
+            [
+                ("site-out", site_out),
+                ("refilled", np.flatnonzero(refilled)),
+                ("tank-empty", np.flatnonzero((before.tank > 0) & (brigades.tank == 0))),
+                ("ignited", np.flatnonzero(burns & ~burnt_before)),
+                ("extinguished", np.flatnonzero(burnt_before & ~burns & (code != BURNT_OUT))),
+                ("burnt-out", np.flatnonzero((code == BURNT_OUT) & (code_before != BURNT_OUT))),
+                ("civilian-hurt", np.flatnonzero((before.civilian_damage == 0) & (civilians.damage > 0))),
+                ("civilian-died", np.flatnonzero((before.civilian_hp > 0) & (civilians.hp == 0))),
+                ("brigade-hurt", np.flatnonzero((before.brigade_damage == 0) & (brigades.damage > 0))),
+                ("brigade-died", np.flatnonzero((before.brigade_hp > 0) & (brigades.hp == 0))),
+            ]
+        )
+
+
+BURNT_OUT = 8
+FEATURES = (
+    "free_edges",
+    "distance_from_center",
+    "distance_from_civilian",
+    "volume",
+    "others_easiest",
+    "others_nearest_to_civilian",
+    "others_nearest_to_center",
+    "others_nearest_to_me",
+)
+
+
+def _is_burning(code: Array) -> Array:
+    burning: Array = (code >= 1) & (code <= 3)
+    return burning
+
+
+def _events(found: list[tuple[str, Any]]) -> Events:
+    kinds = [np.full(len(entities), KIND[name], dtype=np.uint8) for name, entities in found]
+    entities = [np.asarray(entities, dtype=np.int32) for _, entities in found]
+    none: list[Array] = [np.zeros(0, dtype=np.int32)]
+    return Events(
+        kind=np.concatenate([np.zeros(0, dtype=np.uint8), *kinds]), entity=np.concatenate(none + entities)
+    )

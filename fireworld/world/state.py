@@ -1,0 +1,172 @@
+"""WorldArrays: made fresh, copied, taken as a snapshot and put back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from fireworld.city.city import City
+from fireworld.errors import LogError
+from fireworld.kernels.arrays import (
+    Array,
+    BrigadeState,
+    CivilianState,
+    FireState,
+    Outcome,
+    SiteState,
+    WorldArrays,
+)
+from fireworld.parameters import Parameters
+from fireworld.world.tables import air_shape
+
+SCRATCH = {"fire.rate", "fire.emitted", "fire.scratch"} | {
+    f"sites.{name}" for name in SiteState._fields if name not in {"counts", "label"}
+}
+"""Arrays whose content does not outlive a step: what a step needs of them, it computes."""
+
+
+def fresh_fire(city: City) -> FireState:
+    """Return the fire state of a cold, untouched city."""
+    n = city.n_buildings
+    rows, pitch = air_shape(city)
+    return FireState(
+        energy=np.zeros(n),
+        fuel=city.initial_fuel.astype(np.float32),
+        water=np.zeros(n, dtype=np.int32),
+        watered=np.zeros(n, dtype=np.uint8),
+        fieryness=np.zeros(n, dtype=np.uint8),
+        air=np.zeros((rows, pitch)),
+        reach=np.zeros((rows, 2), dtype=np.int32),
+        rate=np.zeros(n),
+        emitted=np.zeros(n),
+        scratch=np.zeros((3, pitch)),
+    )
+
+
+def fresh_civilians(buildings: Array, positions_mm: Array, hp: int) -> CivilianState:
+    """Return healthy civilians. buildings: (c,) index or -1; positions_mm: (c, 2)."""
+    c = len(buildings)
+    positions = np.asarray(positions_mm, dtype=np.float64).reshape(c, 2)
+    return CivilianState(
+        building=np.asarray(buildings, dtype=np.int32),
+        x=positions[:, 0].copy(),
+        y=positions[:, 1].copy(),
+        full_hp=np.full(c, hp, dtype=np.int32),
+        hp=np.full(c, hp, dtype=np.int32),
+        damage=np.zeros(c),
+    )
+
+
+def fresh_brigades(city: City, refuges: Array, tank_litres: int, hp: int) -> BrigadeState:
+    """Return healthy brigades with full tanks, each at the entrance of its refuge. refuges: (b,) building index."""
+    refuges = np.asarray(refuges, dtype=np.int64)
+    b = len(refuges)
+    access = city.streets.access_mm[refuges].astype(np.float64)
+    return BrigadeState(
+        street=city.streets.access_street[refuges].astype(np.int32),
+        offset=city.streets.access_offset_mm[refuges].astype(np.int64),
+        x=access[:, 0].copy(),
+        y=access[:, 1].copy(),
+        tank=np.full(b, tank_litres, dtype=np.int32),
+        refilling=np.zeros(b, dtype=np.uint8),
+        action=np.full(b, -1, dtype=np.int32),
+        target=np.full(b, -1, dtype=np.int32),
+        site=np.zeros(b, dtype=np.int32),
+        activity=np.zeros(b, dtype=np.uint8),
+        refuge=np.full(b, -1, dtype=np.int32),
+        hydrant=np.full(b, -1, dtype=np.int32),
+        inside=np.full(b, -1, dtype=np.int32),
+        sprayed=np.zeros(b, dtype=np.int32),
+        driven=np.zeros(b, dtype=np.int64),
+        hp=np.full(b, hp, dtype=np.int32),
+        damage=np.zeros(b),
+    )
+
+
+def fresh_sites(n: int) -> SiteState:
+    """Return the site state of a city of n buildings in which nothing burns."""
+    return SiteState(
+        counts=np.zeros(3, dtype=np.int32),
+        label=np.zeros(n, dtype=np.int32),
+        place=np.full(n, -1, dtype=np.int32),
+        member=np.zeros(n, dtype=np.uint32),
+        start=np.zeros(n + 1, dtype=np.int32),
+        number=np.zeros(n, dtype=np.int32),
+        volume=np.zeros(n),
+        west=np.zeros(n),
+        south=np.zeros(n),
+        east=np.zeros(n),
+        north=np.zeros(n),
+        center_square=np.zeros(n),
+        civilian_square=np.zeros(n),
+        free_sides=np.zeros(n, dtype=np.uint8),
+        building_civilian_square=np.zeros(n),
+    )
+
+
+def fresh_outcome() -> Outcome:
+    """Return an outcome of which nothing is known yet."""
+    return Outcome(
+        reward=np.zeros(6),
+        stock=np.zeros(4),
+        score=np.zeros(3),
+        counts=np.zeros(4, dtype=np.int32),
+        water=np.zeros(1),
+        draws=np.zeros(2),
+    )
+
+
+def fresh_world(
+    city: City, parameters: Parameters, *, civilian_building: Array, civilian_mm: Array, brigade_refuge: Array
+) -> WorldArrays:
+    """Return the state before anything burns."""
+    hp = parameters.health.initial_hp
+    return WorldArrays(
+        fire=fresh_fire(city),
+        civilians=fresh_civilians(civilian_building, civilian_mm, hp),
+        brigades=fresh_brigades(city, brigade_refuge, parameters.brigades.tank_litres, hp),
+        sites=fresh_sites(city.n_buildings),
+        outcome=fresh_outcome(),
+    )
+
+
+def named_arrays(world: WorldArrays) -> Iterator[tuple[str, Array]]:
+    """Yield every array with its name, `group.field`."""
+    for group_name, group in zip(world._fields, world, strict=True):
+        for name, array in zip(group._fields, group, strict=True):
+            yield f"{group_name}.{name}", array
+
+
+def copy_world(world: WorldArrays) -> WorldArrays:
+    """Copy all arrays."""
+    groups: list[Any] = [type(group)(*(array.copy() for array in group)) for group in world]
+    return WorldArrays(*groups)
+
+
+def copy_into(world: WorldArrays, source: WorldArrays) -> None:
+    """Overwrite one world's arrays with another's of the same shapes."""
+    for (_, array), (_, other) in zip(named_arrays(world), named_arrays(source), strict=True):
+        array[...] = other
+
+
+def take_snapshot(world: WorldArrays) -> dict[str, Array]:
+    """Copy everything that replay needs to go on from here."""
+    return {name: array.copy() for name, array in named_arrays(world) if name not in SCRATCH}
+
+
+def restore_snapshot(world: WorldArrays, snapshot: Mapping[str, Array]) -> None:
+    """Put a snapshot back into a world of the same city and team.
+
+    Raises:
+        LogError: an array is missing or of another shape or type.
+    """
+    for name, array in named_arrays(world):
+        if name in SCRATCH:
+            continue
+        held = snapshot.get(name)
+        if held is None or held.shape != array.shape or held.dtype != array.dtype:
+            found = "nothing" if held is None else f"{held.dtype} {held.shape}"
+            raise LogError(f"snapshot: {name}: expected {array.dtype} {array.shape}, got {found}")
+        array[...] = held

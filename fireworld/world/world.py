@@ -1,0 +1,216 @@
+"""World: a city in which a fire is fought, one step at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fireworld.city.city import City
+from fireworld.errors import PolicyError
+from fireworld.kernels.arrays import Array, CityTables, Constants, PolicyTables, WorldArrays
+from fireworld.kernels.brigades import act
+from fireworld.kernels.fire import advance_fire, draw_burn_rates, ignite
+from fireworld.kernels.health import harm_brigades, harm_civilians
+from fireworld.kernels.observation import can_choose, find_target, observe
+from fireworld.kernels.outcome import assess
+from fireworld.kernels.sites import find_sites
+from fireworld.parameters import Parameters
+from fireworld.policy.protocol import Decision, Observation, Policy
+from fireworld.world.state import fresh_world
+from fireworld.world.tables import city_tables, world_constants
+
+NO_DECISION = Decision(-1)
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What the brigades saw and decided in a step."""
+
+    features: Array  # (b, 8) int64
+    state_index: Array  # (b,) int64, -1 none
+    decisions: tuple[Decision, ...]  # (b,)
+
+
+class World:
+    """A city, its team and its fire.
+
+    Attributes:
+        city: the City.
+        tables: its arrays as kernels read them.
+        constants: scalars of the model.
+        arrays: everything that a step changes.
+        seed: seed of the run's luck.
+        step_number: steps done so far.
+        n_steps_max: the run is truncated after this step.
+    """
+
+    def __init__(
+        self,
+        city: City,
+        parameters: Parameters,
+        *,
+        ignited: Array,
+        civilian_building: Array,
+        civilian_mm: Array,
+        brigade_refuge: Array,
+        seed: int,
+        n_steps_max: int,
+        reward_change: bool = False,
+        unit_volume_m3: float | None = None,
+        tables: CityTables | None = None,
+    ) -> None:
+        """Set up the world before its first step.
+
+        Args:
+            city: the city.
+            parameters: of fire, health and brigades.
+            ignited: (k,) indices of the buildings on fire at the start.
+            civilian_building: (c,) index of the building each civilian is in, -1 outdoors.
+            civilian_mm: (c, 2) their positions.
+            brigade_refuge: (b,) index of the refuge building each brigade starts from.
+            seed: seed of all draws.
+            n_steps_max: last step.
+            reward_change: reward the change of the stock instead of the stock.
+            unit_volume_m3: unit of the volume feature; None: twice the mean building.
+            tables: of the same city and parameters, if they have been built already.
+        """
+        self.city = city
+        self.parameters = parameters
+        self.tables = tables if tables is not None else city_tables(city, parameters.fire)
+        self.constants: Constants = world_constants(
+            city, parameters, reward_change=reward_change, unit_volume_m3=unit_volume_m3
+        )
+        self.seed = seed
+        self.n_steps_max = n_steps_max
+        self.step_number = 0
+        self.arrays: WorldArrays = fresh_world(
+            city,
+            parameters,
+            civilian_building=civilian_building,
+            civilian_mm=civilian_mm,
+            brigade_refuge=brigade_refuge,
+        )
+        for b in np.asarray(ignited, dtype=np.int64):
+            ignite(b, self.tables.buildings, self.arrays.fire)
+        self._assess()
+        self.arrays.outcome.reward[:] = 0.0
+
+    @property
+    def n_brigades(self) -> int:
+        """Number of brigades."""
+        return len(self.arrays.brigades.hp)
+
+    @property
+    def terminated(self) -> bool:
+        """Whether nothing burns any more."""
+        return bool(self.arrays.outcome.counts[0] == 0)
+
+    @property
+    def truncated(self) -> bool:
+        """Whether the last step is done while something burns."""
+        return not self.terminated and self.step_number >= self.n_steps_max
+
+    def step(self, policy: Policy) -> Choices:
+        """Run one step: look, decide one after another, act, burn, hurt, assess."""
+        self.step_number += 1
+        self._look()
+        choices = self._decide(policy)
+        self._act()
+        self._burn()
+        self._hurt()
+        self._assess()
+        return choices
+
+    def run(self, policy: PolicyTables) -> int:
+        """Run to the end without a word to Python; return the last step. Same phases, same luck, same outcome."""
+        from fireworld.kernels.episode import run_episode  # the largest kernel: compiled only where it is used
+
+        self.step_number = int(
+            run_episode(
+                self.tables,
+                self.arrays,
+                self.constants,
+                policy,
+                self.seed,
+                self.step_number + 1,
+                self.n_steps_max,
+            )
+        )
+        return self.step_number
+
+    def _look(self) -> None:
+        arrays = self.arrays
+        find_sites(self.tables, arrays.fire, arrays.civilians, arrays.brigades, arrays.sites)
+
+    def _decide(self, policy: Policy) -> Choices:
+        features = np.zeros((self.n_brigades, 8), dtype=np.int64)
+        states = np.full(self.n_brigades, -1, dtype=np.int64)
+        decisions = [NO_DECISION] * self.n_brigades
+        brigades = self.arrays.brigades
+        brigades.target[:] = -1
+        for brigade in range(self.n_brigades):
+            states[brigade] = observe(
+                brigade, self.arrays.brigades, self.arrays.sites, self.constants.observation, features[brigade]
+            )
+            if can_choose(brigade, self.arrays.brigades, self.arrays.sites):
+                decisions[brigade] = self._ask(policy, brigade, features[brigade], int(states[brigade]))
+                brigades.target[brigade] = self._target(brigade, decisions[brigade].action)
+            brigades.action[brigade] = decisions[brigade].action
+        return Choices(features=features, state_index=states, decisions=tuple(decisions))
+
+    def _target(self, brigade: int, action: int) -> int:
+        arrays, tables = self.arrays, self.tables
+        return int(
+            find_target(
+                brigade, action, arrays.brigades, tables.buildings, arrays.fire, tables.geometry, arrays.sites
+            )
+        )
+
+    def _ask(self, policy: Policy, brigade: int, features: Array, state: int) -> Decision:
+        seen = [int(feature) for feature in features]
+        decision = policy.decide(
+            Observation(
+                brigade=brigade,
+                step=self.step_number,
+                seed=self.seed,
+                state_index=state,
+                free_edges=seen[0],
+                distance_from_center=seen[1],
+                distance_from_civilian=seen[2],
+                volume=seen[3],
+                others=(bool(seen[4]), bool(seen[5]), bool(seen[6]), bool(seen[7])),
+                city=self.tables,
+                world=self.arrays,
+            )
+        )
+        if not isinstance(decision, Decision) or decision.action not in range(4):
+            raise PolicyError(
+                f"policy: step {self.step_number}, brigade {brigade}: expected a Decision with action 0..3, got {decision!r}"
+            )
+        return decision
+
+    def _act(self) -> None:
+        arrays = self.arrays
+        arrays.outcome.water[0] += act(arrays.brigades, arrays.fire, self.tables, self.constants.brigades)
+
+    def _burn(self) -> None:
+        tables, fire, constants = self.tables, self.arrays.fire, self.constants.fire
+        rates = draw_burn_rates(tables.buildings, fire, constants, self.seed, self.step_number)
+        self.arrays.outcome.draws[0] = rates
+        advance_fire(tables.buildings, tables.cover, tables.links, fire, constants)
+
+    def _hurt(self) -> None:
+        arrays, health, seed, step = self.arrays, self.constants.health, self.seed, self.step_number
+        draws = harm_civilians(arrays.civilians, arrays.fire, health, seed, step)
+        draws += harm_brigades(arrays.brigades, arrays.fire, health, seed, step, len(arrays.civilians.hp))
+        arrays.outcome.draws[1] = draws
+
+    def _assess(self) -> None:
+        assess(
+            self.arrays.fire,
+            self.arrays.civilians,
+            self.tables.geometry,
+            self.constants.reward_change,
+            self.arrays.outcome,
+        )

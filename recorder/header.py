@@ -1,0 +1,83 @@
+"""The run header as metadata that checks itself: text keys and values, and the hashes of the attachments."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from collections.abc import Mapping
+from typing import Final
+
+from fireworld.errors import LogError, expected
+from fireworld.records import FORMAT, RunHeader
+
+METADATA_NAME: Final = "fireworld.run"
+PROFILE: Final = "fireworld"
+_ATTACHMENT: Final = "attachment:"
+_FIELDS: Final = tuple(item for item in dataclasses.fields(RunHeader) if item.name != "attachments")
+
+
+def to_metadata(header: RunHeader) -> dict[str, str]:
+    """Write a header as text, by rising key, with a checksum over all the rest (MCAP has none for metadata)."""
+    metadata = {item.name: str(getattr(header, item.name)) for item in _FIELDS}
+    metadata["format"] = FORMAT
+    for name, data in header.attachments.items():
+        metadata[_ATTACHMENT + name] = hashlib.sha256(data).hexdigest()
+    metadata["checksum"] = _checksum(metadata)
+    return dict(sorted(metadata.items()))
+
+
+def check_format(found: str) -> None:
+    """Refuse a log of another format.
+
+    Raises:
+        LogError: the format is not the one that this version reads.
+    """
+    if found == FORMAT:
+        return
+    name, _, major = found.partition("/")
+    ours_name, _, ours = FORMAT.partition("/")
+    newer = name == ours_name and major.isdecimal() and int(major) > int(ours)
+    hint = "it was written by a newer fireworld: try to upgrade" if newer else ""
+    raise LogError(expected("format", "", FORMAT, found, hint))
+
+
+def from_metadata(metadata: Mapping[str, str], attachments: Mapping[str, bytes]) -> RunHeader:
+    """Read a header and the attachments it names; keys of later versions are ignored.
+
+    Args:
+        metadata: the metadata `fireworld.run`.
+        attachments: every attachment of the log; those that the header does not name are left out.
+
+    Raises:
+        LogError: another format, a value that was changed, an attachment that is lost or was changed.
+    """
+    check_format(metadata.get("format", ""))
+    if metadata.get("checksum") != _checksum(metadata):
+        raise LogError(expected(METADATA_NAME, "", "its own checksum", "other bytes", "the header is damaged"))
+    values: dict[str, object] = {}
+    for item in _FIELDS:
+        text = metadata.get(item.name)
+        if text is None and item.default is dataclasses.MISSING:
+            raise LogError(expected(item.name, "", "a value in the header", "none"))
+        if text is not None:
+            values[item.name] = _integer(item.name, text) if item.type == "int" else text
+    named = {}
+    for key, digest in metadata.items():
+        if key.startswith(_ATTACHMENT):
+            name = key.removeprefix(_ATTACHMENT)
+            if name not in attachments or hashlib.sha256(attachments[name]).hexdigest() != digest:
+                raise LogError(expected(name, "", "the attachment as it was recorded", "other bytes or none"))
+            named[name] = attachments[name]
+    return RunHeader(**values, attachments=named)  # type: ignore[arg-type]  # checked field by field above
+
+
+def _integer(key: str, text: str) -> int:
+    try:
+        return int(text)
+    except ValueError as error:
+        raise LogError(expected(key, "", "a whole number", text)) from error
+
+
+def _checksum(metadata: Mapping[str, str]) -> str:
+    text = "".join(f"{key}\0{value}\0" for key, value in sorted(metadata.items()) if key != "checksum")
+    return hashlib.sha256(text.encode()).hexdigest()

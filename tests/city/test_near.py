@@ -1,0 +1,68 @@
+"""The neighbourhood that makes fire sites."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fireworld.city.city import Links
+from fireworld.city.near import near_relation
+from tests.city.plans import footprints, rectangle
+
+
+def no_links(n):
+    return Links(np.zeros(n + 1, np.int32), np.empty(0, np.int32), np.empty(0, np.float32))
+
+
+def near(plan, links=None):
+    relation = near_relation(plan, no_links(len(plan.building_id)) if links is None else links)
+    assert (relation.share == 1).all()
+    return [
+        relation.building[begin:end].tolist() for begin, end in zip(relation.ptr[:-1], relation.ptr[1:], strict=True)
+    ]
+
+
+@pytest.mark.parametrize(("gap_mm", "related"), [(29_999, True), (30_000, False), (30_001, False), (0, True)])
+def test_closer_than_thirty_metres_strictly(gap_mm, related):
+    plan = footprints(rectangle(0, 0, 5000, 5000), rectangle(5000 + gap_mm, 1000, 5000, 5000))
+    assert near(plan) == ([[1], [0]] if related else [[], []])
+
+
+@pytest.mark.parametrize(("more_mm", "related"), [(0, False), (-1, True)])
+def test_corner_to_corner(more_mm, related):
+    # 18 m and 24 m apart: 30 m exactly.
+    plan = footprints(rectangle(0, 0, 5000, 5000), rectangle(23_000, 29_000 + more_mm, 5000, 5000))
+    assert near(plan) == ([[1], [0]] if related else [[], []])
+
+
+def test_the_middle_of_a_wall_counts():
+    wedge = [(100_000, 29_000), (101_000, 60_000), (99_000, 60_000)]
+    assert near(footprints(rectangle(0, -5000, 200_000, 5000), wedge)) == [[1], [0]]
+
+
+def test_crossing_buildings_are_near_however_far_their_corners():
+    bars = rectangle(-100_000, -1000, 200_000, 2000), rectangle(-1000, -100_000, 2000, 200_000)
+    assert near(footprints(*bars)) == [[1], [0]]
+
+
+def test_links_relate_in_both_directions():
+    plan = footprints(*[rectangle(100_000 * k, 0, 5000, 5000) for k in range(3)])
+    links = Links(np.array([0, 0, 0, 1], np.int32), np.array([0], np.int32), np.array([0.01], np.float32))
+    assert near(plan, links) == [[2], [], [0]]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_agrees_with_shapely(seed):
+    import shapely
+
+    draw = np.random.default_rng(seed)
+    outlines = []
+    for _ in range(80):
+        x, y, width, depth = draw.integers([0, 0, 2000, 2000], [400_000, 250_000, 40_000, 20_000])
+        corners = np.array(rectangle(0, 0, int(width), int(depth))) @ np.array([[3, 4], [-4, 3]]) // 5 + [x, y]
+        outlines.append([(int(a), int(b)) for a, b in corners])
+    rings = shapely.linearrings([[*outline, outline[0]] for outline in outlines])
+    closer = shapely.distance(rings[:, None], rings[None, :]) < 30_000
+    np.fill_diagonal(closer, val=False)
+    assert near(footprints(*outlines)) == [np.flatnonzero(row).tolist() for row in closer]
+    assert closer.any(axis=1).sum() > 40

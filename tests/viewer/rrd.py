@@ -1,0 +1,57 @@
+"""Read a Rerun file back as plain tables, and run Rerun's own program."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewer import app
+
+Rows = dict[str, list[tuple[int | None, Any]]]
+
+
+def read(path: Path) -> dict[str, Rows]:
+    """Entity path to component to (step, list of values) in order; step None is static."""
+    from rerun.chunk import RrdReader
+
+    found: dict[str, Rows] = defaultdict(lambda: defaultdict(list))
+    for chunk in RrdReader(path).stream():
+        batch = chunk.to_record_batch()
+        assert set(chunk.timeline_names) <= {"step"}
+        steps = [None] * chunk.num_rows if chunk.is_static else batch.column("step").to_pylist()
+        for name in batch.schema.names:
+            if name == "step" or "RowId" in name:
+                continue
+            found[chunk.entity_path][name].extend(zip(steps, batch.column(name), strict=True))
+    for rows in found.values():
+        for component in rows.values():
+            component.sort(key=lambda row: -1 if row[0] is None else row[0])
+    return found
+
+
+def at_every_step(rows: list[tuple[int | None, Any]], steps: list[int]) -> list[np.ndarray]:
+    """What a viewer shows of a component at each step: the latest row."""
+    shown, latest, place = [], None, 0
+    for step in steps:
+        while place < len(rows) and (rows[place][0] is None or rows[place][0] <= step):
+            latest = rows[place][1]
+            place += 1
+        assert latest is not None
+        shown.append(np.asarray(latest.as_py() or []))
+    return shown
+
+
+def rerun_program(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [str(app.viewer_executable()), *arguments],
+        env=app.viewer_environment(os.environ),
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )

@@ -1,0 +1,41 @@
+"""The table of colors: packed as Rerun wants them, and health colored by what is left of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fireworld.records import ACTIVITIES, FIERYNESS
+from viewer import colors
+
+
+def test_every_code_and_activity_has_a_color_of_its_own():
+    assert len(colors.FIERYNESS_RGB) == len(set(colors.FIERYNESS_RGB)) == len(FIERYNESS)
+    assert len(colors.ACTIVITY_RGB) == len(set(colors.ACTIVITY_RGB)) == len(ACTIVITIES)
+    assert colors.REFUGE_RGB not in colors.FIERYNESS_RGB
+
+
+def test_packed_is_red_green_blue_and_opaque():
+    assert colors.packed((1, 2, 3)) == 0x010203FF
+    assert colors.packed_table(((1, 2, 3), (255, 0, 16))).tolist() == [0x010203FF, 0xFF0010FF]
+
+
+def test_shades_darken_each_part_and_keep_it_opaque():
+    table = colors.shaded_table(((200, 100, 50),), (100, 50))
+    assert table.tolist() == [[0xC86432FF, 0x643219FF]]
+
+
+@pytest.mark.parametrize(
+    ("hp", "rgb"),
+    [(1000, colors.HEALTHY_RGB), (500, colors.HURT_RGB), (1, colors.DYING_RGB), (0, colors.DEAD_RGB)],
+)
+def test_health_runs_from_green_over_white_to_magenta_and_the_dead_are_black(hp: int, rgb: colors.Rgb):
+    shown = colors.health_rgb(np.array([[hp]]), np.array([1000]))
+    assert shown.shape == (1, 1, 3)
+    assert np.abs(shown[0, 0].astype(int) - rgb).max() <= 2
+
+
+def test_health_follows_each_persons_own_start():
+    shown = colors.health_rgb(np.array([500, 500]), np.array([500, 1000]))
+    assert tuple(shown[0]) == colors.HEALTHY_RGB
+    assert tuple(shown[1]) == pytest.approx(colors.HURT_RGB, abs=2)

@@ -1,0 +1,198 @@
+"""What is written to a Rerun file is what the recording holds, at every step."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fireworld.errors import ViewError
+from fireworld.records import ACTIVITIES, MemoryRecording
+from tests.viewer import rrd
+from tests.viewer.conftest import make_recording
+from viewer import app, colors, crews
+from viewer.city_mesh import SHADES_PERCENT, build_mesh
+from viewer.plots import COUNTS, REWARDS, SCORES
+
+
+@pytest.fixture(scope="module")
+def saved(small: MemoryRecording, tmp_path_factory: pytest.TempPathFactory) -> dict[str, rrd.Rows]:
+    path = tmp_path_factory.mktemp("view") / "small.rrd"
+    app.save([small], path, focus=[121, 100])
+    return rrd.read(path)
+
+
+def packed(rgb: colors.Rgb, percent: int) -> int:
+    red, green, blue = (part * percent // 100 for part in rgb)
+    return red << 24 | green << 16 | blue << 8 | 255
+
+
+def test_every_building_has_its_color_at_every_step(small, saved):
+    mesh = build_mesh(small.city)
+    shown = rrd.at_every_step(saved["/city/buildings"]["Mesh3D:vertex_colors"], small.steps.tolist())
+    refuges = set(small.city.refuge_building.tolist())
+    assert len(shown) == len(list(small))
+    for record, vertex_colors in zip(small, shown, strict=True):
+        for building, code in enumerate(record.buildings.fieryness.tolist()):
+            rgb = colors.REFUGE_RGB if building in refuges else colors.FIERYNESS_RGB[code]
+            own = mesh.vertex_building == building
+            wanted = [packed(rgb, SHADES_PERCENT[shade]) for shade in mesh.vertex_shade[own].tolist()]
+            assert vertex_colors[own].tolist() == wanted
+
+
+def test_geometry_is_sent_once_and_colors_only_when_they_change(small, saved):
+    mesh = saved["/city/buildings"]
+    assert [step for step, _ in mesh["Mesh3D:vertex_positions"]] == [None]
+    codes = small.column("/buildings", "fieryness")
+    changes = [0, *(np.flatnonzero(np.any(codes[1:] != codes[:-1], axis=1)) + 1).tolist()]
+    assert [step for step, _ in mesh["Mesh3D:vertex_colors"]] == changes
+    assert len(changes) < len(codes)
+
+
+@pytest.mark.parametrize("name", ["temperature", "fuel", "water_litres", "fieryness"])
+def test_handles_carry_the_numbers_of_every_building(small, saved, name: str):
+    shown = rrd.at_every_step(saved["/city/handles"][f"Building:{name}"], small.steps.tolist())
+    assert np.array_equal(np.array(shown), small.column("/buildings", name))
+
+
+def test_handles_sit_on_the_roofs_and_know_their_buildings(small, saved):
+    handles = saved["/city/handles"]
+    (_, positions), (_, ids) = handles["Points3D:positions"][0], handles["Facts:id"][0]
+    assert ids.as_py() == small.city.building_id.tolist()
+    xyz = np.array(positions.as_py())
+    assert np.allclose(xyz[:, 0], small.city.center_x_m, atol=1e-4)
+    assert np.all(xyz[:, 2] > 3 * small.city.floors)
+
+
+@pytest.mark.parametrize(
+    ("path", "topic", "names"),
+    [("score", "/score", SCORES), ("buildings", "/score", COUNTS), ("reward", "/rewards", REWARDS)],
+)
+def test_plots_hold_the_recorded_scalars(small, saved, path: str, topic: str, names: tuple[str, ...]):
+    shown = rrd.at_every_step(saved[f"/plots/{path}"]["Scalars:scalars"], small.steps.tolist())
+    assert np.array_equal(np.array(shown), np.column_stack([small.column(topic, name) for name in names]))
+
+
+def test_tanks_and_the_focus_are_plotted(small, saved):
+    steps = small.steps.tolist()
+    tanks = rrd.at_every_step(saved["/plots/tanks"]["Scalars:scalars"], steps)
+    assert np.array_equal(np.array(tanks), small.column("/brigades", "tank_litres"))
+    focus = rrd.at_every_step(saved["/plots/focus"]["Scalars:scalars"], steps)
+    assert np.array_equal(np.array(focus), small.column("/buildings", "temperature")[:, [21, 0]])
+    (_, names) = saved["/plots/focus"]["SeriesLines:names"][0]
+    assert names.as_py() == ["building 121", "building 100"]
+
+
+def test_brigades_stand_where_they_are_in_the_color_of_what_they_do(small, saved):
+    steps = small.steps.tolist()
+    brigades = saved["/team/brigades"]
+    xyz = np.array(rrd.at_every_step(brigades["Points3D:positions"], steps))
+    assert np.allclose(xyz[..., 0], small.column("/brigades", "x_m"))
+    assert np.allclose(xyz[..., 1], small.column("/brigades", "y_m"))
+    activity = small.column("/brigades", "activity")
+    shown = np.array(rrd.at_every_step(brigades["Points3D:colors"], steps))
+    assert np.array_equal(shown, colors.packed_table(colors.ACTIVITY_RGB)[activity])
+    labels = rrd.at_every_step(saved["/team/names"]["Points3D:labels"], steps)
+    assert labels[3].tolist() == [f"{i} · {tank} l" for i, tank in enumerate(list(small)[3].brigades.tank_litres)]
+
+
+def test_gauges_are_as_high_as_the_tanks_are_full(small, saved):
+    halves = np.array(rrd.at_every_step(saved["/team/tanks"]["Boxes3D:half_sizes"], small.steps.tolist()))
+    share = small.column("/brigades", "tank_litres") / small.city.brigade_tank_litres
+    assert np.allclose(halves[..., 2] / halves[..., 2].max(), share / share.max(), atol=1e-6)
+
+
+def test_a_jet_runs_from_each_spraying_brigade_to_its_target(small, saved):
+    jets = rrd.at_every_step(saved["/team/water"]["LineStrips3D:strips"], small.steps.tolist())
+    n_jets = 0
+    for record, strips in zip(small, jets, strict=True):
+        sprays = np.flatnonzero(record.brigades.sprayed_litres > 0)
+        assert len(strips) == len(sprays)
+        for strip, brigade in zip(strips, sprays.tolist(), strict=True):
+            target = record.decisions.target[brigade]
+            assert strip[0][0] == pytest.approx(record.brigades.x_m[brigade])
+            assert strip[-1][0] == pytest.approx(small.city.center_x_m[target])
+            assert strip[-1][1] == pytest.approx(small.city.center_y_m[target])
+            n_jets += 1
+    assert n_jets > 0
+
+
+def test_civilians_are_colored_by_health_and_stand_above_their_roofs(small, saved):
+    shown = rrd.at_every_step(saved["/civilians"]["Points3D:colors"], small.steps.tolist())
+    hp = small.column("/civilians", "hp")
+    rgb = colors.health_rgb(hp, small.city.civilian_hp).astype(int)
+    assert np.array_equal(np.array(shown), rgb[..., 0] << 24 | rgb[..., 1] << 16 | rgb[..., 2] << 8 | 255)
+    assert len(np.unique(hp)) > 3
+    (_, positions) = saved["/civilians"]["Points3D:positions"][0]
+    assert np.all(np.array(positions.as_py())[:, 2] > 3 * small.city.floors[small.city.civilian_building])
+
+
+def test_sites_and_their_free_sides(small, saved):
+    steps = small.steps.tolist()
+    boxes = rrd.at_every_step(saved["/fire/sites"]["Boxes3D:centers"], steps)
+    sides = rrd.at_every_step(saved["/fire/free_sides"]["LineStrips3D:strips"], steps)
+    for record, box, strips in zip(small, boxes, sides, strict=True):
+        observed = record.observations
+        assert len(box) == len(observed.site_id)
+        assert len(strips) == 2 * len(observed.site_id)  # N and S are free in the made-up run
+        for site in range(len(observed.site_id)):
+            assert box[site][0] == pytest.approx((observed.site_west_m[site] + observed.site_east_m[site]) / 2)
+            assert {point[1] for point in strips[0]} == {pytest.approx(observed.site_north_m[site])}
+            assert {point[1] for point in strips[1]} == {pytest.approx(observed.site_south_m[site])}
+
+
+def test_lanes_change_where_activities_change(small, saved):
+    for brigade in range(3):
+        lane = saved[f"/activity/brigade_{brigade}"]["StateChange:state"]
+        shown = [states.tolist() for states in rrd.at_every_step(lane, small.steps.tolist())]
+        assert shown == [[ACTIVITIES[record.brigades.activity[brigade]]] for record in small]
+
+
+def test_the_log_tells_events_and_new_choices(small, saved):
+    events = [(step, text.as_py()[0]) for step, text in saved["/log/events"]["TextLog:text"]]
+    wanted = sum(len(record.events.kind) for record in small)
+    assert len(events) == wanted
+    assert (6, "brigade 0: tank empty") in events
+    first = next(record for record in small if 0 in record.events.kind)
+    assert events[0] == (first.step, f"building {small.city.building_id[first.events.entity[0]]} ignited")
+    choices = [(step, text.as_py()[0]) for step, text in saved["/log/decisions"]["TextLog:text"]]
+    target = small.city.building_id[list(small)[1].decisions.target]
+    assert choices[:3] == [
+        (1, f"brigade 0: easiest → building {target[0]}"),
+        (1, f"brigade 1: nearest-to-civilian → building {target[1]} (exploring)"),
+        (1, f"brigade 2: nearest-to-center → building {target[2]}"),
+    ]
+    assert len(choices) < 3 * len(small.steps)
+
+
+def test_no_entity_stands_for_a_single_building(saved):
+    assert len(saved) < 35
+
+
+def test_brigades_on_one_spot_are_drawn_side_by_side():
+    recording = make_recording(4, 4, 2)
+    for record in recording:
+        record.brigades.x_m[:] = [5.0, 5.0, 5.0]
+        record.brigades.x_m[1] = 6.0
+    xyz = crews.brigade_positions_m(recording)
+    assert xyz[0, :, 0].tolist() == [5.0, 6.0, 12.0]
+
+
+def test_a_city_without_people_or_fire_sites_can_be_shown(tmp_path: Path):
+    recording = make_recording(3, 3, 0, n_brigades=0, n_civilians=0)
+    app.save([recording], tmp_path / "empty.rrd")
+    found = rrd.read(tmp_path / "empty.rrd")
+    assert "/city/buildings" in found
+    assert not {"/civilians", "/team/brigades", "/fire/sites", "/log/events"} & set(found)
+
+
+def test_an_unknown_focus_is_named(small, tmp_path: Path):
+    with pytest.raises(ViewError, match=r"--focus: expected ids of buildings of city 'grid', got 7; .*100, 101, 102"):
+        app.save([small], tmp_path / "x.rrd", focus=[100, 7])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_thousand_buildings_for_300_steps_stay_small(big, tmp_path: Path):
+    app.save([big], tmp_path / "big.rrd")
+    assert (tmp_path / "big.rrd").stat().st_size < 8_000_000

@@ -1,0 +1,214 @@
+"""Ways to look at recordings: save them for Rerun, open Rerun's window, or serve Rerun to a browser."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import Final
+
+from fireworld.errors import OutputError, ViewError, expected
+from fireworld.records import Recording
+
+RERUN_MINOR: Final = "0.41."
+INSTALL_HINT: Final = "try pip install 'fireworld[view]'"
+LOCALHOST: Final = "127.0.0.1"
+WEB_PORT: Final = 9090
+APPLICATION_ID: Final = "fireworld"
+
+
+def save(recordings: Sequence[Recording], path: Path, *, focus: Sequence[int] = (), force: bool = False) -> None:
+    """Write one recording, or two side by side, as a Rerun file; an unfinished file never bears the final name.
+
+    Args:
+        recordings: one, or two of the same city.
+        path: the .rrd file.
+        focus: ids of buildings whose temperatures are plotted.
+        force: replace an existing file.
+
+    Raises:
+        OutputError: the file exists or cannot be written.
+        ViewError: Rerun is missing, the cities differ or a building of the focus is unknown.
+    """
+    if path.exists() and not force:
+        raise OutputError(f"{path}: exists already; try --force")
+    if not path.parent.is_dir():
+        raise OutputError(f"{path}: its folder does not exist")
+    partial = path.with_name(path.name + ".partial")
+    try:
+        _write(recordings, partial, focus)
+        partial.replace(path)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from None
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def show(recordings: Sequence[Recording], *, focus: Sequence[int] = ()) -> None:
+    """Open recordings in Rerun's own window and return when it is closed.
+
+    Raises:
+        ViewError: there is no display, or no viewer.
+    """
+    _import_rerun()
+    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise ViewError("view: no display here; try --save FILE.rrd, or --web")
+    _run_viewer(recordings, focus, ["--port", str(free_port()), "--hide-welcome-screen"])
+
+
+def serve(
+    recordings: Sequence[Recording],
+    *,
+    focus: Sequence[int] = (),
+    port: int = WEB_PORT,
+    announce: Callable[[str], None],
+) -> None:
+    """Serve Rerun with the recordings to browsers on this machine until interrupted.
+
+    Args:
+        recordings: one, or two of the same city.
+        focus: ids of buildings whose temperatures are plotted.
+        port: of the page.
+        announce: told the address of the page.
+
+    Raises:
+        ViewError: the port is taken, or there is no viewer.
+    """
+    _import_rerun()
+    if not _is_free(port):
+        raise ViewError(expected("view", "--port", "a free port", port, "try another one"))
+    data_port = free_port()
+    announce(f"http://{LOCALHOST}:{port}?url=rerun%2Bhttp%3A%2F%2F{LOCALHOST}%3A{data_port}%2Fproxy")
+    ports = ["--web-viewer-port", str(port), "--port", str(data_port)]
+    _run_viewer(recordings, focus, ["--serve-web", *ports])
+
+
+def viewer_executable() -> Path:
+    """Path of Rerun's viewer itself; the `rerun` script is a wrapper that leaves it running when it is stopped.
+
+    Raises:
+        ViewError: it is not there.
+    """
+    rerun = _import_rerun()
+    folder = Path(str(rerun.__file__)).parents[1] / "rerun_cli"
+    path = folder / ("rerun.exe" if os.name == "nt" else "rerun")
+    if not path.is_file():
+        raise ViewError(f"view: expected Rerun's viewer at {path}; {INSTALL_HINT}")
+    return path
+
+
+def viewer_environment(environment: Mapping[str, str]) -> dict[str, str]:
+    """Environment for Rerun's viewer: it reports usage unless it believes to run in continuous integration."""
+    kept = {name: value for name, value in environment.items() if name != "RERUN_ANALYTICS"}
+    return {**kept, "CI": "1", "RUST_LOG": environment.get("RUST_LOG", "error")}
+
+
+def free_port() -> int:
+    """A port of this machine that nobody listens on at the moment."""
+    with socket.socket() as probe:
+        probe.bind((LOCALHOST, 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def _write(recordings: Sequence[Recording], path: Path, focus: Sequence[int]) -> None:
+    """Send recordings to a Rerun file and make sure that all of it arrived."""
+    rerun = _import_rerun()
+    from viewer import blueprint, comparison, legend, mapping
+
+    identity = "-".join(f"{one.header.scenario}-{one.header.policy}-{one.header.seed}" for one in recordings)
+    stream = rerun.RecordingStream(APPLICATION_ID, recording_id=identity, send_properties=False)
+    stream.set_log_time_enabled(False)
+    stream.set_log_tick_enabled(False)
+    comparing = len(recordings) > 1
+    if comparing:
+        comparison.check_same_city(*(one.city for one in recordings))
+    layout = blueprint.pair if comparing else blueprint.single
+    try:
+        path.touch()
+        stream.save(path, default_blueprint=layout(*recordings, focus=bool(focus)))
+        if comparing:
+            first, second = recordings
+            comparison.log_comparison(stream, first, second, focus=focus)
+        else:
+            mapping.log_recording(stream, recordings[0], focus=focus)
+        legend.log_legend(stream, comparing=comparing)
+        stream.send_recording_name(" | ".join(map(blueprint.title, recordings)))
+        stream.flush()
+    except RuntimeError as error:
+        # The stream's writer runs beside us; all it tells is that it stopped, and it stops when the disk refuses.
+        raise OSError(f"{error}; is the disk full?") from None
+    finally:
+        stream.disconnect()
+    _check(rerun, path)
+
+
+def _check(rerun: ModuleType, path: Path) -> None:
+    """Make sure that a Rerun file is complete: its table of contents, written last, can be read."""
+    from rerun.chunk import RrdReader
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", rerun.error_utils.RerunWarning)
+        try:
+            RrdReader(path).store()
+        except (RuntimeError, ValueError, rerun.error_utils.RerunWarning):
+            raise OSError("the file is not complete; is the disk full?") from None
+
+
+def _run_viewer(recordings: Sequence[Recording], focus: Sequence[int], options: list[str]) -> None:
+    """Run Rerun's viewer on recordings until it ends or we are told to stop; it never outlives us."""
+    with tempfile.TemporaryDirectory(prefix="fireworld-") as folder:
+        path = Path(folder) / "view.rrd"
+        save(recordings, path, focus=focus)
+        command = [str(viewer_executable()), "--bind", LOCALHOST, *options, str(path)]
+        before = signal.signal(signal.SIGTERM, _stop)
+        viewer = subprocess.Popen(command, env=viewer_environment(os.environ))  # noqa: S603 - our own command
+        try:
+            status = viewer.wait()
+        except KeyboardInterrupt:
+            status = 0
+        finally:
+            signal.signal(signal.SIGTERM, before)
+            viewer.terminate()
+            viewer.wait()
+    if status:
+        raise ViewError(f"view: Rerun's viewer ended with code {status}; try --save FILE.rrd, or --web")
+
+
+def _stop(number: int, frame: object) -> None:
+    del number, frame
+    raise KeyboardInterrupt
+
+
+def _is_free(port: int) -> bool:
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((LOCALHOST, port))
+        except OSError:
+            return False
+    return True
+
+
+def _import_rerun() -> ModuleType:
+    """Import Rerun, quietly: its own log would stand between the user and our one line.
+
+    Raises:
+        ViewError: it is not installed, or is of another minor version.
+    """
+    os.environ.setdefault("RUST_LOG", "off")
+    try:
+        import rerun
+    except ImportError:
+        raise ViewError(f"view: Rerun is not installed; {INSTALL_HINT}") from None
+    if not rerun.__version__.startswith(RERUN_MINOR):
+        raise ViewError(expected("rerun-sdk", "version", f"{RERUN_MINOR}*", rerun.__version__, INSTALL_HINT))
+    module: ModuleType = rerun
+    return module

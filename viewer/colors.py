@@ -1,0 +1,117 @@
+"""The colors of everything a viewer draws: one table for the Rerun view, the maps and the legend.
+
+The fieryness colors follow the official viewer's: yellow, orange and dark red burn; blue-grey shades were watered or
+extinguished; black is burnt out. All colors are sRGB, 0..255.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Rgb = tuple[int, int, int]
+UInt32Array = NDArray[np.uint32]
+
+FIERYNESS_RGB: Final[tuple[Rgb, ...]] = (
+    (188, 184, 176),  # 0 unburnt
+    (246, 214, 60),  # 1 heating
+    (238, 126, 34),  # 2 burning
+    (166, 28, 28),  # 3 inferno
+    (116, 168, 182),  # 4 water-damaged
+    (120, 158, 214),  # 5 minor damage
+    (98, 116, 190),  # 6 moderate damage
+    (82, 78, 140),  # 7 severe damage
+    (22, 20, 20),  # 8 burnt out
+)
+"""By official code 0 to 8."""
+
+REFUGE_RGB: Final[Rgb] = (62, 168, 84)
+HYDRANT_RGB: Final[Rgb] = (52, 190, 190)
+STREET_RGB: Final[Rgb] = (112, 116, 122)
+GROUND_RGB: Final[Rgb] = (70, 74, 80)
+BACKGROUND_RGB: Final[Rgb] = (34, 37, 42)
+LEGEND_BACKGROUND_RGB: Final[Rgb] = (62, 66, 72)
+WATER_RGB: Final[Rgb] = (90, 190, 255)
+DRIVE_RGB: Final[Rgb] = (235, 235, 235)
+FREE_SIDE_RGB: Final[Rgb] = (255, 72, 140)
+CLOSED_SIDE_RGB: Final[Rgb] = (150, 150, 150)
+LABEL_RGB: Final[Rgb] = (225, 225, 225)
+HANDLE_RGB: Final[Rgb] = (96, 94, 90)
+
+ACTIVITY_RGB: Final[tuple[Rgb, ...]] = (
+    (225, 225, 225),  # idle
+    (202, 164, 255),  # driving
+    (40, 140, 255),  # spraying
+    (120, 220, 140),  # driving to a refuge
+    (30, 150, 70),  # refilling
+    (10, 10, 10),  # dead
+)
+"""By index into records.ACTIVITIES."""
+
+BRIGADE_RGB: Final[tuple[Rgb, ...]] = (
+    (79, 147, 255),
+    (255, 160, 60),
+    (88, 196, 120),
+    (224, 100, 190),
+    (190, 170, 255),
+    (240, 220, 90),
+    (100, 210, 220),
+    (230, 110, 100),
+)
+"""Line colors of the brigades in plots; repeated when there are more."""
+
+HEALTHY_RGB: Final[Rgb] = (96, 240, 120)
+HURT_RGB: Final[Rgb] = (250, 250, 250)
+DYING_RGB: Final[Rgb] = (225, 60, 235)
+DEAD_RGB: Final[Rgb] = (10, 10, 10)
+
+BETTER_RGB: Final[Rgb] = (64, 132, 230)
+SAME_RGB: Final[Rgb] = (188, 184, 176)
+WORSE_RGB: Final[Rgb] = (214, 60, 52)
+DIFFERENCE_RGB: Final[tuple[Rgb, ...]] = (BETTER_RGB, SAME_RGB, WORSE_RGB)
+"""By difference + 1: -1 less damage in the second run, 0 the same, +1 more."""
+
+
+def packed(rgb: Rgb) -> int:
+    """Pack a color as 0xRRGGBBAA, opaque."""
+    red, green, blue = rgb
+    return red << 24 | green << 16 | blue << 8 | 0xFF
+
+
+def packed_table(colors: tuple[Rgb, ...]) -> UInt32Array:
+    """Pack a table of colors, to be indexed by codes: (len(colors),) uint32."""
+    return np.array([packed(rgb) for rgb in colors], dtype=np.uint32)
+
+
+def shaded_table(colors: tuple[Rgb, ...], shades_percent: tuple[int, ...]) -> UInt32Array:
+    """Pack every color at every brightness: (len(colors), len(shades_percent)) uint32."""
+    return np.array(
+        [
+            [packed((red * shade // 100, green * shade // 100, blue * shade // 100)) for shade in shades_percent]
+            for red, green, blue in colors
+        ],
+        dtype=np.uint32,
+    )
+
+
+def health_rgb(hp: NDArray[Any], hp_start: NDArray[Any]) -> NDArray[np.uint8]:
+    """Color people by the share of their health left: green when well, white at half, magenta when dying.
+
+    The dead are black.
+
+    Args:
+        hp: (..., n) health points now.
+        hp_start: (n,) health points at the start.
+
+    Returns:
+        (..., n, 3) sRGB.
+    """
+    start = np.maximum(hp_start, 1).astype(np.int64)
+    share = np.clip(hp.astype(np.int64), 0, start) * 512 // start  # 0..512
+    half, rest = share[..., np.newaxis] // 257, share[..., np.newaxis] % 257
+    low, high = np.array([DYING_RGB, HURT_RGB])[half], np.array([HURT_RGB, HEALTHY_RGB])[half]
+    mixed = (low[..., 0, :] * (256 - rest) + high[..., 0, :] * rest) // 256
+    colors: NDArray[np.uint8] = np.where(hp[..., np.newaxis] > 0, mixed, np.array(DEAD_RGB)).astype(np.uint8)
+    return colors

@@ -1,0 +1,78 @@
+"""The legend: every color of the map with its name, and a page on how to read the view."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from fireworld.records import ACTIVITIES, FIERYNESS
+from viewer import colors
+
+if TYPE_CHECKING:
+    import rerun
+
+LEGEND_PATH: Final = "/legend"
+HELP_PATH: Final = "/help"
+
+_COLUMN_WIDTH: Final = 2.9
+
+HELP: Final = """\
+# How to read this
+
+**Buildings** stand as they are, 3 m a storey. Grey ones are untouched; yellow, orange and dark red ones burn; blue ones
+were watered or put out; black ones are burnt out; green ones are refuges, where tanks are refilled. Click the dot on a
+roof: the panel on the right shows the building's temperature, fuel, water and fieryness at this step.
+
+**Brigades** are balls, colored by what they do. The blue bar above a brigade is the water in its tank; the label is
+its number and the litres. A blue arc is water on its way to the target; a thin white one leads to the target that a
+brigade drives to. Brigades on one spot are drawn side by side.
+
+**Civilians** are small dots above roofs: green when well, white when hurt, magenta when dying, black when dead.
+
+**Fire sites** are thin boxes, as the brigades saw them before the step; a pink side is one over which the fire can
+still spread.
+
+The slider below moves through the steps, one simulated minute each; the space bar plays them.
+"""
+
+
+def entries(*, comparing: bool) -> list[list[tuple[str, colors.Rgb]]]:
+    """Rows of names and colors of all that is on the map."""
+    buildings = list(zip(FIERYNESS, colors.FIERYNESS_RGB, strict=True))
+    names = [f"brigade {activity}".replace("driving-to", "to") for activity in ACTIVITIES]
+    brigades = list(zip(names, colors.ACTIVITY_RGB, strict=True))
+    rows = [
+        [*buildings[:4], buildings[8]],
+        [*buildings[4:8], ("refuge", colors.REFUGE_RGB)],
+        [*brigades[:3], ("water", colors.WATER_RGB), ("fire can spread", colors.FREE_SIDE_RGB)],
+        [*brigades[3:], ("hydrant", colors.HYDRANT_RGB)],
+        [
+            ("civilian, well", colors.HEALTHY_RGB),
+            ("civilian, hurt", colors.HURT_RGB),
+            ("civilian, dying", colors.DYING_RGB),
+            ("civilian, dead", colors.DEAD_RGB),
+        ],
+    ]
+    if comparing:
+        rows.append(list(zip(("B is better", "the same", "B is worse"), colors.DIFFERENCE_RGB, strict=True)))
+    return rows
+
+
+def log_legend(stream: rerun.RecordingStream, *, comparing: bool) -> None:
+    """Send the legend, as dots in rows with their names below them, and the page of help."""
+    import rerun
+
+    rows = entries(comparing=comparing)
+    place = [(_COLUMN_WIDTH * x, float(y)) for y, row in enumerate(rows) for x in range(len(row))]
+    named = [entry for row in rows for entry in row]
+    dots = rerun.Points2D(place, colors=[rgb for _, rgb in named], radii=rerun.Radius.ui_points(6.0))
+    # The names hang on points of their own: a name takes the color of its point, and black ones could not be read.
+    names = rerun.Points2D(
+        place,
+        colors=[colors.LABEL_RGB],
+        labels=[name for name, _ in named],
+        show_labels=True,
+        radii=rerun.Radius.ui_points(0.5),
+    )
+    stream.log(f"{LEGEND_PATH}/dots", dots, static=True)
+    stream.log(f"{LEGEND_PATH}/names", names, static=True)
+    stream.log(HELP_PATH, rerun.TextDocument(HELP, media_type=rerun.MediaType.MARKDOWN), static=True)

@@ -1,0 +1,177 @@
+"""Recording to Rerun: puts every layer of a run on the `step` timeline. `log_recording` is the way in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fireworld.errors import ViewError, expected
+from fireworld.records import MATERIALS, CityRecord, Recording
+from viewer import colors, crews, plots, telling
+from viewer.city_mesh import SHADES_PERCENT, CityMesh, build_mesh
+from viewer.stage import Stage, values
+
+if TYPE_CHECKING:
+    import rerun
+
+_REFUGE: Final = len(colors.FIERYNESS_RGB)
+"""Row of a refuge in the table of building colors."""
+
+_BUILDING_COLORS: Final = colors.shaded_table((*colors.FIERYNESS_RGB, colors.REFUGE_RGB), SHADES_PERCENT)
+
+
+def log_recording(
+    stream: rerun.RecordingStream, recording: Recording, *, prefix: str = "", focus: Sequence[int] = ()
+) -> None:
+    """Send everything that a recording holds to a Rerun stream, below one entity path.
+
+    Args:
+        stream: where to; its log time and log tick are left out of everything sent.
+        recording: what to show.
+        prefix: entity path to put it below, "" or like "/a".
+        focus: ids of buildings whose temperatures are plotted.
+
+    Raises:
+        ViewError: a focus that the city has no building for.
+    """
+    focus_index = building_indices(recording.city, focus)
+    stage = Stage(stream, prefix, recording.steps)
+    stage.static("", _coordinates())
+    mesh = build_mesh(recording.city)
+    log_city(stage, recording.city)
+    log_buildings(stage, recording, mesh)
+    crews.log_brigades(stage, recording, mesh)
+    crews.log_water(stage, recording, mesh)
+    crews.log_civilians(stage, recording, mesh)
+    crews.log_sites(stage, recording)
+    plots.log_plots(stage, recording, focus_index)
+    plots.log_activities(stage, recording)
+    telling.log_text(stage, recording)
+
+
+def building_indices(city: CityRecord, focus: Sequence[int]) -> list[int]:
+    """Find buildings by their ids.
+
+    Raises:
+        ViewError: the city has no such building.
+    """
+    index_of = {int(identifier): index for index, identifier in enumerate(city.building_id)}
+    for identifier in focus:
+        if identifier not in index_of:
+            some = f"the first are {', '.join(map(str, list(index_of)[:3]))}"
+            raise ViewError(expected("--focus", "", f"ids of buildings of city {city.name!r}", identifier, some))
+    return [index_of[identifier] for identifier in focus]
+
+
+def log_city(stage: Stage, city: CityRecord) -> None:
+    """Draw the ground, streets, refuges and hydrants; none of them changes."""
+    import rerun
+
+    low, high = city_box_m(city, margin_m=15.0)
+    corners = [(low[0], low[1], -0.4), (high[0], low[1], -0.4), (high[0], high[1], -0.4), (low[0], high[1], -0.4)]
+    ground = rerun.Mesh3D(
+        vertex_positions=corners,
+        triangle_indices=[(0, 1, 2), (0, 2, 3)],
+        vertex_colors=np.full(4, colors.packed(colors.GROUND_RGB), dtype=np.uint32),
+    )
+    stage.static("city/ground", ground)
+    if len(city.street_from):
+        node = np.column_stack([city.node_x_m, city.node_y_m, np.zeros(len(city.node_x_m))]).astype(np.float32)
+        strips = np.stack([node[city.street_from], node[city.street_to]], axis=1)
+        stage.static("city/streets", rerun.LineStrips3D(strips, colors=[colors.STREET_RGB], radii=[0.8]))
+    if len(city.refuge_building):
+        refuge = np.asarray(city.refuge_building)
+        roof = np.column_stack([city.center_x_m, city.center_y_m, np.asarray(city.floors) * 3.0 + 3.0])[refuge]
+        labels = [f"refuge {city.building_id[index]}" for index in refuge]
+        marks = rerun.Points3D(roof, colors=[colors.REFUGE_RGB], radii=[3.0], labels=labels, show_labels=True)
+        stage.static("city/refuges", marks)
+    if len(city.hydrant_x_m):
+        position = np.column_stack([city.hydrant_x_m, city.hydrant_y_m, np.full(len(city.hydrant_x_m), 1.0)])
+        stage.static("city/hydrants", rerun.Points3D(position, colors=[colors.HYDRANT_RGB], radii=[1.2]))
+
+
+def log_buildings(stage: Stage, recording: Recording, mesh: CityMesh) -> None:
+    """Color the city by fieryness, and put a handle with the numbers of its building on every roof."""
+    city = recording.city
+    fieryness = recording.column("/buildings", "fieryness")
+    log_mesh(stage, mesh, shown_codes(city, fieryness), _BUILDING_COLORS)
+
+    log_handles(stage, city, mesh)
+    columns = {name: recording.column("/buildings", name) for name in ("temperature", "fuel", "water_litres")}
+    columns["fieryness"] = fieryness
+    for block in stage.blocks(13 * len(city.building_id)):
+        part = {name: numbers[block] for name, numbers in columns.items()}
+        stage.rows("city/handles", values("Building", part), steps=stage.steps[block])
+
+
+def log_handles(stage: Stage, city: CityRecord, mesh: CityMesh) -> None:
+    """Put a dot on every roof that can be clicked, with the facts of its building; one batch, never one by one."""
+    import rerun
+
+    handles = mesh.roof_xyz_m + np.array([0, 0, 0.3], dtype=np.float32)
+    points = rerun.Points3D(handles, colors=[colors.HANDLE_RGB], radii=[0.9])
+    facts = rerun.DynamicArchetype(
+        "Facts",
+        components={
+            "id": np.asarray(city.building_id),
+            "material": [MATERIALS[code] for code in city.material],
+            "floors": np.asarray(city.floors),
+            "volume_m3": np.asarray(city.volume_m3),
+            "initial_fuel": np.asarray(city.initial_fuel),
+        },
+    )
+    stage.static("city/handles", points, facts)
+
+
+def log_mesh(
+    stage: Stage,
+    mesh: CityMesh,
+    codes: NDArray[np.uint8],
+    table: NDArray[np.uint32],
+    path: str = "city/buildings",
+) -> None:
+    """Send the city's mesh once and its colors for every step in which a code changes.
+
+    Args:
+        stage: where to.
+        mesh: the city's geometry.
+        codes: (k, n) row of the table for each building.
+        table: (codes, len(SHADES_PERCENT)) packed colors.
+        path: entity path.
+    """
+    import rerun
+
+    stage.static(path, rerun.Mesh3D(vertex_positions=mesh.vertex_xyz_m, triangle_indices=mesh.triangle))
+    changed = np.flatnonzero(np.concatenate([[True], np.any(codes[1:] != codes[:-1], axis=1)]))
+    entry = codes.astype(np.intp) * table.shape[1]
+    flat = table.reshape(-1)
+    n_vertices = len(mesh.vertex_building)
+    for block in stage.blocks(4 * n_vertices, changed):
+        vertex_colors = flat[entry[block][:, mesh.vertex_building] + mesh.vertex_shade]
+        columns = rerun.Mesh3D.columns(vertex_colors=vertex_colors.reshape(-1))
+        stage.rows(path, columns.partition(np.full(len(block), n_vertices)), steps=stage.steps[block])
+
+
+def shown_codes(city: CityRecord, fieryness: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Row of each building in the table of colors: its code, or a refuge's own row. (k, n) to (k, n)."""
+    shown = fieryness.copy()
+    shown[:, np.asarray(city.refuge_building, dtype=np.intp)] = _REFUGE
+    return shown
+
+
+def city_box_m(city: CityRecord, margin_m: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """South-west and north-east corner of the city with a margin."""
+    x, y = np.asarray(city.outline_x_m), np.asarray(city.outline_y_m)
+    return (
+        (float(x.min()) - margin_m, float(y.min()) - margin_m),
+        (float(x.max()) + margin_m, float(y.max()) + margin_m),
+    )
+
+
+def _coordinates() -> object:
+    import rerun
+
+    return rerun.ViewCoordinates.RIGHT_HAND_Z_UP
