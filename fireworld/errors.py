@@ -49,4 +49,6 @@ def expected(where: str, key: str, wanted: str, got: object, hint: str = "") -> 
     if len(shown) > 80:
         shown = shown[:77] + "..."
     place = f"{where}: {key}" if key else where
-    return f"{place}: expected {wanted}, got {shown}" + (f"; {hint}" if hint else "")
+    message = f"{place}: expected {wanted}, got {shown}" + (f"; {hint}" if hint else "")
+    # Names and keys are the user's: a line break in one of them must not make two lines of the message.
+    return "".join(character if character.isprintable() else repr(character)[1:-1] for character in message)

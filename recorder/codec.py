@@ -266,10 +266,10 @@ def decode_snapshot(data: Buffer) -> Snapshot:
             raise LogError(f"arrays: expected wire type {_BYTES}, got {wire_type}")
         item = decode(NamedArray, raw)
         if item.dtype not in _SNAPSHOT_DTYPES:
-            raise LogError(f"{item.name}: expected a numeric type, got {item.dtype!r}")
+            raise LogError(f"{item.name!r}: expected a numeric type, got {item.dtype!r}")
         shape = tuple(int(length) for length in item.shape)
         dtype = np.dtype(item.dtype)
         if min(shape, default=0) < 0 or math.prod(shape) * dtype.itemsize != len(item.data):
-            raise LogError(f"{item.name}: expected an array of shape {shape}, got {len(item.data)} bytes")
+            raise LogError(f"{item.name!r}: expected an array of shape {shape}, got {len(item.data)} bytes")
         arrays[item.name] = np.frombuffer(item.data, dtype).reshape(shape).copy()
     return Snapshot(arrays=arrays)

@@ -20,6 +20,7 @@ MAGIC: Final = b"\x89MCAP0\r\n"
 CHUNK_BYTES_MAX: Final = 1 << 28
 """A chunk holds a step, which is far below this even for a city of a million buildings."""
 
+_LAST: Final = frozenset({int(Opcode.DATA_END), int(Opcode.FOOTER)})
 _RECORD: Final = struct.Struct("<BQ")
 _MESSAGE: Final = struct.Struct("<HIQQ")
 _FOOTER: Final = struct.Struct("<QQI")
@@ -34,6 +35,7 @@ class Record(NamedTuple):
 
     offset: int
     opcode: int
+    head: bytes  # opcode and length as they stand in the file
     body: bytes
 
 
@@ -99,19 +101,6 @@ class Fields:
         return self._body[self._position - length : self._position]
 
 
-def check_magic(file: IO[bytes]) -> None:
-    """Read the first bytes.
-
-    Raises:
-        LogError: this is not an MCAP file.
-    """
-    found = file.read(len(MAGIC))
-    if found != MAGIC:
-        raise LogError(
-            f"expected an MCAP recording, got {f'a file that starts with {found!r}' if found else 'nothing'}"
-        )
-
-
 def records(file: IO[bytes], size: int) -> Iterator[Record]:
     """Yield the records from the file's position on, to the end of the data section.
 
@@ -136,8 +125,8 @@ def records(file: IO[bytes], size: int) -> Iterator[Record]:
         body = file.read(length)
         if len(body) < length:
             raise TruncatedError("the file ends inside a record")
-        yield Record(offset, opcode, body)
-        if opcode in {Opcode.DATA_END, Opcode.FOOTER}:
+        yield Record(offset, opcode, head, body)
+        if opcode in _LAST:
             return
         offset += _RECORD.size + length
 
@@ -148,11 +137,6 @@ def _raise_overrun(file: IO[bytes], size: int, offset: int) -> None:
     if file.read(len(MAGIC)) == MAGIC:
         raise LogError(f"the record at byte {offset} has a length beyond the end of the file")
     raise TruncatedError("the file ends inside a record")
-
-
-def head(record: Record) -> bytes:
-    """Return the bytes that stand before a record's body."""
-    return _RECORD.pack(record.opcode, len(record.body))
 
 
 def data_checksum_fits(body: bytes, checksum: int) -> bool:
@@ -272,5 +256,5 @@ def read_attachment(body: bytes) -> tuple[str, bytes]:
     data = bytes(fields.bytes(length_layout="<Q"))
     (checksum,) = fields.numbers("<I")
     if checksum and checksum != zlib.crc32(body[:-4]):
-        raise LogError(f"the attachment {name} is damaged")
+        raise LogError(f"the attachment {name!r} is damaged")
     return name, data

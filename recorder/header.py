@@ -16,6 +16,10 @@ _ATTACHMENT: Final = "attachment:"
 _FIELDS: Final = tuple(item for item in dataclasses.fields(RunHeader) if item.name != "attachments")
 
 
+class ForeignError(LogError):
+    """A file that is no log, or one of another format."""
+
+
 def to_metadata(header: RunHeader) -> dict[str, str]:
     """Write a header as text, by rising key, with a checksum over all the rest (MCAP has none for metadata)."""
     metadata = {item.name: str(getattr(header, item.name)) for item in _FIELDS}
@@ -30,7 +34,7 @@ def check_format(found: str) -> None:
     """Refuse a log of another format.
 
     Raises:
-        LogError: the format is not the one that this version reads.
+        ForeignError: the format is not the one that this version reads.
     """
     if found == FORMAT:
         return
@@ -38,7 +42,7 @@ def check_format(found: str) -> None:
     ours_name, _, ours = FORMAT.partition("/")
     newer = name == ours_name and major.isdecimal() and int(major) > int(ours)
     hint = "it was written by a newer fireworld: try to upgrade" if newer else ""
-    raise LogError(expected("format", "", FORMAT, found, hint))
+    raise ForeignError(expected("format", "", FORMAT, found, hint))
 
 
 def from_metadata(metadata: Mapping[str, str], attachments: Mapping[str, bytes]) -> RunHeader:

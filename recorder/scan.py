@@ -17,11 +17,15 @@ from recorder import container
 from recorder.chain import Chain
 from recorder.codec import decode
 from recorder.container import Channel, Fields, Record, Schema, TruncatedError
-from recorder.header import METADATA_NAME, PROFILE, check_format, from_metadata
+from recorder.header import METADATA_NAME, PROFILE, ForeignError, check_format, from_metadata
 from recorder.schema import Commit
 
 State = Literal["complete", "partial", "damaged"]
-_BARE: Final = frozenset({Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE})
+# Plain integers, because comparing enumeration members takes as long as decoding a message.
+_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = (
+    int(opcode) for opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK)
+)
+_BARE: Final = frozenset({_SCHEMA, _CHANNEL, _MESSAGE})
 
 
 class Start(NamedTuple):
@@ -100,8 +104,10 @@ def _scan(path: str, stream: _Stream) -> Scan:
     try:
         city = _read_city(stream_of_messages)
         header = from_metadata(stream.metadata, stream.attachments)
+    except ForeignError as error:
+        raise LogError(f"{path}: {error}") from error
     except LogError as error:
-        raise LogError(f"{path}: {error}; without header and city there is nothing to read") from error
+        raise LogError(f"{path}: {error}; without header and city nothing can be read") from error
     chain = Chain(city)
     found = Scan(
         n_bytes=stream.n_bytes,
@@ -125,7 +131,7 @@ def _read_city(stream_of_messages: Iterator[tuple[str, memoryview, Start]]) -> b
     """Take the first message, which must be a city."""
     for topic, payload, _ in stream_of_messages:
         if topic != CityRecord.topic:
-            raise LogError(f"expected {CityRecord.topic} first, got {topic}")
+            raise LogError(f"expected {CityRecord.topic} first, got {topic!r}")
         decode(CityRecord, payload)
         return bytes(payload)
     raise LogError(f"expected {CityRecord.topic} first, got no message")
@@ -169,15 +175,15 @@ def messages(
     for record in container.records(file, n_bytes):
         position = start.position if record.offset == start.offset else 0
         for _, opcode, body in container.split(_block(record, decompressor), position):
-            if opcode == Opcode.MESSAGE:
+            if opcode == _MESSAGE:
                 yield _channel_of(body, channels).topic, container.payload_of(body)
 
 
 def _block(record: Record, decompressor: zstandard.ZstdDecompressor) -> bytes:
     """Return the records that a record of the file stands for: those in a chunk, or itself, or none."""
-    if record.opcode == Opcode.CHUNK:
+    if record.opcode == _CHUNK:
         return container.unpack_chunk(record.body, decompressor)
-    return container.head(record) + record.body if record.opcode in _BARE else b""
+    return record.head + record.body if record.opcode in _BARE else b""
 
 
 def _channel_of(message: memoryview, channels: Mapping[int, Channel]) -> Channel:
@@ -205,16 +211,19 @@ class _Stream:
         Raises:
             LogError: at the first fault of the file.
         """
-        container.check_magic(self._file)
+        found = self._file.read(len(container.MAGIC))
+        if found != container.MAGIC:
+            what = f"a file that begins with {found!r}" if found else "an empty file"
+            raise ForeignError(f"expected an MCAP recording, got {what}")
         checksum = zlib.crc32(container.MAGIC)
         for record in container.records(self._file, self.n_bytes):
             if record.opcode == Opcode.DATA_END:
                 self._check_end(record, checksum)
                 return
-            checksum = zlib.crc32(record.body, zlib.crc32(container.head(record), checksum))
+            checksum = zlib.crc32(record.body, zlib.crc32(record.head, checksum))
             self._take(record)
             for position, opcode, body in container.split(_block(record, self._decompressor)):
-                if opcode == Opcode.MESSAGE:
+                if opcode == _MESSAGE:
                     place = Start(record.offset, position)
                     yield _channel_of(body, self.channels).topic, container.payload_of(body), place
                 else:
@@ -226,7 +235,7 @@ class _Stream:
             fields = Fields(record.body)
             profile, library = fields.text(), fields.text()
             if profile != PROFILE:
-                raise LogError(expected("profile", "", PROFILE, profile, "this is no fireworld log"))
+                raise ForeignError(expected("profile", "", PROFILE, profile, "this is no fireworld log"))
             if library.startswith("fireworld-log/"):  # other tools that rewrite a log put their own name here
                 check_format(library)
         elif record.opcode == Opcode.METADATA:
@@ -238,10 +247,10 @@ class _Stream:
             self.attachments[name] = data
 
     def _register(self, opcode: int, body: memoryview) -> None:
-        if opcode == Opcode.SCHEMA:
+        if opcode == _SCHEMA:
             schema = container.read_schema(body)
             self.schemas[schema.id] = schema
-        elif opcode == Opcode.CHANNEL:
+        elif opcode == _CHANNEL:
             channel = container.read_channel(body)
             if self.channels.setdefault(channel.id, channel) != channel:
                 raise LogError(f"channel {channel.id} changes its topic")

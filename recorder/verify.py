@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-
-import numpy as np
-
-from fireworld.records import Array, CityRecord, Recording, RunHeader, StepRecord
+from fireworld.records import Recording
 from recorder.diff import Difference, compare
 
 
-def verify(log: Recording, replay: Iterable[StepRecord]) -> Difference | None:
-    """Compare every step of a log with its replay, exactly.
+def verify(log: Recording, replay: Recording) -> Difference | None:
+    """Compare a log with its replay: city and every step, exactly.
 
     Args:
         log: the recording.
-        replay: the steps of the same scenario, seed and decisions, run again; taken one by one.
+        replay: the same scenario, seed and decisions, run again while it is walked through, once.
 
     Returns:
         How they differ, the log's values as `a`; None if they do not.
@@ -23,34 +19,5 @@ def verify(log: Recording, replay: Iterable[StepRecord]) -> Difference | None:
     Raises:
         LogError: the log cannot be read.
     """
-    difference = compare(log, _Replay(log, replay))
+    difference = compare(log, replay)
     return None if difference.same else difference
-
-
-class _Replay:
-    """Steps that are computed while they are compared, as a recording."""
-
-    def __init__(self, log: Recording, records: Iterable[StepRecord]) -> None:
-        self._log = log
-        self._records = records
-
-    @property
-    def header(self) -> RunHeader:
-        return self._log.header
-
-    @property
-    def city(self) -> CityRecord:
-        return self._log.city
-
-    @property
-    def steps(self) -> Array:
-        return np.asarray(self._log.steps)
-
-    def __iter__(self) -> Iterator[StepRecord]:
-        return iter(self._records)
-
-    def column(self, topic: str, name: str) -> Array:
-        raise NotImplementedError("a replay is only walked through")
-
-    def ragged(self, topic: str, name: str) -> Sequence[Array]:
-        raise NotImplementedError("a replay is only walked through")

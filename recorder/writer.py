@@ -113,11 +113,11 @@ class StepFile:
             self._writer.finish()  # type: ignore[no-untyped-call]
             self._file.flush()
             os.fsync(self._file.fileno())
-            self._open = False
             self._file.close()
             if not self._force:
                 _refuse_existing(self.path)
             self.partial.replace(self.path)
+            self._open = False
 
     def abort(self) -> None:
         """Stop here; the partial file stays if it holds a step."""
@@ -126,7 +126,7 @@ class StepFile:
         self._open = False
         with contextlib.suppress(OSError):  # a full disk complains again; what it could not hold is lost anyway
             self._file.close()
-        if self.n_commits == 0 or not self._keep_partial:
+        if not self._holds_steps:
             self.partial.unlink(missing_ok=True)
 
     def __enter__(self) -> Self:
@@ -140,6 +140,11 @@ class StepFile:
         else:
             self.abort()
 
+    @property
+    def _holds_steps(self) -> bool:
+        """Whether the partial file is worth keeping."""
+        return self._keep_partial and self.n_commits > 0
+
     def _add(self, topic: str, data: bytes, *, step: int) -> None:
         time = step * _STEP_NANOSECONDS
         self._writer.add_message(self._channel_ids[topic], time, data, time, step)
@@ -152,7 +157,7 @@ class StepFile:
         except OSError as error:
             self.abort()
             reason = "no space is left on the disk" if error.errno == errno.ENOSPC else error.strerror or str(error)
-            kept = f"; {self.n_commits} steps are safe in {self.partial}" if self.partial.exists() else ""
+            kept = f"; {self.n_commits} steps are safe in {self.partial}" if self._holds_steps else ""
             raise OutputError(f"{self.path}: cannot be written: {reason}{kept}") from error
         except BaseException:
             self.abort()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import signal
 import socket
@@ -41,9 +42,10 @@ def save(recordings: Sequence[Recording], path: Path, *, focus: Sequence[int] = 
         raise OutputError(f"{path}: exists already; try --force")
     if not path.parent.is_dir():
         raise OutputError(f"{path}: its folder does not exist")
+    content = _rrd(recordings, focus)
     partial = path.with_name(path.name + ".partial")
     try:
-        _write(recordings, partial, focus)
+        partial.write_bytes(content)
         partial.replace(path)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from None
@@ -118,48 +120,45 @@ def free_port() -> int:
         return port
 
 
-def _write(recordings: Sequence[Recording], path: Path, focus: Sequence[int]) -> None:
-    """Send recordings to a Rerun file and make sure that all of it arrived."""
+def _rrd(recordings: Sequence[Recording], focus: Sequence[int]) -> bytes:
+    """Make the Rerun file of one recording, or of two of the same city, in memory.
+
+    Rerun can write files too, in a thread of its own that tells nobody when the disk is full.
+    """
     rerun = _import_rerun()
     from viewer import blueprint, comparison, legend, mapping
 
-    identity = "-".join(f"{one.header.scenario}-{one.header.policy}-{one.header.seed}" for one in recordings)
-    stream = rerun.RecordingStream(APPLICATION_ID, recording_id=identity, send_properties=False)
-    stream.set_log_time_enabled(False)
-    stream.set_log_tick_enabled(False)
     comparing = len(recordings) > 1
     if comparing:
         comparison.check_same_city(*(one.city for one in recordings))
-    layout = blueprint.pair if comparing else blueprint.single
-    try:
-        path.touch()
-        stream.save(path, default_blueprint=layout(*recordings, focus=bool(focus)))
-        if comparing:
-            first, second = recordings
-            comparison.log_comparison(stream, first, second, focus=focus)
-        else:
-            mapping.log_recording(stream, recordings[0], focus=focus)
-        legend.log_legend(stream, comparing=comparing)
-        stream.send_recording_name(" | ".join(map(blueprint.title, recordings)))
-        stream.flush()
-    except RuntimeError as error:
-        # The stream's writer runs beside us; all it tells is that it stopped, and it stops when the disk refuses.
-        raise OSError(f"{error}; is the disk full?") from None
-    finally:
-        stream.disconnect()
-    _check(rerun, path)
-
-
-def _check(rerun: ModuleType, path: Path) -> None:
-    """Make sure that a Rerun file is complete: its table of contents, written last, can be read."""
-    from rerun.chunk import RrdReader
-
+    stream = rerun.RecordingStream(APPLICATION_ID, recording_id=_identity(recordings), send_properties=False)
+    if not rerun.is_enabled(stream):
+        raise ViewError("view: Rerun is switched off by the environment variable RERUN; try unsetting it")
+    stream.set_log_time_enabled(False)
+    stream.set_log_tick_enabled(False)
+    memory = stream.memory_recording()
     with warnings.catch_warnings():
+        # Rerun warns of data it cannot take and goes on; a view that lacks something is worse than none.
         warnings.simplefilter("error", rerun.error_utils.RerunWarning)
-        try:
-            RrdReader(path).store()
-        except (RuntimeError, ValueError, rerun.error_utils.RerunWarning):
-            raise OSError("the file is not complete; is the disk full?") from None
+        stream.send_blueprint((blueprint.pair if comparing else blueprint.single)(*recordings, focus=bool(focus)))
+        stream.send_recording_name(" | ".join(map(blueprint.title, recordings)))
+        legend.log_legend(stream, comparing=comparing)
+        if comparing:
+            comparison.log_comparison(stream, *recordings, focus=focus)
+        else:
+            mapping.log_recording(stream, *recordings, focus=focus)
+    content: bytes = memory.drain_as_bytes()
+    return content
+
+
+def _identity(recordings: Sequence[Recording]) -> str:
+    """Name what is shown: Rerun merges what has one name, so that different runs must have different ones."""
+    digest = hashlib.sha256()
+    for one in recordings:
+        digest.update(f"{one.header.scenario_digest} {one.header.seed} {one.header.policy_digest}".encode())
+        for numbers in (one.steps, one.column("/buildings", "energy"), one.column("/brigades", "x_m")):
+            digest.update(numbers.tobytes())
+    return digest.hexdigest()[:32]
 
 
 def _run_viewer(recordings: Sequence[Recording], focus: Sequence[int], options: list[str]) -> None:
@@ -203,11 +202,15 @@ def _import_rerun() -> ModuleType:
     Raises:
         ViewError: it is not installed, or is of another minor version.
     """
-    os.environ.setdefault("RUST_LOG", "off")
+    spoken = os.environ.get("RUST_LOG")
+    os.environ["RUST_LOG"] = spoken or "off"  # read once, when Rerun is first imported
     try:
         import rerun
     except ImportError:
         raise ViewError(f"view: Rerun is not installed; {INSTALL_HINT}") from None
+    finally:
+        if spoken is None:
+            del os.environ["RUST_LOG"]
     if not rerun.__version__.startswith(RERUN_MINOR):
         raise ViewError(expected("rerun-sdk", "version", f"{RERUN_MINOR}*", rerun.__version__, INSTALL_HINT))
     module: ModuleType = rerun

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fireworld.records import Recording
 from viewer import colors
@@ -17,7 +18,8 @@ from viewer.plots import COUNTS
 from viewer.stage import TIMELINE
 
 STEPS_PER_SECOND: Final = 8.0
-_MARGIN_M: Final = 40.0
+_MARGIN_M: Final = 45.0
+_FOUGHT_BUILDINGS: Final = 60
 _LEAST_DISTANCE_M: Final = 100.0
 _ELEVATION_DEGREES: Final = 56.0
 _FIELD_OF_VIEW_DEGREES: Final = 55.0
@@ -33,19 +35,19 @@ class Camera:
 
 
 def frame_fire(recordings: Sequence[Recording], *, aspect: float) -> Camera:
-    """Look from the south, from above, at all that ever burned, or at the whole city if nothing did.
+    """Look from the south, from above, at the fire while it can still be fought, or at the whole city without one.
 
     Args:
         recordings: runs in one city.
         aspect: width of the view by its height.
     """
     city = recordings[0].city
-    touched = np.zeros(len(city.building_id), dtype=bool)
-    for recording in recordings:
-        touched |= np.any(recording.column("/buildings", "fieryness") != 0, axis=0)
     low, high = city_box_m(city, margin_m=0.0)
-    if touched.any():
-        x, y = np.asarray(city.center_x_m)[touched], np.asarray(city.center_y_m)[touched]
+    fought = np.zeros(len(city.building_id), dtype=bool)
+    for recording in recordings:
+        fought |= _fought_buildings(recording.column("/buildings", "fieryness"))
+    if fought.any():
+        x, y = np.asarray(city.center_x_m)[fought], np.asarray(city.center_y_m)[fought]
         low = (max(low[0], float(x.min()) - _MARGIN_M), max(low[1], float(y.min()) - _MARGIN_M))
         high = (min(high[0], float(x.max()) + _MARGIN_M), min(high[1], float(y.max()) + _MARGIN_M))
     half_width_m, half_depth_m = (high[0] - low[0]) / 2, (high[1] - low[1]) / 2
@@ -57,6 +59,14 @@ def frame_fire(recordings: Sequence[Recording], *, aspect: float) -> Camera:
     )
     x_m, y_m = (low[0] + high[0]) / 2, (low[1] + high[1]) / 2
     return Camera(eye_m=(x_m, y_m - far_m * south, far_m * up), target_m=(x_m, y_m, 0.0))
+
+
+def _fought_buildings(fieryness: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Buildings that burned, (n,), up to the step at which more than _FOUGHT_BUILDINGS had. (k, n) codes."""
+    touched = np.logical_or.accumulate(fieryness != 0, axis=0)
+    small = np.flatnonzero(touched.sum(axis=1) <= _FOUGHT_BUILDINGS)
+    found: NDArray[np.bool_] = touched[small[-1] if len(small) else 0]
+    return found
 
 
 def single(recording: Recording, *, focus: bool) -> Any:

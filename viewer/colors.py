@@ -6,6 +6,7 @@ extinguished; black is burnt out. All colors are sRGB, 0..255.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -80,9 +81,17 @@ def packed(rgb: Rgb) -> int:
     return red << 24 | green << 16 | blue << 8 | 0xFF
 
 
-def packed_table(colors: tuple[Rgb, ...]) -> UInt32Array:
-    """Pack a table of colors, to be indexed by codes: (len(colors),) uint32."""
+def packed_table(colors: Sequence[Rgb]) -> UInt32Array:
+    """Pack colors: (len(colors),) uint32, to be indexed by codes.
+
+    Rerun is given packed colors only: it guesses at lists, and takes three numbers for one color.
+    """
     return np.array([packed(rgb) for rgb in colors], dtype=np.uint32)
+
+
+def single(rgb: Rgb) -> UInt32Array:
+    """Pack one color for all: (1,) uint32."""
+    return packed_table((rgb,))
 
 
 def shaded_table(colors: tuple[Rgb, ...], shades_percent: tuple[int, ...]) -> UInt32Array:
@@ -94,6 +103,13 @@ def shaded_table(colors: tuple[Rgb, ...], shades_percent: tuple[int, ...]) -> UI
         ],
         dtype=np.uint32,
     )
+
+
+def packed_array(rgb: NDArray[np.uint8]) -> UInt32Array:
+    """Pack an array of colors: (..., 3) to (...)."""
+    parts = rgb.astype(np.uint32)
+    joined = parts[..., 0] << 24 | parts[..., 1] << 16 | parts[..., 2] << 8 | 0xFF
+    return joined.astype(np.uint32)
 
 
 def health_rgb(hp: NDArray[Any], hp_start: NDArray[Any]) -> NDArray[np.uint8]:

@@ -15,12 +15,14 @@ from viewer.stage import Stage, values
 DRIVING: Final = ACTIVITIES.index("driving")
 SPRAYING: Final = ACTIVITIES.index("spraying")
 
-_BRIGADE_RADIUS_M: Final = 3.6
+_BRIGADE_RADIUS_M: Final = 4.0
 _BRIGADE_HEIGHT_M: Final = 6.0
-_GAUGE_HEIGHT_M: Final = 14.0
-_GAUGE_HALF_WIDTH_M: Final = 1.1
-_NAME_RISE_M: Final = 24.0
-_QUEUE_M: Final = 7.0
+_GAUGE_HEIGHT_M: Final = 20.0
+_GAUGE_HALF_WIDTH_M: Final = 1.5
+_NAME_RISE_M: Final = 31.0
+_NAME_STACK_M: Final = 12.0
+_CROWD_M: Final = 22.0
+_QUEUE_M: Final = 8.0
 _JET_POINTS: Final = 9
 
 
@@ -41,10 +43,10 @@ def log_brigades(stage: Stage, recording: Recording, mesh: CityMesh) -> None:
         positions=position.reshape(-1, 3),
         colors=colors.packed_table(colors.ACTIVITY_RGB)[activity].reshape(-1),
     )
-    names = rerun.Points3D.columns(
-        positions=(position + np.array([0, 0, _NAME_RISE_M], dtype=np.float32)).reshape(-1, 3),
-        labels=labels,
-    )
+    rise = _NAME_RISE_M + _NAME_STACK_M * crowding(position[..., 0], position[..., 1], within_m=_CROWD_M)
+    named = position.copy()
+    named[..., 2] += rise
+    names = rerun.Points3D.columns(positions=named.reshape(-1, 3), labels=labels)
     numbers = {
         "tank_litres": tank,
         "sprayed_litres": recording.column("/brigades", "sprayed_litres"),
@@ -53,7 +55,7 @@ def log_brigades(stage: Stage, recording: Recording, mesh: CityMesh) -> None:
     }
     stage.static("team/brigades", rerun.Points3D.from_fields(radii=[_BRIGADE_RADIUS_M]))
     stage.rows("team/brigades", ball.partition(width), values("Brigade", numbers))
-    style = rerun.Points3D.from_fields(radii=[0.1], colors=[colors.LABEL_RGB], show_labels=[True])
+    style = rerun.Points3D.from_fields(radii=[0.1], colors=colors.single(colors.LABEL_RGB), show_labels=[True])
     stage.static("team/names", style)
     stage.rows("team/names", names.partition(width))
 
@@ -64,7 +66,7 @@ def log_brigades(stage: Stage, recording: Recording, mesh: CityMesh) -> None:
         centers=np.stack([position[..., 0], position[..., 1], base + half_height], axis=-1).reshape(-1, 3),
         half_sizes=_gauge_half_sizes(half_height).reshape(-1, 3),
     )
-    style = rerun.Boxes3D.from_fields(colors=[colors.WATER_RGB], fill_mode=rerun.components.FillMode.Solid)
+    style = rerun.Boxes3D.from_fields(colors=colors.single(colors.WATER_RGB), fill_mode=rerun.components.FillMode.Solid)
     stage.static("team/tanks", style)
     stage.rows("team/tanks", gauge.partition(width))
 
@@ -72,9 +74,17 @@ def log_brigades(stage: Stage, recording: Recording, mesh: CityMesh) -> None:
 def brigade_positions_m(recording: Recording) -> NDArray[np.float32]:
     """Where brigades are drawn, (k, n_brigades, 3): where they are, those on one spot side by side, eastward."""
     x, y = recording.column("/brigades", "x_m"), recording.column("/brigades", "y_m")
-    same = (x[:, :, np.newaxis] == x[:, np.newaxis, :]) & (y[:, :, np.newaxis] == y[:, np.newaxis, :])
-    place = np.tril(same, k=-1).sum(axis=2)
+    place = crowding(x, y, within_m=0.0)
     return np.stack([x + _QUEUE_M * place, y, np.full(x.shape, _BRIGADE_HEIGHT_M)], axis=-1).astype(np.float32)
+
+
+def crowding(x: NDArray[Any], y: NDArray[Any], *, within_m: float) -> NDArray[np.int64]:
+    """How many brigades of lower numbers are as near as told, in x and in y: (k, n) and (k, n) to (k, n)."""
+    near = (np.abs(x[:, :, np.newaxis] - x[:, np.newaxis, :]) <= within_m) & (
+        np.abs(y[:, :, np.newaxis] - y[:, np.newaxis, :]) <= within_m
+    )
+    counts: NDArray[np.int64] = np.tril(near, k=-1).sum(axis=2)
+    return counts
 
 
 def log_water(stage: Stage, recording: Recording, mesh: CityMesh) -> None:
@@ -113,9 +123,10 @@ def log_civilians(stage: Stage, recording: Recording, mesh: CityMesh) -> None:
     inside = np.asarray(city.civilian_building)
     height = np.where(inside >= 0, mesh.roof_xyz_m[inside, 2] + 3.0, 2.0)
     position = np.column_stack([city.civilian_x_m, city.civilian_y_m, height])
-    stage.static("civilians", rerun.Points3D(position, radii=[1.9]))
+    stage.static("civilians", rerun.Points3D(position, radii=[2.6]))
     hp = recording.column("/civilians", "hp")
-    look = rerun.Points3D.columns(colors=colors.health_rgb(hp, np.asarray(city.civilian_hp)).reshape(-1, 3))
+    health = colors.packed_array(colors.health_rgb(hp, np.asarray(city.civilian_hp)))
+    look = rerun.Points3D.columns(colors=health.reshape(-1))
     stage.rows("civilians", look.partition(np.full(len(hp), n)), values("Civilian", {"hp": hp}))
 
 
@@ -141,7 +152,7 @@ def log_sites(stage: Stage, recording: Recording) -> None:
         half_sizes=np.column_stack([(east - west) / 2, (north - south) / 2, height]),
         labels=labels,
     )
-    style = rerun.Boxes3D.from_fields(colors=[colors.CLOSED_SIDE_RGB], radii=[0.2], show_labels=[False])
+    style = rerun.Boxes3D.from_fields(colors=colors.single(colors.CLOSED_SIDE_RGB), radii=[0.2], show_labels=[False])
     stage.static("fire/sites", style)
     stage.rows("fire/sites", boxes.partition(count))
 
@@ -163,7 +174,7 @@ def _log_strips(
 
     if len(strips) == 0:
         return
-    stage.static(path, rerun.LineStrips3D.from_fields(radii=[radius_m], colors=[rgb]))
+    stage.static(path, rerun.LineStrips3D.from_fields(radii=[radius_m], colors=colors.single(rgb)))
     stage.rows(path, rerun.LineStrips3D.columns(strips=strips).partition(per_step))
 
 

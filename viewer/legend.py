@@ -19,8 +19,9 @@ HELP: Final = """\
 # How to read this
 
 **Buildings** stand as they are, 3 m a storey. Grey ones are untouched; yellow, orange and dark red ones burn; blue ones
-were watered or put out; black ones are burnt out; green ones are refuges, where tanks are refilled. Click the dot on a
-roof: the panel on the right shows the building's temperature, fuel, water and fieryness at this step.
+were watered or put out; black ones are burnt out; green ones are refuges, where tanks are refilled. Point at the dot on
+a roof, or click it and open the panel on the right (the button at the top right), to read the building's temperature,
+fuel, water and fieryness at this step.
 
 **Brigades** are balls, colored by what they do. The blue bar above a brigade is the water in its tank; the label is
 its number and the litres. A blue arc is water on its way to the target; a thin white one leads to the target that a
@@ -64,11 +65,13 @@ def log_legend(stream: rerun.RecordingStream, *, comparing: bool) -> None:
     rows = entries(comparing=comparing)
     place = [(_COLUMN_WIDTH * x, float(y)) for y, row in enumerate(rows) for x in range(len(row))]
     named = [entry for row in rows for entry in row]
-    dots = rerun.Points2D(place, colors=[rgb for _, rgb in named], radii=rerun.Radius.ui_points(6.0))
+    dots = rerun.Points2D(
+        place, colors=colors.packed_table([rgb for _, rgb in named]), radii=rerun.Radius.ui_points(6.0)
+    )
     # The names hang on points of their own: a name takes the color of its point, and black ones could not be read.
     names = rerun.Points2D(
         place,
-        colors=[colors.LABEL_RGB],
+        colors=colors.single(colors.LABEL_RGB),
         labels=[name for name, _ in named],
         show_labels=True,
         radii=rerun.Radius.ui_points(0.5),

@@ -81,16 +81,18 @@ def log_city(stage: Stage, city: CityRecord) -> None:
     if len(city.street_from):
         node = np.column_stack([city.node_x_m, city.node_y_m, np.zeros(len(city.node_x_m))]).astype(np.float32)
         strips = np.stack([node[city.street_from], node[city.street_to]], axis=1)
-        stage.static("city/streets", rerun.LineStrips3D(strips, colors=[colors.STREET_RGB], radii=[0.8]))
+        stage.static("city/streets", rerun.LineStrips3D(strips, colors=colors.single(colors.STREET_RGB), radii=[0.8]))
     if len(city.refuge_building):
         refuge = np.asarray(city.refuge_building)
         roof = np.column_stack([city.center_x_m, city.center_y_m, np.asarray(city.floors) * 3.0 + 3.0])[refuge]
         labels = [f"refuge {city.building_id[index]}" for index in refuge]
-        marks = rerun.Points3D(roof, colors=[colors.REFUGE_RGB], radii=[3.0], labels=labels, show_labels=True)
+        marks = rerun.Points3D(
+            roof, colors=colors.single(colors.REFUGE_RGB), radii=[3.0], labels=labels, show_labels=True
+        )
         stage.static("city/refuges", marks)
     if len(city.hydrant_x_m):
         position = np.column_stack([city.hydrant_x_m, city.hydrant_y_m, np.full(len(city.hydrant_x_m), 1.0)])
-        stage.static("city/hydrants", rerun.Points3D(position, colors=[colors.HYDRANT_RGB], radii=[1.2]))
+        stage.static("city/hydrants", rerun.Points3D(position, colors=colors.single(colors.HYDRANT_RGB), radii=[1.2]))
 
 
 def log_buildings(stage: Stage, recording: Recording, mesh: CityMesh) -> None:
@@ -112,7 +114,7 @@ def log_handles(stage: Stage, city: CityRecord, mesh: CityMesh) -> None:
     import rerun
 
     handles = mesh.roof_xyz_m + np.array([0, 0, 0.3], dtype=np.float32)
-    points = rerun.Points3D(handles, colors=[colors.HANDLE_RGB], radii=[0.9])
+    points = rerun.Points3D(handles, colors=colors.single(colors.HANDLE_RGB), radii=[0.9])
     facts = rerun.DynamicArchetype(
         "Facts",
         components={

@@ -52,9 +52,7 @@ def log_activities(stage: Stage, recording: Recording) -> None:
     import rerun
 
     activity = recording.column("/brigades", "activity")
-    style = rerun.StateConfiguration(
-        values=list(ACTIVITIES), colors=[colors.packed(rgb) for rgb in colors.ACTIVITY_RGB]
-    )
+    style = rerun.StateConfiguration(values=list(ACTIVITIES), colors=colors.packed_table(colors.ACTIVITY_RGB))
     for brigade in range(activity.shape[1]):
         lane = activity[:, brigade]
         changed = np.flatnonzero(np.concatenate([[True], lane[1:] != lane[:-1]]))
@@ -73,7 +71,7 @@ def log_plot(
     rows, width = numbers.shape
     if width == 0:
         return
-    stage.static(path, rerun.SeriesLines(names=list(names), colors=list(rgb), widths=[2.0] * width))
+    stage.static(path, rerun.SeriesLines(names=list(names), colors=colors.packed_table(rgb), widths=[2.0] * width))
     stage.rows(path, rerun.Scalars.columns(scalars=numbers.reshape(-1)).partition(np.full(rows, width)))
 
 

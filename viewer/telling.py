@@ -75,5 +75,5 @@ def _log_lines(stage: Stage, path: str, lines: Iterator[Line]) -> None:
     if not table:
         return
     steps, levels, texts, rgb = zip(*table, strict=True)
-    columns = rerun.TextLog.columns(text=texts, level=levels, color=[colors.packed(one) for one in rgb])
+    columns = rerun.TextLog.columns(text=texts, level=levels, color=colors.packed_table(rgb))
     stage.rows(path, columns, steps=np.array(steps, dtype=np.int64))

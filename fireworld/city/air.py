@@ -62,7 +62,7 @@ def cover_cells(footprints: Footprints, cell_mm: int, *, where: str = "city") ->
     if not n_covered.all():
         lost = int(footprints.building_id[int(np.argmin(n_covered))])
         wanted = "a footprint that covers a sample point of the air grid"
-        raise CityError(expected(where, f"building {lost}: apexes", wanted, "none", "try a larger footprint"))
+        raise CityError(expected(where, f"building {lost}: apexes", wanted, "one between them", "try a larger one"))
     return AirCells(
         origin_mm=(int(origin[0]), int(origin[1])),
         cell_mm=cell_mm,

@@ -40,7 +40,7 @@ class Fields:
         """Return what a key holds, or its default; REQUIRED has none."""
         found = self.object().get(key, default)
         if found is REQUIRED:
-            self.refuse(key, "this key to be there", "none")
+            self.refuse(key, "this key to be there", "an object without it")
         return found
 
     def text(self, key: str, *, default: Any = REQUIRED) -> str:
@@ -76,7 +76,7 @@ class Fields:
         """Read an array, not empty, of pairs of whole numbers."""
         found = self.array(key)
         if not found:
-            self.refuse(key, "at least one pair", "none")
+            self.refuse(key, "at least one pair", "an empty array")
         result = []
         for index, item in enumerate(found):
             if not isinstance(item, list) or len(item) != 2:
@@ -94,5 +94,5 @@ class Fields:
 
 def _kind(value: Any) -> str:
     """Name the kind of a JSON value."""
-    names = {dict: "an object", list: "an array", str: "a text", bool: "true or false", type(None): "null"}
+    names = {dict: "an object", list: "an array", str: "a text", bool: "true or false", type(None): "no value (null)"}
     return names.get(type(value), "a number")

@@ -24,7 +24,7 @@ WIDTH, DEPTH, OFFSET_X, OFFSET_Y, FLOORS, MATERIAL, SHAPE, NOTCH_WIDTH, NOTCH_DE
 
 FLOORS_OF_DRAW: Final = (1, 1, 2, 3)
 WOOD_PERCENT: Final = 75
-STEEL_PERCENT: Final = 5
+STEEL_PERCENT: Final = 20
 L_SHAPE_ONE_IN: Final = 2
 """One building in so many is L-shaped, if what the notch leaves still fills the lot enough."""
 SPAN_MAX_MM: Final = 10_000_000
@@ -63,7 +63,7 @@ def generate_plan(
     """Make a city of columns * rows lots.
 
     Buildings have identifiers from 0 in row order, south-west first. Footprints are rectangles or L-shapes; floors
-    1, 2, 3 come 2:1:1 and wood, steel, concrete 75:5:20, as in the official maps.
+    1, 2, 3 come 2:1:1 and wood, steel, concrete 75:20:5, as in the official maps.
 
     Args:
         columns: lots from west to east.

@@ -71,7 +71,7 @@ def parse_plan(text: bytes, *, where: str, name: str = "city") -> Plan:
     document.allow_only(*READ_KEYS, *IGNORED_KEYS)
     items = document.array("buildings")
     if not items:
-        document.refuse("buildings", "at least one building", "none")
+        document.refuse("buildings", "at least one building", "an empty array")
     buildings: list[Building] = []
     taken: set[int] = set()
     for index, item in enumerate(items):

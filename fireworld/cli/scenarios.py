@@ -60,29 +60,17 @@ def _draw(scenario: Scenario, path: Path, *, force: bool) -> None:
     """Draw the map of a scenario at its start."""
     import numpy as np
 
-    from fireworld.city.build import build_city
-    from fireworld.city.record import city_record
-    from fireworld.placement import place, scenario_plan
+    from fireworld.world.stage import build_stage
     from viewer.maps import draw_map, save_figure
 
-    plan = scenario_plan(scenario)
-    setup = place(scenario, plan)
-    parameters = scenario.parameters
-    city = build_city(plan, parameters.fire, seed=scenario.city.ray_seed)
-    record = city_record(
-        city,
-        civilian_mm=setup.civilian_mm,
-        civilian_building=setup.civilian_building,
-        civilian_hp=np.full(len(setup.civilian_building), parameters.health.initial_hp),
-        n_brigades=len(setup.brigade_refuge),
-        brigades=parameters.brigades,
-    )
-    fieryness = np.zeros(city.n_buildings, dtype=np.uint8)
-    fieryness[setup.ignited] = 1
-    brigades_xy = city.streets.access_mm[setup.brigade_refuge] / 1000.0
+    stage = build_stage(scenario)
+    fieryness = np.zeros(stage.city.n_buildings, dtype=np.uint8)
+    fieryness[stage.setup.ignited] = 1
+    brigades_xy = stage.city.streets.access_mm[stage.setup.brigade_refuge] / 1000.0
     title = ": ".join(part for part in (scenario.name, scenario.description) if part)
-    save_figure(draw_map(record, fieryness=fieryness, brigades_xy=brigades_xy, title=title), path, force=force)
-    click.echo(f"{path}: {city.n_buildings} buildings, {len(setup.ignited)} burning")
+    figure = draw_map(stage.city_record(), fieryness=fieryness, brigades_xy=brigades_xy, title=title)
+    save_figure(figure, path, force=force)
+    click.echo(f"{path}: {stage.city.n_buildings} buildings, {len(stage.setup.ignited)} burning")
 
 
 def _summary(scenario: Scenario) -> dict[str, Any]:

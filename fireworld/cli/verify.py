@@ -21,12 +21,12 @@ def command(context: click.Context, *, log: Path, as_json: bool) -> None:
     import json
 
     from fireworld.cli.diff import show, write_json
-    from fireworld.replay import replay
+    from fireworld.replay import Replay
     from recorder.reader import open_log
     from recorder.verify import verify
 
     recording = open_log(log)
-    difference = verify(recording, replay(recording.header, recording.city, recording))
+    difference = verify(recording, Replay(recording))
     if difference is not None:
         if as_json:
             write_json(difference, digests=[recording.digest])

@@ -9,12 +9,15 @@ import numpy as np
 from numba import float32, njit
 
 from fireworld.draws import BURN_RATE
-from fireworld.kernels.arrays import BuildingTables, CoverTables, FireConstants, FireState, LinkTables
+from fireworld.kernels.arrays import Array, BuildingTables, CoverTables, FireConstants, FireState, LinkTables
 from fireworld.kernels.draws import normal
 
 AMBIENT_KELVIN = 293.0
 STEFAN_BOLTZMANN = 5.6704e-8
 LEAST_SHARE = np.float32(0.005)
+ONE, TWO, THREE, FOUR = np.uint32(1), np.uint32(2), np.uint32(3), np.uint32(4)
+PADDING = 5
+"""Cells of a row of air that are no cells of the city: one before, four behind them."""
 
 
 @njit(cache=True, nogil=True)
@@ -109,45 +112,72 @@ def cool(buildings: BuildingTables, fire: FireState, constants: FireConstants) -
 
 
 @njit(cache=True, nogil=True)
+def mix_row(before: Array, row: Array, after: Array, here: Array, sums: Array, constants: FireConstants) -> None:
+    """Mix one row of air cells with the rows beside it, in place; all (pitch,) float64.
+
+    Whole rows and no bounds but their length: that is what the compiler turns into vector instructions.
+
+    Args:
+        before: the row before, as it was.
+        row: the row; changed.
+        after: the row after.
+        here: receives the row as it was.
+        sums: scratch.
+        constants: of the fire model.
+    """
+    flow, kept, flush = constants.air_to_air_flow, constants.air_heat_kept, constants.flush_temperature
+    for y in range(len(row)):
+        here[y] = row[y]
+        sums[y] = before[y] + row[y] + after[y]
+    for y in range(len(row) - PADDING):
+        old = here[y + 1]
+        mean = (sums[y] + sums[y + 1] + sums[y + 2] - old) * 0.125
+        warmth = (old + (mean - old) * flow) * kept
+        row[y + 1] = warmth if warmth > flush else 0.0
+
+
+@njit(cache=True, nogil=True)
 def spread_air(fire: FireState, constants: FireConstants) -> None:
     """Mix every air cell with its eight neighbours and lose some heat; MODEL 2.5. Only rows in reach are touched.
 
-    Works in place: two rows of `scratch` keep the row before and the row itself as they were, the third the sums of
-    three cells across the rows.
+    Works in place: two rows of `scratch` keep the row before and the row itself as they were.
     """
-    air, reach, scratch = fire.air, fire.reach, fire.scratch
+    air, reach = fire.air, fire.reach
+    before, here, sums = fire.scratch[0], fire.scratch[1], fire.scratch[2]
     rows, pitch = air.shape
-    flow, kept, flush = constants.air_to_air_flow, constants.air_heat_kept, constants.flush_temperature
-    before, here = 0, 1
     for y in range(pitch):
-        scratch[0, y] = 0.0
+        before[y] = 0.0
     before_first, before_end = 0, 0  # reach of the row before, as it was
     for x in range(1, rows - 1):
         first, end = before_first, before_end
         before_first, before_end = reach[x, 0], reach[x, 1]
-        for row in range(x, x + 2):
-            if reach[row, 1] > reach[row, 0]:
-                first = min(first, reach[row, 0]) if end > first else reach[row, 0]
-                end = max(end, reach[row, 1])
-        for y in range(pitch):
-            scratch[here, y] = air[x, y]
+        for k in range(x, x + 2):
+            if reach[k, 1] > reach[k, 0]:
+                first = min(first, reach[k, 0]) if end > first else reach[k, 0]
+                end = max(end, reach[k, 1])
+        row = air[x]
         if end <= first:
-            before, here = here, before
-            continue
-        low, high = max(1, first - 1), min(pitch - 4, end + 1)
-        for y in range(low - 1, high + 1):
-            scratch[2, y] = scratch[before, y] + scratch[here, y] + air[x + 1, y]
-        for y in range(low, high):
-            old = scratch[here, y]
-            mean = (scratch[2, y - 1] + scratch[2, y] + scratch[2, y + 1] - old) * 0.125
-            fresh = (old + (mean - old) * flow) * kept
-            air[x, y] = fresh if fresh > flush else 0.0
+            for y in range(pitch):
+                here[y] = 0.0
+        else:
+            mix_row(before, row, air[x + 1], here, sums, constants)
+            low, high = max(1, first - 1), min(pitch - PADDING + 1, end + 1)
+            while low < high and row[low] == 0.0:
+                low += 1
+            while high > low and row[high - 1] == 0.0:
+                high -= 1
+            reach[x, 0], reach[x, 1] = low, high
         before, here = here, before
-        while low < high and air[x, low] == 0.0:
-            low += 1
-        while high > low and air[x, high - 1] == 0.0:
-            high -= 1
-        reach[x, 0], reach[x, 1] = low, high
+
+
+@njit(cache=True, nogil=True)
+def extend_reach(reach: Array, x0: int, x1: int, y0: int, y1: int) -> None:
+    """Note that cells y0..y1 of the rows x0..x1 of air may be warm now."""
+    for x in range(x0, x1):
+        if reach[x, 1] <= reach[x, 0]:
+            reach[x, 0], reach[x, 1] = y0, y1
+        elif reach[x, 0] > y0 or reach[x, 1] < y1:
+            reach[x, 0], reach[x, 1] = min(reach[x, 0], y0), max(reach[x, 1], y1)
 
 
 @njit(cache=True, nogil=True)
@@ -157,46 +187,45 @@ def exchange_with_air(
     """Let each building in turn exchange heat with the air cells under it; MODEL 2.6.
 
     q = (T_cell - T_building) * weight; the cell loses q * cell_share, the building gains the sum. A building without
-    heat over cells without heat is passed over: nothing would change.
+    heat over cells without heat is passed over: nothing would change. Four cells go at once, with a sum each, because
+    one sum would make every cell wait for the one before; unsigned indices spare numba's test for negative ones.
     """
-    air, reach = fire.air, fire.reach
+    energy, air, reach, weight = fire.energy, fire.air, fire.reach, cover.weight
     share = constants.cell_share
     for k in range(len(buildings.order)):
         b = buildings.order[k]
         x0, y0 = cover.x0[b], cover.y0[b]
         x1, y1 = x0 + cover.rows[b], y0 + cover.width[b]
-        if fire.energy[b] == 0.0:
+        if energy[b] == 0.0:
             warm = False
             for x in range(x0, x1):
                 if reach[x, 0] < y1 and reach[x, 1] > y0:
                     warm = True
             if not warm:
                 continue
-        temperature = fire.energy[b] / buildings.capacity[b]
+        extend_reach(reach, x0, x1, y0, y1)
+        temperature = energy[b] / buildings.capacity[b]
         p = cover.ptr[b]
         gain_0 = gain_1 = gain_2 = gain_3 = 0.0
         for x in range(x0, x1):
-            if reach[x, 1] <= reach[x, 0]:
-                reach[x, 0], reach[x, 1] = y0, y1
-            else:
-                reach[x, 0], reach[x, 1] = min(reach[x, 0], y0), max(reach[x, 1], y1)
-            cells = air[x]
-            for y in range(y0, y1, 4):
-                cell_0, cell_1, cell_2, cell_3 = cells[y], cells[y + 1], cells[y + 2], cells[y + 3]
-                q_0 = (cell_0 - temperature) * cover.weight[p]
-                q_1 = (cell_1 - temperature) * cover.weight[p + 1]
-                q_2 = (cell_2 - temperature) * cover.weight[p + 2]
-                q_3 = (cell_3 - temperature) * cover.weight[p + 3]
-                cells[y] = cell_0 - q_0 * share
-                cells[y + 1] = cell_1 - q_1 * share
-                cells[y + 2] = cell_2 - q_2 * share
-                cells[y + 3] = cell_3 - q_3 * share
+            y = y0
+            while y < y1:
+                cell_0, cell_1, cell_2, cell_3 = air[x, y], air[x, y + ONE], air[x, y + TWO], air[x, y + THREE]
+                q_0 = (cell_0 - temperature) * weight[p]
+                q_1 = (cell_1 - temperature) * weight[p + ONE]
+                q_2 = (cell_2 - temperature) * weight[p + TWO]
+                q_3 = (cell_3 - temperature) * weight[p + THREE]
+                air[x, y] = cell_0 - q_0 * share
+                air[x, y + ONE] = cell_1 - q_1 * share
+                air[x, y + TWO] = cell_2 - q_2 * share
+                air[x, y + THREE] = cell_3 - q_3 * share
                 gain_0 += q_0
                 gain_1 += q_1
                 gain_2 += q_2
                 gain_3 += q_3
-                p += 4
-        fire.energy[b] += (gain_0 + gain_1) + (gain_2 + gain_3)
+                p += FOUR
+                y += FOUR
+        energy[b] += (gain_0 + gain_1) + (gain_2 + gain_3)
 
 
 @njit(cache=True, nogil=True)
@@ -205,18 +234,18 @@ def radiate(buildings: BuildingTables, links: LinkTables, fire: FireState) -> No
 
     emitted = min(E, (T + 293)^4 * emission), for all buildings before any receives.
     """
-    n = len(fire.energy)
-    for b in range(n):
-        energy = fire.energy[b]
-        kelvin = energy / buildings.capacity[b] + AMBIENT_KELVIN
+    energy, emitted = fire.energy, fire.emitted
+    for b in range(len(energy)):
+        heat = energy[b]
+        kelvin = heat / buildings.capacity[b] + AMBIENT_KELVIN
         square = kelvin * kelvin
-        fire.emitted[b] = min(energy, square * square * buildings.emission[b])
-    for b in range(n):
-        emitted = fire.emitted[b]
-        if emitted != 0.0:
+        emitted[b] = min(heat, square * square * buildings.emission[b])
+    for b in range(len(energy)):
+        sent = emitted[b]
+        if sent != 0.0:
             for k in range(links.ptr[b], links.ptr[b + 1]):
-                fire.energy[links.building[k]] += emitted * links.share[k]
-            fire.energy[b] -= emitted
+                energy[links.building[k]] += sent * links.share[k]
+            energy[b] -= sent
 
 
 @njit(cache=True, nogil=True)

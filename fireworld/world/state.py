@@ -50,7 +50,7 @@ def fresh_civilians(buildings: Array, positions_mm: Array, hp: int) -> CivilianS
     c = len(buildings)
     positions = np.asarray(positions_mm, dtype=np.float64).reshape(c, 2)
     return CivilianState(
-        building=np.asarray(buildings, dtype=np.int32),
+        building=np.array(buildings, dtype=np.int32),
         x=positions[:, 0].copy(),
         y=positions[:, 1].copy(),
         full_hp=np.full(c, hp, dtype=np.int32),

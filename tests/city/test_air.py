@@ -49,7 +49,7 @@ def test_near_walls_count_and_far_walls_do_not():
 
 
 @pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize("cell_mm", [5000, 3333, 701])
+@pytest.mark.parametrize("cell_mm", [5000, 3333, 1701])
 def test_cover_is_the_count_of_samples_inside(seed, cell_mm):
     draw = np.random.default_rng(seed)
     outlines = []

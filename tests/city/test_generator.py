@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -17,7 +19,7 @@ PAPER = generate_plan(columns=24, rows=26, seed=1)
 def outlines(plan):
     ptr = plan.footprints.outline_ptr
     corners = [tuple(corner) for corner in plan.footprints.outline_mm.tolist()]
-    return [corners[begin:end] for begin, end in zip(ptr[:-1], ptr[1:], strict=True)]
+    return [corners[begin:end] for begin, end in pairwise(ptr)]
 
 
 def test_the_city_of_the_paper():

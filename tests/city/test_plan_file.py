@@ -54,6 +54,15 @@ def changed(path, value):
     return document
 
 
+def complaint(text):
+    """Return why a file is refused, "" if it is read."""
+    try:
+        parse_plan(text, where="city.json")
+    except CityError as error:
+        return str(error)
+    return ""
+
+
 DELETE = object()
 
 
@@ -118,11 +127,11 @@ def test_a_plan_with_footpaths_survives_too():
 
 B0 = ("buildings", 0)
 REFUSALS = [
-    (("buildings",), DELETE, "buildings: expected this key to be there, got 'none'"),
-    (("buildings",), [], "buildings: expected at least one building, got 'none'"),
+    (("buildings",), DELETE, "buildings: expected this key to be there, got an object without it"),
+    (("buildings",), [], "buildings: expected at least one building, got an empty array"),
     (("buildings",), {}, "buildings: expected an array, got an object"),
     (("buildings", 1), 5, "buildings.1: expected an object, got a number"),
-    ((*B0, "id"), DELETE, "buildings.0.id: expected this key to be there, got 'none'"),
+    ((*B0, "id"), DELETE, "buildings.0.id: expected this key to be there, got an object without it"),
     ((*B0, "id"), "7", "buildings.0.id: expected a whole number from 0 to 2147483647, got '7'"),
     ((*B0, "id"), -1, "buildings.0.id: expected a whole number from 0 to 2147483647, got -1"),
     ((*B0, "id"), 2**31, "buildings.0.id: expected a whole number from 0 to 2147483647, got 2147483648"),
@@ -145,7 +154,11 @@ REFUSALS = [
     ((*B0, "apexes"), [0, 0, 9000, 0, 0, 0, 9000, 0], "building 7: apexes: expected at least 3 distinct corners"),
     ((*B0, "apexes"), [], "building 7: apexes: expected at least 3 distinct corners, got 0 of them"),
     ((*B0, "apexes"), [0, 0, 9000, 0, 18000, 0], "building 7: apexes: expected an area of at least 1 m2, got 0.0000"),
-    ((*B0, "apexes"), [0, 0, 999, 0, 999, 999, 0, 999], "building 7: apexes: expected an area of at least 1 m2, got 0.998"),
+    (
+        (*B0, "apexes"),
+        [0, 0, 999, 0, 999, 999, 0, 999],
+        "building 7: apexes: expected an area of at least 1 m2, got 0.998",
+    ),
     ((*B0, "apexes"), [0, 0, 9000, 0, 9000, 0.5], "building 7: apexes.5: expected a whole number"),
     ((*B0, "apexes"), [0, 0, 2**31, 0, 9000, 5], "building 7: apexes.2: expected a whole number"),
     (
@@ -160,12 +173,14 @@ REFUSALS = [
     ),
     (("name",), "", "name: expected a text of 1 to 100 printable characters, got ''"),
     (("name",), "two\nlines", "name: expected a text of 1 to 100 printable characters, got 'two\\nlines'"),
+    (("name",), "two \n lines", "name: expected a text of 1 to 100 printable characters, got two \\n lines"),
+    (("wah\nter",), [], "wah\\nter: expected one of the keys name,"),
     (("wahter",), [], "wahter: expected one of the keys name, buildings, streets, hydrants,"),
-    (("streets",), None, "streets: expected an object, got null"),
-    (("streets", "nodes"), [], "streets.nodes: expected at least one pair, got 'none'"),
+    (("streets",), None, "streets: expected an object, got no value (null)"),
+    (("streets", "nodes"), [], "streets.nodes: expected at least one pair, got an empty array"),
     (("streets", "nodes"), [[0, 0], [1]], "streets.nodes.1: expected a pair of whole numbers, got [1]"),
     (("streets", "nodes"), [[0, 0], [1, 0.5]], "streets.nodes.1.1: expected a whole number"),
-    (("streets", "edges"), [], "streets.edges: expected at least one pair, got 'none'"),
+    (("streets", "edges"), [], "streets.edges: expected at least one pair, got an empty array"),
     (("streets", "edges"), [[0, 2]], "streets.edges.0.1: expected a whole number from 0 to 1, got 2"),
     (("streets", "edges"), [[1, 1]], "streets.edges.0: expected two different nodes, got [1, 1]"),
     (("streets", "edegs"), [], "streets.edegs: expected one of the keys nodes, edges"),
@@ -229,20 +244,13 @@ JUNK = st.recursive(
 @settings(deadline=None, max_examples=150)
 @given(path=st.sampled_from([path for path in places(CITY) if path]), value=JUNK | st.just(DELETE))
 def test_a_city_is_read_or_refused_but_never_fails(path, value):
-    try:
-        plan = parse(changed(path, value))
-    except CityError as error:
-        assert str(error).startswith("city.json: ")
-        assert "\n" not in str(error)
-    else:
-        assert len(plan.footprints.building_id) >= 1
+    message = complaint(json.dumps(changed(path, value)).encode())
+    assert message.startswith("city.json: ") or not message
+    assert message.isprintable()
 
 
 @settings(deadline=None, max_examples=100)
 @given(st.binary(max_size=40), st.integers(0, len(json.dumps(CITY))))
 def test_no_bytes_make_it_fail(noise, place):
     text = json.dumps(CITY).encode()
-    try:
-        parse_plan(text[:place] + noise + text[place + len(noise) :], where="city.json")
-    except CityError as error:
-        assert "\n" not in str(error)
+    assert complaint(text[:place] + noise + text[place + len(noise) :]).isprintable()

@@ -75,7 +75,9 @@ def test_the_grid_misses_no_wall(seed):
         base, reach = draw.integers(0, size, 2), int(draw.choice([900, 12_000, size // 2]))
         triangle = base + draw.integers(-reach, reach + 1, (3, 2))
         outlines.append([(int(x), int(y)) for x, y in triangle])
-    outlines = [o for o in outlines if (o[1][0] - o[0][0]) * (o[2][1] - o[0][1]) != (o[2][0] - o[0][0]) * (o[1][1] - o[0][1])]
+    outlines = [
+        o for o in outlines if (o[1][0] - o[0][0]) * (o[2][1] - o[0][1]) != (o[2][0] - o[0][0]) * (o[1][1] - o[0][1])
+    ]
     plan = footprints(*outlines)
     walls = walls_of(plan)
     source = draw.integers(0, len(walls.building), 300)

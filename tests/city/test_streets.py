@@ -81,7 +81,10 @@ def test_access_points_by_hand():
 @pytest.mark.parametrize("seed", range(3))
 def test_access_points_against_every_street(seed):
     draw = np.random.default_rng(seed)
-    nodes, pairs = draw.integers(0, 200_000, (30, 2)), [(k, (7 * k + 1) % 30) for k in range(30) if (7 * k + 1) % 30 != k]
+    nodes, pairs = (
+        draw.integers(0, 200_000, (30, 2)),
+        [(k, (7 * k + 1) % 30) for k in range(30) if (7 * k + 1) % 30 != k],
+    )
     centroids = draw.integers(-20_000, 220_000, (200, 2)).astype(np.int32)
     streets = streets_of(street_map(nodes.tolist(), pairs), centroids)
     start, span = nodes[[a for a, _ in pairs]], nodes[[b for _, b in pairs]] - nodes[[a for a, _ in pairs]]

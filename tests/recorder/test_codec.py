@@ -1,5 +1,6 @@
 """The codec against itself, against the protobuf library, and against bytes that are no message."""
 
+import contextlib
 import dataclasses
 
 import numpy as np
@@ -38,11 +39,12 @@ def records_of(record_type):
     return st.builds(record_type, **fields)
 
 
+def same_value(a, b):
+    return np.array_equal(a, b, equal_nan=not isinstance(a, str | bytes))
+
+
 def same(a, b):
-    return all(
-        np.array_equal(x, y, equal_nan=not isinstance(x, str | bytes))
-        for x, y in zip(vars(a).values(), vars(b).values(), strict=True)
-    )
+    return all(same_value(x, y) for x, y in zip(vars(a).values(), vars(b).values(), strict=True))
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +76,7 @@ def test_bytes_are_those_of_the_protobuf_library(protobuf_types, record):
         if item.repeated:
             assert np.array_equal(np.array(value, DTYPES[item.wire]), ours, equal_nan=True)
         else:
-            assert value == ours or value != value
+            assert same_value(value, ours)
     assert theirs.SerializeToString(deterministic=True) == data
     assert same(codec.decode(type(record), theirs.SerializeToString(deterministic=True)), record)
 
@@ -139,10 +141,8 @@ def test_malformed_messages_are_refused(data, words):
 @settings(max_examples=400, deadline=None)
 @given(data=st.binary(max_size=60), topic=st.sampled_from(TOPICS))
 def test_any_bytes_decode_or_are_refused(data, topic):
-    try:
+    with contextlib.suppress(LogError):
         codec.decode_snapshot(data) if topic is schema.Snapshot else codec.decode(topic, data)
-    except LogError:
-        pass
 
 
 @pytest.mark.parametrize(

@@ -107,10 +107,11 @@ def test_a_jet_runs_from_each_spraying_brigade_to_its_target(small, saved):
     jets = rrd.at_every_step(saved["/team/water"]["LineStrips3D:strips"], small.steps.tolist())
     n_jets = 0
     for record, strips in zip(small, jets, strict=True):
-        sprays = np.flatnonzero(record.brigades.sprayed_litres > 0)
+        aims = record.decisions.target if record.step else np.full(3, -1)
+        sprays = np.flatnonzero((record.brigades.sprayed_litres > 0) & (aims >= 0))
         assert len(strips) == len(sprays)
         for strip, brigade in zip(strips, sprays.tolist(), strict=True):
-            target = record.decisions.target[brigade]
+            target = aims[brigade]
             assert strip[0][0] == pytest.approx(record.brigades.x_m[brigade])
             assert strip[-1][0] == pytest.approx(small.city.center_x_m[target])
             assert strip[-1][1] == pytest.approx(small.city.center_y_m[target])
@@ -138,8 +139,8 @@ def test_sites_and_their_free_sides(small, saved):
         assert len(strips) == 2 * len(observed.site_id)  # N and S are free in the made-up run
         for site in range(len(observed.site_id)):
             assert box[site][0] == pytest.approx((observed.site_west_m[site] + observed.site_east_m[site]) / 2)
-            assert {point[1] for point in strips[0]} == {pytest.approx(observed.site_north_m[site])}
-            assert {point[1] for point in strips[1]} == {pytest.approx(observed.site_south_m[site])}
+            assert [point[1] for point in strips[0]] == pytest.approx([observed.site_north_m[site]] * 2)
+            assert [point[1] for point in strips[1]] == pytest.approx([observed.site_south_m[site]] * 2)
 
 
 def test_lanes_change_where_activities_change(small, saved):
@@ -166,6 +167,12 @@ def test_the_log_tells_events_and_new_choices(small, saved):
     assert len(choices) < 3 * len(small.steps)
 
 
+def test_the_page_on_the_viewer_names_every_path(saved):
+    page = (Path(__file__).parents[2] / "docs" / "viewer.md").read_text(encoding="utf-8")
+    for path in set(saved) - {"/", "/__properties", "/activity/brigade_1", "/activity/brigade_2"}:
+        assert f"`{path}`" in page, path
+
+
 def test_no_entity_stands_for_a_single_building(saved):
     assert len(saved) < 35
 
@@ -176,7 +183,7 @@ def test_brigades_on_one_spot_are_drawn_side_by_side():
         record.brigades.x_m[:] = [5.0, 5.0, 5.0]
         record.brigades.x_m[1] = 6.0
     xyz = crews.brigade_positions_m(recording)
-    assert xyz[0, :, 0].tolist() == [5.0, 6.0, 12.0]
+    assert xyz[0, :, 0].tolist() == [5.0, 6.0, 13.0]
 
 
 def test_a_city_without_people_or_fire_sites_can_be_shown(tmp_path: Path):

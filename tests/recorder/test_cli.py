@@ -1,0 +1,159 @@
+"""The commands info, diff, recover and verify: what they say, and their exit codes."""
+
+import json
+import sys
+import types
+
+import pytest
+
+from fireworld.records import MemoryRecording
+from recorder.schema import PROTO
+from tests.recorder import synthetic
+from tests.recorder.conftest import write_log
+from tests.recorder.test_diff import altered
+
+
+@pytest.fixture
+def cut_log(tmp_path, log_path):
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(log_path.read_bytes()[:30_000])
+    return path
+
+
+@pytest.fixture
+def other_log(tmp_path, records):
+    other = altered(records, 21, "decisions", action=(1, 3), q_values=(7, 5.0))
+    return write_log(tmp_path / "other.mcap", other, header=synthetic.header(policy="random"))
+
+
+def test_info_of_a_complete_log(run_cli, log_path):
+    code, out, _ = run_cli("info", log_path)
+    assert code == 0
+    for words in (
+        "complete",
+        "synthetic",
+        "seed 7",
+        "easiest",
+        "31, from 0 to 30",
+        "10, 20, 30",
+        "/buildings",
+        "4.5 of 5",
+    ):
+        assert words in out
+    code, out, _ = run_cli("info", log_path, "--json")
+    facts = json.loads(out)
+    assert code == 0
+    assert facts["state"] == "complete"
+    assert facts["header"]["seed"] == "7"
+    assert facts["topics"]["/commit"]["n_messages"] == 31
+    assert facts["totals"]["n_burnt_out"] == 3
+    assert run_cli("info", log_path, "--schema") == (0, PROTO.read_text(encoding="utf-8"), "")
+
+
+def test_info_of_a_cut_off_damaged_and_unreadable_log(run_cli, cut_log, log_path, tmp_path):
+    code, out, _ = run_cli("info", cut_log)
+    assert code == 1
+    assert "partial: the file ends inside a record; good up to step " in out
+    data = bytearray(log_path.read_bytes())
+    data[30_000] ^= 4
+    (tmp_path / "flipped.mcap").write_bytes(data)
+    code, out, _ = run_cli("info", tmp_path / "flipped.mcap", "--json")
+    assert code == 1
+    assert json.loads(out)["state"] == "damaged"
+    (tmp_path / "other.txt").write_text("hello world")
+    code, out, err = run_cli("info", tmp_path / "other.txt")
+    assert (code, out) == (2, "")
+    assert "expected an MCAP recording" in err
+
+
+def test_info_of_a_log_without_steps(run_cli, tmp_path):
+    path = write_log(tmp_path / "a.mcap", [])
+    code, out, _ = run_cli("info", path)
+    assert code == 0
+    assert "none, of at most 500; no step" in out
+    assert run_cli("info", path, "--json")[0] == 0
+
+
+def test_diff_of_the_same_run(run_cli, log_path):
+    code, out, _ = run_cli("diff", log_path, log_path)
+    assert code == 0
+    assert "the same: 31 steps" in out
+    code, out, _ = run_cli("diff", log_path, log_path, "--json")
+    assert code == 0
+    assert json.loads(out)["same"] is True
+
+
+def test_diff_of_two_runs(run_cli, log_path, other_log):
+    code, out, _ = run_cli("diff", log_path, other_log)
+    assert code == 1
+    assert "step 21, choose: brigade 1 chose nearest-to-me, was nearest-to-civilian; Q of nearest-to-me" in out
+    assert "policy: easiest / random" in out
+    assert "burnt out" in out
+    assert "/decisions" in out
+    code, out, _ = run_cli("diff", log_path, other_log, "--json")
+    facts = json.loads(out)
+    assert code == 1
+    assert facts["first"]["step"] == 21
+    assert facts["n_steps_differing"] == {"/decisions": 1}
+    code, _, _ = run_cli("diff", log_path, other_log, "--tolerance", "action=2", "--tolerance", "decisions.q_values=9")
+    assert code == 0
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "words"),
+    [("buildings.temp=1", "try buildings.temperature"), ("hp", "FIELD=X"), ("hp=-1", "X >= 0"), ("hp=nan", "X >= 0")],
+)
+def test_diff_refuses_bad_tolerances(run_cli, log_path, tolerance, words):
+    code, _, err = run_cli("diff", log_path, log_path, "--tolerance", tolerance)
+    assert code == 2
+    assert words in " ".join(err.split())
+
+
+def test_diff_that_cannot_compare(run_cli, log_path, cut_log, tmp_path):
+    code, _, err = run_cli("diff", log_path, cut_log)
+    assert code == 2
+    assert "good up to step" in err
+    assert "fireworld recover" in err
+    code, _, err = run_cli("diff", log_path, tmp_path / "missing.mcap")
+    assert code == 2
+    assert "No such file" in err
+    assert run_cli("diff", log_path)[0] == 2
+
+
+def test_recover(run_cli, cut_log, tmp_path):
+    output = tmp_path / "good.mcap"
+    code, out, _ = run_cli("recover", cut_log, "-o", output)
+    assert code == 0
+    assert "good up to step" in out
+    assert run_cli("info", output)[0] == 0
+    code, _, err = run_cli("recover", cut_log, "-o", output)
+    assert code == 2
+    assert "--force" in err
+    assert run_cli("recover", cut_log, "-o", output, "--force")[0] == 0
+    code, _, err = run_cli("recover", tmp_path / "missing.mcap", "-o", tmp_path / "x.mcap")
+    assert code == 2
+    assert run_cli("recover", cut_log)[0] == 2
+
+
+def test_verify(run_cli, log_path, cut_log, records, city, monkeypatch):
+    replays = iter([records, records, altered(records, 4, "civilians", hp=(0, 1)), records[:5]])
+
+    def replay(recording):
+        assert recording.header == synthetic.header()
+        return MemoryRecording(recording.header, city, next(replays))
+
+    module = types.ModuleType("fireworld.replay")
+    module.Replay = replay
+    monkeypatch.setitem(sys.modules, "fireworld.replay", module)
+    code, out, _ = run_cli("verify", log_path)
+    assert code == 0
+    assert "31 steps" in out
+    code, out, _ = run_cli("verify", log_path, "--json")
+    assert (code, json.loads(out)["same"]) == (0, True)
+    code, out, _ = run_cli("verify", log_path)
+    assert code == 1
+    assert "step 4, health: civilian 0: hp is 1, was 996" in out
+    code, out, _ = run_cli("verify", log_path, "--json")
+    assert code == 1
+    assert json.loads(out)["first"]["phase"] == "length"
+    assert run_cli("verify", cut_log)[0] == 2

@@ -1,0 +1,186 @@
+"""Ways to look: files are whole or absent, servers are local, and every failure is one sentence."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import urllib.request
+from pathlib import Path
+
+import pytest
+import rerun
+
+from fireworld.errors import OutputError, ViewError
+from tests.viewer import rrd
+from tests.viewer.conftest import make_recording
+from viewer import app
+from viewer.blueprint import frame_fire, title
+
+
+def test_rerun_verifies_what_is_saved(small, slower, tmp_path: Path):
+    app.save([small], tmp_path / "one.rrd", focus=[100])
+    app.save([small, slower], tmp_path / "two.rrd")
+    done = rrd.rerun_program("rrd", "verify", str(tmp_path / "one.rrd"), str(tmp_path / "two.rrd"))
+    assert done.returncode == 0, done.stderr
+    assert "2 files verified without error" in done.stdout + done.stderr
+
+
+def test_the_same_recording_gives_the_same_data(small, tmp_path: Path):
+    app.save([small], tmp_path / "one.rrd")
+    app.save([small], tmp_path / "two.rrd")
+    done = rrd.rerun_program("rrd", "compare", "--unordered", str(tmp_path / "one.rrd"), str(tmp_path / "two.rrd"))
+    assert done.returncode == 0, done.stderr
+    different = make_recording(6, 6, 40, speed_m=7.0)
+    app.save([different], tmp_path / "three.rrd")
+    done = rrd.rerun_program("rrd", "compare", "--unordered", str(tmp_path / "one.rrd"), str(tmp_path / "three.rrd"))
+    assert done.returncode != 0
+
+
+def test_an_existing_file_is_replaced_only_when_asked(small, tmp_path: Path):
+    path = tmp_path / "run.rrd"
+    path.write_text("mine")
+    with pytest.raises(OutputError, match=r"run\.rrd: exists already; try --force"):
+        app.save([small], path)
+    assert path.read_text() == "mine"
+    app.save([small], path, force=True)
+    assert path.stat().st_size > 10_000
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_missing_folder_is_named(small, tmp_path: Path):
+    with pytest.raises(OutputError, match="its folder does not exist"):
+        app.save([small], tmp_path / "nowhere" / "run.rrd")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs a limit on the size of files")
+def test_a_full_disk_leaves_nothing_behind(tmp_path: Path):
+    program = """
+import resource, signal, sys
+from pathlib import Path
+from fireworld.errors import OutputError
+from tests.viewer.conftest import make_recording
+from viewer import app
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
+try:
+    app.save([make_recording(6, 6, 40)], Path(sys.argv[1]))
+except OutputError as error:
+    print(error)
+"""
+    command = [sys.executable, "-c", program, str(tmp_path / "run.rrd")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert done.stdout == f"{tmp_path / 'run.rrd'}: cannot be written: File too large\n"
+    assert done.stderr == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_logging_switched_off_by_the_environment_is_not_mistaken_for_success(tmp_path: Path):
+    program = """
+import sys
+from pathlib import Path
+from fireworld.errors import ViewError
+from tests.viewer.conftest import make_recording
+from viewer import app
+try:
+    app.save([make_recording(3, 3, 2)], Path(sys.argv[1]))
+except ViewError as error:
+    print(error)
+"""
+    command = [sys.executable, "-c", program, str(tmp_path / "run.rrd")]
+    environment = {**os.environ, "RERUN": "off"}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=60)
+    assert "Rerun is switched off by the environment variable RERUN" in done.stdout, done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_another_minor_version_is_refused(small, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(rerun, "__version__", "0.42.1")
+    with pytest.raises(ViewError, match=r"expected 0\.41\.\*, got '0\.42\.1'; try pip install 'fireworld\[view\]'"):
+        app.save([small], tmp_path / "run.rrd")
+
+
+def test_a_missing_rerun_is_named(small, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    with pytest.raises(ViewError, match=r"Rerun is not installed; try pip install 'fireworld\[view\]'"):
+        app.save([small], tmp_path / "run.rrd")
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems always have a display")
+def test_without_a_display_the_other_ways_are_named(small, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(ViewError, match=r"no display here; try --save FILE\.rrd, or --web"):
+        app.show([small])
+
+
+def test_a_taken_port_is_named(small):
+    with socket.socket() as taken:
+        taken.bind((app.LOCALHOST, 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(ViewError, match=f"--port: expected a free port, got {port}"):
+            app.serve([small], port=port, announce=print)
+
+
+@pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="reads the table of sockets")
+def test_the_page_is_served_on_this_machine_only_and_ends_when_told(tmp_path: Path):
+    port = app.free_port()
+    program = f"""
+from tests.viewer.conftest import make_recording
+from viewer import app
+app.serve([make_recording(3, 3, 2)], port={port}, announce=lambda address: print(address, flush=True))
+"""
+    environment = {**os.environ, "HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path), "TMPDIR": str(tmp_path)}
+    with subprocess.Popen(
+        [sys.executable, "-c", program], env=environment, stdout=subprocess.PIPE, text=True
+    ) as server:
+        try:
+            assert server.stdout is not None
+            assert server.stdout.readline().startswith(f"http://127.0.0.1:{port}?url=")
+            page = wait_for_page(f"http://127.0.0.1:{port}/")
+            assert b"re_viewer.js" in page
+            assert listening_addresses(port) == {"0100007F"}  # 127.0.0.1
+        finally:
+            server.terminate()
+            assert server.wait(timeout=20) == 0
+    assert listening_addresses(port) == set()
+    assert not list(tmp_path.rglob("analytics*"))
+    assert not list(tmp_path.glob("fireworld-*"))
+
+
+def wait_for_page(address: str) -> bytes:
+    for _ in range(200):
+        try:
+            with urllib.request.urlopen(address, timeout=5) as answer:  # noqa: S310 - our own server
+                content: bytes = answer.read()
+                return content
+        except OSError:
+            subprocess.run(["sleep", "0.05"], check=True)  # noqa: S607 - nothing else to wait for
+    raise AssertionError("the page was not served")
+
+
+def listening_addresses(port: int) -> set[str]:
+    rows = [line.split() for line in Path("/proc/net/tcp").read_text().splitlines()[1:]]
+    return {row[1].split(":")[0] for row in rows if row[3] == "0A" and int(row[1].split(":")[1], 16) == port}
+
+
+def test_the_viewer_reports_no_usage():
+    environment = app.viewer_environment({"RERUN_ANALYTICS": "on", "HOME": "/home/me"})
+    assert environment["CI"] == "1"
+    assert "RERUN_ANALYTICS" not in environment
+    assert environment["HOME"] == "/home/me"
+
+
+def test_the_camera_looks_at_the_fire_from_the_south(small):
+    camera = frame_fire([small], aspect=1.8)
+    assert camera.target_m[2] == 0
+    assert 0 < camera.target_m[0] < 100
+    assert camera.eye_m[1] < camera.target_m[1]
+    assert camera.eye_m[2] > 50
+
+
+def test_names_from_files_keep_letters_that_the_viewer_can_draw(small):
+    header = type(small.header)(**{**small.header.__dict__, "scenario": "Zürich \U0001f525\n"})
+    assert title(type(small)(header, small.city, [])) == "Zürich ??, easiest, seed 3"

@@ -1,0 +1,159 @@
+"""`fireworld view`: its options, its errors, and damaged recordings."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from click.testing import CliRunner, Result
+
+from fireworld.cli import root
+from fireworld.errors import FireworldError, OutputError, ViewError
+from fireworld.records import MemoryRecording
+from tests.viewer import rrd
+from viewer import app
+
+reader = pytest.importorskip("recorder.reader")
+
+
+class OpenedLog:
+    """A recording as the recorder opens it."""
+
+    def __init__(self, recording: MemoryRecording, damage: str | None) -> None:
+        self.header, self.city, self.steps = recording.header, recording.city, recording.steps
+        self.damage = damage
+        self._recording = recording
+
+    def __iter__(self):
+        return iter(self._recording)
+
+
+@pytest.fixture
+def logs(small: MemoryRecording, slower: MemoryRecording, monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """Let the names a.mcap, b.mcap and cut.mcap stand for recordings."""
+    known = {
+        "a.mcap": OpenedLog(small, None),
+        "b.mcap": OpenedLog(slower, None),
+        "cut.mcap": OpenedLog(small, "cut off after step 40"),
+    }
+
+    def open_log(path: Path, *, partial: bool) -> OpenedLog:
+        assert partial  # a damaged recording is shown as far as it is good
+        return known[path.name]
+
+    monkeypatch.setattr(reader, "open_log", open_log)
+    return SimpleNamespace(**known)
+
+
+def view(*arguments: str) -> Result:
+    return CliRunner().invoke(root, ["view", *arguments])
+
+
+def test_save_one(logs, tmp_path: Path):
+    path = tmp_path / "a.rrd"
+    result = view("a.mcap", "--save", str(path), "--focus", "121,100,121")
+    assert result.exit_code == 0, result.output
+    assert result.output == f"wrote {path}; open it with `rerun {path}`\n"
+    (_, names) = rrd.read(path)["/plots/focus"]["SeriesLines:names"][0]
+    assert names.as_py() == ["building 121", "building 100"]
+
+
+def test_save_two_side_by_side(logs, tmp_path: Path):
+    result = view("a.mcap", "b.mcap", "--save", str(tmp_path / "ab.rrd"))
+    assert result.exit_code == 0, result.output
+    found = rrd.read(tmp_path / "ab.rrd")
+    assert {"/a/city/buildings", "/b/city/buildings", "/diff/city/buildings"} <= set(found)
+
+
+def test_a_damaged_recording_is_shown_as_far_as_it_is_good(logs, tmp_path: Path):
+    result = view("cut.mcap", "--save", str(tmp_path / "a.rrd"))
+    assert result.exit_code == 0
+    assert "cut.mcap: cut off after step 40; showing 41 committed steps\n" in result.stderr
+
+
+def test_steps_can_be_chosen(logs, tmp_path: Path):
+    result = view("a.mcap", "--save", str(tmp_path / "a.rrd"), "--from", "5", "--to", "20", "--every", "4")
+    assert result.exit_code == 0, result.output
+    rows = rrd.read(tmp_path / "a.rrd")["/plots/score"]["Scalars:scalars"]
+    assert [step for step, _ in rows] == [5, 9, 13, 17]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["a.mcap", "b.mcap", "a.mcap"], "Expected one or two recordings, got 3."),
+        (["a.mcap", "--web", "--save", "x.rrd"], "--save and --web exclude each other."),
+        (["a.mcap", "--port", "80"], "--port goes with --web."),
+        (["a.mcap", "--force"], "--force goes with --save."),
+        (["a.mcap", "--focus", "9,x"], "expected building ids like 369,42, got '9,x'"),
+        (["a.mcap", "--every", "0"], "0 is not in the range x>=1"),
+        ([], "Missing argument 'LOG...'"),
+    ],
+)
+def test_misuse_is_explained(logs, arguments: list[str], said: str):
+    result = view(*arguments)
+    assert result.exit_code == 2
+    assert said in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "said"),
+    [
+        (["a.mcap", "--save", "x.rrd", "--from", "50"], ViewError, "holds steps 0 to 40"),
+        (["a.mcap", "--save", "x.rrd", "--from", "9", "--to", "3"], ViewError, "got steps 9 to 3"),
+        (["a.mcap", "--save", "x.rrd", "--focus", "1"], ViewError, "ids of buildings of city 'grid', got 1"),
+        (["a.mcap", "--save", "nowhere/x.rrd"], OutputError, "its folder does not exist"),
+    ],
+)
+def test_mistakes_are_one_sentence(
+    logs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], error: type[FireworldError], said: str
+):
+    monkeypatch.chdir(tmp_path)
+    result = view(*arguments)
+    assert isinstance(result.exception, error)
+    assert said in str(result.exception)
+    assert "\n" not in str(result.exception)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_web_and_window_get_what_they_are_told(logs, monkeypatch: pytest.MonkeyPatch):
+    calls = []
+    monkeypatch.setattr(app, "show", lambda recordings, **options: calls.append(("show", len(recordings), options)))
+    monkeypatch.setattr(app, "serve", lambda recordings, **options: calls.append(("serve", len(recordings), options)))
+    assert view("a.mcap", "b.mcap").exit_code == 0
+    assert view("a.mcap", "--web", "--port", "9191", "--focus", "100").exit_code == 0
+    assert calls[0] == ("show", 2, {"focus": ()})
+    assert calls[1][:2] == ("serve", 1)
+    assert calls[1][2]["port"] == 9191
+    assert calls[1][2]["focus"] == (100,)
+
+
+def test_help_imports_nothing_heavy():
+    program = """
+import sys
+from fireworld.cli import root
+root.main(["view", "--help"], standalone_mode=False)
+heavy = {"numpy", "numba", "rerun", "mcap", "matplotlib", "pyarrow", "viewer", "recorder"} & set(sys.modules)
+assert not heavy, heavy
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert "Open one recording in Rerun" in done.stdout
+
+
+def test_saving_never_imports_the_simulator():
+    program = """
+import sys, tempfile
+from pathlib import Path
+from tests.viewer.conftest import make_recording
+from viewer import app
+app.save([make_recording(3, 3, 2)], Path(tempfile.mkdtemp()) / "x.rrd")
+assert "numba" not in sys.modules and "matplotlib" not in sys.modules
+parts = {name.split(".")[1] for name in sys.modules if name.startswith("fireworld.")}
+assert parts <= {"errors", "records"}, parts
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 0, done.stderr
