@@ -1,14 +1,63 @@
 # fireworld: `make demo` shows it, `make test` checks all of it. Needs Python 3.11 or newer, and pip.
 PYTHON ?= python3
+WORKERS ?= 2
 BIN := .venv/bin
+DEMO := recordings/demo
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
-export RERUN_ANALYTICS_ENABLED := 0
 
-.PHONY: install
+.DELETE_ON_ERROR:
+.PHONY: help install demo test check-format check-lint check-types check-imports check-tests format docs bench clean
 
-install: .venv/.installed
+help:  ## List these targets.
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
+install: .venv/.installed  ## Make .venv with everything in it, and nothing else.
+
+# Written last, so that half an installation does not count; renewed when the requirements change. A Python without
+# ensurepip (Debian keeps it in a package of its own) lends its own pip to the new environment.
 .venv/.installed: pyproject.toml constraints.txt
-	$(PYTHON) -m venv .venv
+	$(PYTHON) -m venv .venv || { $(PYTHON) -m venv --without-pip .venv && $(PYTHON) -m pip --python $(BIN)/python install --quiet pip; }
 	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --editable '.[view,figures,dev]'
 	touch $@
+
+# No file is a target here: a recording is made anew each time, and half a one never counts as made.
+demo: install  ## Run the default scenario, record it, verify the recording and save it for Rerun.
+	mkdir -p recordings
+	$(BIN)/fireworld run default --record $(DEMO).mcap --force
+	$(BIN)/fireworld verify $(DEMO).mcap
+	$(BIN)/fireworld view $(DEMO).mcap --save $(DEMO).rrd --force
+	@echo "look at it: $(BIN)/fireworld view $(DEMO).mcap"
+
+test: check-format check-lint check-types check-imports check-tests  ## Run everything that CI checks.
+
+check-format: install
+	$(BIN)/ruff format --check .
+
+check-lint: install
+	$(BIN)/ruff check .
+
+check-types: install
+	$(BIN)/mypy
+
+check-imports: install
+	$(BIN)/lint-imports
+
+check-tests: install
+	$(BIN)/python -m pytest --numprocesses $(WORKERS)
+
+format: install  ## Format the code and mend what the linter can mend.
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+docs: install  ## Renew the pages of docs/ that are made from the code.
+	$(BIN)/python -m recorder.schema --write
+	$(BIN)/python -m fireworld.scenario.reference
+	$(BIN)/python -m fireworld.cli.reference
+
+bench: install  ## Measure speed; prints ratios taken within the run.
+	$(BIN)/python -m benchmarks.bench
+
+clean:  ## Remove what the other targets made, .venv too.
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist build
+	rm -f $(DEMO).mcap $(DEMO).mcap.partial $(DEMO).rrd
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

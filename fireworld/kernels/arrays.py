@@ -65,7 +65,7 @@ class FireState(NamedTuple):
     watered: Array  # (n,) uint8, 1 once water has reached it
     fieryness: Array  # (n,) uint8, official code
     air: Array  # (nx + 2, pitch) float64, degrees; a border of zeros around the nx * ny cells
-    reach: Array  # (nx + 2, 2) int32, per row of air: first cell and end of what may differ from zero
+    warm: Array  # (4,) int64, box of the air that may differ from zero: first row, end, first cell, end
     rate: Array  # (n,) float64, burn rate of the step where a building burns
     emitted: Array  # (n,) float64, scratch
     scratch: Array  # (3, pitch) float64, scratch

@@ -26,7 +26,7 @@ def is_burning(energy: float, capacity: float, ignition_point: float, fuel: floa
 
     Takes numbers, not arrays: passing groups of arrays to a small function costs more than the function.
     """
-    return energy / capacity >= ignition_point and fuel > 0.0 and inflammable != 0
+    return energy > 0.0 and energy / capacity >= ignition_point and fuel > 0.0 and inflammable != 0
 
 
 @njit(cache=True, nogil=True)
@@ -112,72 +112,58 @@ def cool(buildings: BuildingTables, fire: FireState, constants: FireConstants) -
 
 
 @njit(cache=True, nogil=True)
-def mix_row(before: Array, row: Array, after: Array, here: Array, sums: Array, constants: FireConstants) -> None:
-    """Mix one row of air cells with the rows beside it, in place; all (pitch,) float64.
-
-    Whole rows and no bounds but their length: that is what the compiler turns into vector instructions.
-
-    Args:
-        before: the row before, as it was.
-        row: the row; changed.
-        after: the row after.
-        here: receives the row as it was.
-        sums: scratch.
-        constants: of the fire model.
-    """
-    flow, kept, flush = constants.air_to_air_flow, constants.air_heat_kept, constants.flush_temperature
-    for y in range(len(row)):
-        here[y] = row[y]
-        sums[y] = before[y] + row[y] + after[y]
-    for y in range(len(row) - PADDING):
-        old = here[y + 1]
-        mean = (sums[y] + sums[y + 1] + sums[y + 2] - old) * 0.125
-        warmth = (old + (mean - old) * flow) * kept
-        row[y + 1] = warmth if warmth > flush else 0.0
-
-
-@njit(cache=True, nogil=True)
 def spread_air(fire: FireState, constants: FireConstants) -> None:
-    """Mix every air cell with its eight neighbours and lose some heat; MODEL 2.5. Only rows in reach are touched.
+    """Mix every air cell with its eight neighbours and lose some heat; MODEL 2.5. Only the warm rows are touched.
 
-    Works in place: two rows of `scratch` keep the row before and the row itself as they were.
+    Heat reaches one cell farther than before, so the warm box first grows by one on every side, within the grid. Works
+    in place: two rows of `scratch` keep the row before and the row itself as they were. Whole rows, one array a row
+    and no bounds but their length: that is what the compiler turns into vector instructions.
     """
-    air, reach = fire.air, fire.reach
-    before, here, sums = fire.scratch[0], fire.scratch[1], fire.scratch[2]
+    air, warm = fire.air, fire.warm
+    if warm[1] <= warm[0]:
+        return
+    flow, kept, flush = constants.air_to_air_flow, constants.air_heat_kept, constants.flush_temperature
     rows, pitch = air.shape
+    warm[0], warm[1] = max(1, warm[0] - 1), min(rows - 1, warm[1] + 1)
+    warm[2], warm[3] = max(1, warm[2] - 1), min(pitch - PADDING + 1, warm[3] + 1)
+    before, here, sums = fire.scratch[0], fire.scratch[1], fire.scratch[2]
     for y in range(pitch):
         before[y] = 0.0
-    before_first, before_end = 0, 0  # reach of the row before, as it was
-    for x in range(1, rows - 1):
-        first, end = before_first, before_end
-        before_first, before_end = reach[x, 0], reach[x, 1]
-        for k in range(x, x + 2):
-            if reach[k, 1] > reach[k, 0]:
-                first = min(first, reach[k, 0]) if end > first else reach[k, 0]
-                end = max(end, reach[k, 1])
-        row = air[x]
-        if end <= first:
-            for y in range(pitch):
-                here[y] = 0.0
-        else:
-            mix_row(before, row, air[x + 1], here, sums, constants)
-            low, high = max(1, first - 1), min(pitch - PADDING + 1, end + 1)
-            while low < high and row[low] == 0.0:
-                low += 1
-            while high > low and row[high - 1] == 0.0:
-                high -= 1
-            reach[x, 0], reach[x, 1] = low, high
+    for x in range(warm[0], warm[1]):
+        row, after = air[x], air[x + 1]
+        for y in range(len(row)):
+            here[y] = row[y]
+            sums[y] = before[y] + row[y] + after[y]
+        for y in range(len(row) - PADDING):
+            old = here[y + 1]
+            mean = (sums[y] + sums[y + 1] + sums[y + 2] - old) * 0.125
+            warmth = (old + (mean - old) * flow) * kept
+            row[y + 1] = warmth if warmth > flush else 0.0
         before, here = here, before
+    shrink(air, warm)
 
 
 @njit(cache=True, nogil=True)
-def extend_reach(reach: Array, x0: int, x1: int, y0: int, y1: int) -> None:
-    """Note that cells y0..y1 of the rows x0..x1 of air may be warm now."""
+def is_cold(air: Array, x0: int, x1: int, y0: int, y1: int) -> bool:
+    """Tell whether all cells of a block of air are exactly zero."""
     for x in range(x0, x1):
-        if reach[x, 1] <= reach[x, 0]:
-            reach[x, 0], reach[x, 1] = y0, y1
-        elif reach[x, 0] > y0 or reach[x, 1] < y1:
-            reach[x, 0], reach[x, 1] = min(reach[x, 0], y0), max(reach[x, 1], y1)
+        for y in range(y0, y1):
+            if air[x, y] != 0.0:
+                return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def shrink(air: Array, warm: Array) -> None:
+    """Draw the warm box in to the cells that are not zero."""
+    while warm[0] < warm[1] and is_cold(air, warm[0], warm[0] + 1, warm[2], warm[3]):
+        warm[0] += 1
+    while warm[0] < warm[1] and is_cold(air, warm[1] - 1, warm[1], warm[2], warm[3]):
+        warm[1] -= 1
+    while warm[2] < warm[3] and is_cold(air, warm[0], warm[1], warm[2], warm[2] + 1):
+        warm[2] += 1
+    while warm[2] < warm[3] and is_cold(air, warm[0], warm[1], warm[3] - 1, warm[3]):
+        warm[3] -= 1
 
 
 @njit(cache=True, nogil=True)
@@ -190,20 +176,20 @@ def exchange_with_air(
     heat over cells without heat is passed over: nothing would change. Four cells go at once, with a sum each, because
     one sum would make every cell wait for the one before; unsigned indices spare numba's test for negative ones.
     """
-    energy, air, reach, weight = fire.energy, fire.air, fire.reach, cover.weight
+    energy, air, weight, warm = fire.energy, fire.air, cover.weight, fire.warm
     share = constants.cell_share
+    first, end, low, high = warm[0], warm[1], warm[2], warm[3]
     for k in range(len(buildings.order)):
         b = buildings.order[k]
         x0, y0 = cover.x0[b], cover.y0[b]
         x1, y1 = x0 + cover.rows[b], y0 + cover.width[b]
         if energy[b] == 0.0:
-            warm = False
-            for x in range(x0, x1):
-                if reach[x, 0] < y1 and reach[x, 1] > y0:
-                    warm = True
-            if not warm:
+            if x1 <= first or x0 >= end or y1 <= low or y0 >= high or is_cold(air, x0, x1, y0, y1):
                 continue
-        extend_reach(reach, x0, x1, y0, y1)
+        elif end <= first:
+            first, end, low, high = x0, x1, y0, y1
+        else:
+            first, end, low, high = min(first, x0), max(end, x1), min(low, y0), max(high, y1)
         temperature = energy[b] / buildings.capacity[b]
         p = cover.ptr[b]
         gain_0 = gain_1 = gain_2 = gain_3 = 0.0
@@ -226,6 +212,7 @@ def exchange_with_air(
                 p += FOUR
                 y += FOUR
         energy[b] += (gain_0 + gain_1) + (gain_2 + gain_3)
+    warm[0], warm[1], warm[2], warm[3] = first, end, low, high
 
 
 @njit(cache=True, nogil=True)

@@ -38,7 +38,7 @@ def fresh_fire(city: City) -> FireState:
         watered=np.zeros(n, dtype=np.uint8),
         fieryness=np.zeros(n, dtype=np.uint8),
         air=np.zeros((rows, pitch)),
-        reach=np.zeros((rows, 2), dtype=np.int32),
+        warm=np.zeros(4, dtype=np.int64),
         rate=np.zeros(n),
         emitted=np.zeros(n),
         scratch=np.zeros((3, pitch)),

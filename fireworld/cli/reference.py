@@ -1,0 +1,47 @@
+"""The command-line reference docs/cli.md, made from the commands; `python -m fireworld.cli.reference` renews it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+import click
+
+from fireworld.cli import root
+
+PAGE: Final = Path(__file__).parents[2] / "docs" / "cli.md"
+WIDTH: Final = 100
+HEAD: Final = """\
+# The command line
+
+This page is what every command says with `--help`; `make docs` renews it.
+
+Results go to standard output, progress and complaints to standard error. Whatever is wrong with a file or a flag is told
+in one line. Exit codes: 0 done, 1 done and the answer is no (recordings differ, a recording is damaged, a trace is not
+met), 2 could not be done, 130 interrupted.
+"""
+
+
+def commands() -> Iterator[tuple[click.Context, click.Command]]:
+    """Yield every command with its context: the root, then each command followed by those below it."""
+    yield from _with_those_below(root, click.Context(root, info_name="fireworld", terminal_width=WIDTH))
+
+
+def command_reference() -> str:
+    """Return the whole page."""
+    sections = [f"## {context.command_path}\n\n```text\n{command.get_help(context)}\n```\n" for context, command in commands()]
+    return "\n".join([HEAD, *sections])
+
+
+def _with_those_below(command: click.Command, context: click.Context) -> Iterator[tuple[click.Context, click.Command]]:
+    yield context, command
+    if isinstance(command, click.Group):
+        for name in command.list_commands(context):
+            below = command.get_command(context, name)
+            assert below is not None, name  # noqa: S101 - a group knows the commands it lists
+            yield from _with_those_below(below, click.Context(below, info_name=name, parent=context))
+
+
+if __name__ == "__main__":
+    PAGE.write_text(command_reference(), encoding="utf-8")
