@@ -17,21 +17,26 @@ HEAD: Final = """\
 
 This page is what every command says with `--help`; `make docs` renews it.
 
-Results go to standard output, progress and complaints to standard error. Whatever is wrong with a file or a flag is told
-in one line. Exit codes: 0 done, 1 done and the answer is no (recordings differ, a recording is damaged, a trace is not
-met), 2 could not be done, 130 interrupted.
+Results go to standard output, progress and complaints to standard error. Whatever is wrong with a file or a flag is
+told in one line. Exit codes: 0 done, 1 done and the answer is no (recordings differ, a recording is damaged, a trace is
+not met), 2 could not be done, 130 interrupted.
 """
 
 
 def commands() -> Iterator[tuple[click.Context, click.Command]]:
     """Yield every command with its context: the root, then each command followed by those below it."""
-    yield from _with_those_below(root, click.Context(root, info_name="fireworld", terminal_width=WIDTH))
+    context = click.Context(root, info_name="fireworld", terminal_width=WIDTH, **root.context_settings)
+    yield from _with_those_below(root, context)
 
 
 def command_reference() -> str:
     """Return the whole page."""
-    sections = [f"## {context.command_path}\n\n```text\n{command.get_help(context)}\n```\n" for context, command in commands()]
+    sections = [_section(context.command_path, command.get_help(context)) for context, command in commands()]
     return "\n".join([HEAD, *sections])
+
+
+def _section(title: str, text: str) -> str:
+    return f"## {title}\n\n```text\n{text}\n```\n"
 
 
 def _with_those_below(command: click.Command, context: click.Context) -> Iterator[tuple[click.Context, click.Command]]:

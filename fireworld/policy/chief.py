@@ -1,6 +1,8 @@
-"""A rule of thumb that a sensible chief would give: first the people, then the edge of the fire, never all at one spot."""
+"""A rule that a sensible chief would give: one brigade between the fire and the people, the others at the nearest front."""
 
 from __future__ import annotations
+
+from typing import Final
 
 import numpy as np
 
@@ -8,25 +10,24 @@ from fireworld.kernels.arrays import Array
 from fireworld.policy.kernel import KernelPolicy, from_tables
 from fireworld.policy.protocol import Action
 
-RADIX = (5, 3, 3, 6, 2, 2, 2, 2)
+RADIX: Final = (5, 3, 3, 6, 2, 2, 2, 2)
+"""Values of the eight features, the most significant first."""
+HIGH: Final = 2
 
 
-def rank(free_edges: int, distance_from_center: int, distance_from_civilian: int, volume: int) -> list[Action]:
-    """Rank the actions by what the fire asks for, whatever the others do."""
-    del free_edges, distance_from_center
-    if distance_from_civilian < 2 or volume <= 1:
-        return [Action.NEAREST_TO_CIVILIAN, Action.NEAREST_TO_ME, Action.NEAREST_TO_CENTER, Action.EASIEST]
-    return [Action.NEAREST_TO_ME, Action.NEAREST_TO_CIVILIAN, Action.NEAREST_TO_CENTER, Action.EASIEST]
+def rule(distance_from_civilian: int, *, others_protect: bool) -> Action:
+    """Choose an action: protect people whom the fire comes near, unless another brigade does; else fight the front."""
+    if distance_from_civilian < HIGH and not others_protect:
+        return Action.NEAREST_TO_CIVILIAN
+    return Action.NEAREST_TO_ME
 
 
 def chief_table() -> Array:
-    """Return the rule as a table, (4320, 4): the best free action first, an action another brigade does costs."""
-    table = np.zeros((*RADIX, 4))
+    """Return the rule as a table of action values, (4320, 4): 1 for the action it names, 0 for the others."""
+    table = np.zeros((*RADIX, len(Action)))
     for features in np.ndindex(*RADIX):
-        ranked = rank(*features[:4])
-        for place, action in enumerate(ranked):
-            table[features][action] = -place
-    return table.reshape(-1, 4)
+        table[features][rule(features[2], others_protect=bool(features[5]))] = 1.0
+    return table.reshape(-1, len(Action))
 
 
 def chief() -> KernelPolicy:

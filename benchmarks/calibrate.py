@@ -1,0 +1,82 @@
+"""How contested is a fire: what policies that learn nothing make of it, by the number of buildings that burn first.
+
+A scenario is worth playing if it is neither won nor lost whatever one does. The shipped scenarios were set with this
+table: `python -m benchmarks.calibrate --scenarios test-1,test-2,test-3 --counts 8-12`. No learning policy takes part.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from statistics import fmean
+from typing import Final
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+from fireworld.policy.names import BUILT_IN
+from fireworld.scenario import load_scenario
+from fireworld.world.stage import Stage, build_stage
+
+POLICIES: Final = ("easiest", "nearest-to-civilian", "nearest-to-center", "nearest-to-me", "each-another", "random")
+FIRST_SEED: Final = 1000
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Means over seeds of one policy on one fire."""
+
+    score: float  # share of the maximum
+    burnt_out: float  # buildings
+    steps: float
+
+
+def play(stage: Stage, policy: str, *, n_seeds: int) -> Outcome:
+    """Run a policy on several seeds."""
+    tables = BUILT_IN[policy]().for_brigades(len(stage.setup.brigade_refuge))
+    scores, burnt, steps = [], [], []
+    for seed in range(FIRST_SEED, FIRST_SEED + n_seeds):
+        world = stage.world(seed=seed)
+        steps.append(world.run(tables))
+        outcome = world.arrays.outcome
+        scores.append(float(outcome.score[0] / outcome.score[1]))
+        burnt.append(int(outcome.counts[2]))
+    return Outcome(fmean(scores), fmean(burnt), fmean(steps))
+
+
+def rows(scenarios: Iterable[str], counts: Iterable[int | None], *, n_seeds: int) -> Iterator[list[str]]:
+    """Yield a row of the table for every scenario and number of burning buildings (None: as shipped)."""
+    for name in scenarios:
+        for count in counts:
+            settings = {} if count is None else {"fires.0.n_buildings": str(count)}
+            stage = build_stage(load_scenario(name).with_settings(settings))
+            outcomes = [play(stage, policy, n_seeds=n_seeds) for policy in POLICIES]
+            cells = [f"{found.score:.2f} {found.burnt_out:3.0f} {found.steps:3.0f}" for found in outcomes]
+            mean = math.fsum(found.score for found in outcomes) / len(outcomes)
+            yield [name, str(len(stage.setup.ignited)), f"{mean:.2f}", *cells]
+
+
+def parse_counts(text: str | None) -> list[int | None]:
+    """Turn "8-12" into the whole numbers from 8 to 12; nothing into the scenarios' own."""
+    if text is None:
+        return [None]
+    first, _, last = text.partition("-")
+    return list(range(int(first), int(last or first) + 1))
+
+
+@click.command()
+@click.option("--scenarios", default="test-1,test-2,test-3", show_default=True, help="Names, with commas.")
+@click.option("--counts", help="Burning buildings at the start, as 8-12.  [default: the scenarios']")
+@click.option("--seeds", "n_seeds", default=10, show_default=True, help="Runs of each policy.")
+def main(scenarios: str, counts: str | None, n_seeds: int) -> None:
+    """Print score / maximum, burnt-out buildings and steps of every fixed policy."""
+    table = Table("scenario", "fire", "mean", *POLICIES, title=f"score / maximum, burnt out, steps; {n_seeds} seeds")
+    for row in rows(scenarios.split(","), parse_counts(counts), n_seeds=n_seeds):
+        table.add_row(*row)
+    Console(width=160).print(table)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,136 @@
+"""Reading the arrays of a trace file (.npz) with complaints that name file, array and place."""
+
+from __future__ import annotations
+
+import lzma
+import struct
+import zipfile
+import zlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Never
+
+import numpy as np
+
+from fireworld.city.city import Array, Float64Array, Int64Array
+from fireworld.errors import TraceError, expected
+
+SHAPED: Final = "a file with arrays (.npz)"
+UNREADABLE: Final = (
+    ValueError,
+    EOFError,
+    KeyError,
+    IndexError,
+    TypeError,
+    MemoryError,
+    OverflowError,
+    RuntimeError,
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    struct.error,
+)
+"""What zipfile and numpy raise on damaged, encrypted or malicious files."""
+
+
+@dataclass(frozen=True)
+class Arrays:
+    """The arrays of one file. Shapes are asked for as lengths, None where any length will do."""
+
+    where: str
+    stored: Mapping[str, Any]
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.stored
+
+    def refuse(self, key: str, wanted: str, got: object) -> Never:
+        """Complain about one array."""
+        raise TraceError(expected(self.where, key, wanted, got))
+
+    def refuse_first(self, key: str, wrong: Array, wanted: str, values: Array) -> None:
+        """Complain about the first element where `wrong` is true, if there is one."""
+        if wrong.any():
+            place = np.unravel_index(int(np.argmax(wrong)), wrong.shape)
+            index = "".join(f"[{int(i)}]" for i in place)
+            self.refuse(key + index, wanted, values[place].item())
+
+    def get(self, key: str) -> Array:
+        """Return an array of numbers as it is stored."""
+        if key not in self.stored:
+            self.refuse(key, "this array to be there", "a file without it")
+        found = self.stored[key]
+        if not isinstance(found, np.ndarray) or found.dtype.kind not in "biuf":
+            self.refuse(key, "an array of numbers", f"one of {found.dtype}" if isinstance(found, np.ndarray) else found)
+        return found
+
+    def floats(self, key: str, *shape: int | None) -> Float64Array:
+        """Read an array of finite numbers, stored in any precision."""
+        found = self.get(key)
+        self._check_shape(key, found, shape)
+        with np.errstate(over="ignore"):
+            numbers = found.astype(np.float64)
+        self.refuse_first(key, ~np.isfinite(numbers), "a finite number", numbers)
+        return numbers
+
+    def integers(self, key: str, *shape: int | None, low: int, high: int) -> Int64Array:
+        """Read an array of whole numbers from low to high, stored as any type of number."""
+        found = self.get(key)
+        self._check_shape(key, found, shape)
+        outside = ~((found >= low) & (found <= high))  # true for NaN too
+        if found.dtype.kind == "f":
+            outside |= np.floor(found) != found
+        self.refuse_first(key, outside, f"a whole number from {low} to {high}", found)
+        return found.astype(np.int64)
+
+    def text(self, key: str) -> str:
+        """Read a single text."""
+        found = self.stored.get(key)
+        if not isinstance(found, np.ndarray) or found.size != 1 or found.dtype.kind not in "US":
+            self.refuse(key, "a single text", "no text" if found is None else f"{getattr(found, 'dtype', 'something')}")
+        single = found.reshape(-1)[0]
+        return single.decode("utf-8", errors="replace") if isinstance(single, bytes) else str(single)
+
+    def _check_shape(self, key: str, found: Array, shape: tuple[int | None, ...]) -> None:
+        """Refuse an array of another shape."""
+        fits = len(found.shape) == len(shape) and all(
+            wanted is None or length == wanted for length, wanted in zip(found.shape, shape, strict=True)
+        )
+        if not fits:
+            lengths = ", ".join("any" if length is None else str(length) for length in shape)
+            self.refuse(key, f"shape ({lengths})", f"shape ({', '.join(map(str, found.shape))})")
+
+
+def read_arrays(path: Path, keys: Iterable[str]) -> Arrays:
+    """Read those of the named arrays that a file has; others stay unread. Nothing in a file is ever executed.
+
+    Raises:
+        TraceError: the file cannot be read or is damaged.
+    """
+    where = str(path)
+    try:
+        with path.open("rb") as file:
+            stored = _opened(where, file)
+            return Arrays(where, {key: _member(where, stored, key) for key in keys if key in stored.files})
+    except OSError as error:
+        raise TraceError(expected(where, "", "a file that can be read", error.strerror or str(error))) from None
+
+
+def _opened(where: str, file: Any) -> Any:
+    """Open the archive."""
+    try:
+        archive = np.load(file, allow_pickle=False)
+    except UNREADABLE:
+        raise TraceError(expected(where, "", SHAPED, "a damaged one or something else")) from None
+    if not isinstance(archive, np.lib.npyio.NpzFile):
+        raise TraceError(expected(where, "", SHAPED, "a single array (.npy)"))
+    return archive
+
+
+def _member(where: str, archive: Any, key: str) -> Any:
+    """Read one array."""
+    try:
+        return archive[key]
+    except UNREADABLE as error:
+        got = "objects, which may hide programs" if "Object arrays" in str(error) else "a damaged one"
+        raise TraceError(expected(where, key, "an array of numbers or text", got)) from None
