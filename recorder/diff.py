@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from fireworld.records import (
     CityRecord,
     Decisions,
     Events,
+    Observations,
     Recording,
     RunHeader,
     Snapshot,
@@ -24,6 +26,7 @@ from recorder.match import Rules, Spot, find, first_unequal
 from recorder.schema import Commit, Field, message_of
 from recorder.totals import Totals, totals_at, totals_of
 
+_IN_TURN: Final = (Observations.topic, Decisions.topic)
 _ENDINGS: Final = tuple(item for item in message_of(Commit).fields if item.wire == "bool")
 
 
@@ -149,31 +152,41 @@ class _Comparison:
 
     def _take_step(self, a: StepRecord, b: StepRecord) -> None:
         self.n_compared += 1
-        for topic in STEP_TOPICS:
-            name = topic.topic[1:]
-            self._take_topic(topic.topic, getattr(a, name), getattr(b, name), a, b)
+        found = [(topic.topic, self._first_spot(topic.topic, a, b)) for topic in STEP_TOPICS]
+        for name, item, spot in _as_it_happened([(topic, *place) for topic, place in found if place is not None]):
+            self._note(name, self._tell(name, item, spot, a, b))
         if self._rules.snapshots and a.snapshot is not None and b.snapshot is not None:
             self._take_snapshot(a.step, a.snapshot, b.snapshot)
         for item in _ENDINGS:
-            spot = find(item, getattr(a, item.name), getattr(b, item.name))
-            if spot is not None:
-                self._note(Commit.topic, _describe(a, Commit.topic, item, spot, self._city))
+            ending = find(item, getattr(a, item.name), getattr(b, item.name))
+            if ending is not None:
+                self._note(Commit.topic, _describe(a, Commit.topic, item, ending, self._city))
                 break
 
-    def _take_topic(self, topic: str, x: Any, y: Any, a: StepRecord, b: StepRecord) -> None:
-        """Compare one topic up to its first differing field."""
-        for item, tolerance in self._rules.fields[topic]:
-            spot = find(item, getattr(x, item.name), getattr(y, item.name), tolerance)
-            if spot is None:
-                continue
-            difference = _describe(a, topic, item, spot, self._city)
-            if topic == Events.topic:
-                difference = _with_sentence(difference, words.events_sentence(x, y))
-            elif topic == Decisions.topic and item.name == "action" and spot.position is not None:
-                why = words.reason(a, b, spot.position)
-                difference = _with_sentence(difference, f"{difference.sentence}; {why}" if why else difference.sentence)
-            self._note(topic, difference)
-            return
+    def _first_spot(self, topic: str, a: StepRecord, b: StepRecord) -> tuple[Field, Spot] | None:
+        """Find the first difference in one topic of a step.
+
+        That is the first field's; of what brigades see and choose, one after another, the first brigade's.
+        """
+        x, y = getattr(a, topic[1:]), getattr(b, topic[1:])
+        spots = (
+            (item, spot)
+            for item, tolerance in self._rules.fields[topic]
+            if (spot := find(item, getattr(x, item.name), getattr(y, item.name), tolerance)) is not None
+        )
+        if topic not in _IN_TURN:
+            return next(spots, None)
+        return min(spots, key=lambda place: _turn(*place), default=None)
+
+    def _tell(self, topic: str, item: Field, spot: Spot, a: StepRecord, b: StepRecord) -> FirstDifference:
+        """Put a difference in one topic of a step into words."""
+        difference = _describe(a, topic, item, spot, self._city)
+        if topic == Events.topic:
+            return _with_sentence(difference, words.events_sentence(a.events, b.events))
+        if topic == Decisions.topic and item.name == "action" and spot.position is not None:
+            why = words.reason(a, b, spot.position)
+            return _with_sentence(difference, f"{difference.sentence}; {why}" if why else difference.sentence)
+        return difference
 
     def _take_snapshot(self, step: int, x: Snapshot, y: Snapshot) -> None:
         """Compare the arrays that both snapshots hold."""
@@ -198,6 +211,28 @@ class _Comparison:
         self.n_differing[topic] += 1
         if self.first is None:
             self.first = difference
+
+
+def _turn(item: Field, spot: Spot) -> int:
+    """Return the brigade whose turn a difference in observations or decisions belongs to.
+
+    -1 for what is there before anyone's turn; the errors of learning, and lengths, come after everyone's.
+    """
+    if item.name == "td_error" or spot.lengths:
+        return sys.maxsize
+    if spot.position is None or words.entity_kind(item) != "brigade":
+        return -1
+    return words.entity_index(item, spot.position)
+
+
+def _as_it_happened(places: list[tuple[str, Field, Spot]]) -> list[tuple[str, Field, Spot]]:
+    """Order a step's differences, given by topic, as they came about: a brigade sees what those before it chose."""
+    topics = [topic for topic, _, _ in places]
+    if topics.count(Observations.topic) and topics.count(Decisions.topic):
+        seen, chosen = topics.index(Observations.topic), topics.index(Decisions.topic)
+        if _turn(*places[chosen][1:]) < _turn(*places[seen][1:]):
+            places[seen], places[chosen] = places[chosen], places[seen]
+    return places
 
 
 def _describe(step: StepRecord | None, topic: str, item: Field, spot: Spot, city: CityRecord) -> FirstDifference:

@@ -79,6 +79,16 @@ def test_another_choice_is_explained_by_exploring(run, with_records, records):
     assert sentence == "step 21, choose: brigade 0 chose none, was easiest; it explored"
 
 
+def test_a_choice_comes_before_what_later_brigades_see_of_it(run, with_records, records):
+    chosen = altered(records, 21, "decisions", action=(0, 3))
+    seen = altered(chosen, 21, "observations", state_index=(1, 77))
+    assert (
+        compare(run, with_records(seen)).first.sentence == "step 21, choose: brigade 0 chose nearest-to-me, was easiest"
+    )
+    seen = altered(chosen, 21, "observations", state_index=(0, 77))
+    assert compare(run, with_records(seen)).first.phase == "observe"
+
+
 @pytest.mark.parametrize(
     ("topic", "changes", "sentence"),
     [
