@@ -197,7 +197,9 @@ class Brigades:
     topic: ClassVar[str] = "/brigades"
     x_m: Array = column(1, "double", "(n_brigades,) position, x")
     y_m: Array = column(2, "double", "(n_brigades,) position, y")
-    activity: Array = column(3, "uint8", "(n_brigades,) 0 idle, 1 driving, 2 spraying, 3 to refuge, 4 refilling, 5 dead")
+    activity: Array = column(
+        3, "uint8", "(n_brigades,) 0 idle, 1 driving, 2 spraying, 3 to refuge, 4 refilling, 5 dead"
+    )
     tank_litres: Array = column(4, "sfixed32", "(n_brigades,) water in the tank")
     sprayed_litres: Array = column(5, "sfixed32", "(n_brigades,) water sprayed in this step")
     driven_m: Array = column(6, "double", "(n_brigades,) way driven in this step")

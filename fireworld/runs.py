@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
-from fireworld.errors import PolicyError
+from fireworld.policy.asking import begin
 from fireworld.policy.names import NamedPolicy
 from fireworld.policy.protocol import Policy
 from fireworld.records import CityRecord, RunHeader, StepRecord
@@ -26,7 +25,7 @@ class Run:
 
     def __iter__(self) -> Iterator[StepRecord]:
         """Yield the start and then every step, until nothing burns or the last step is done."""
-        begin(self.policy, self.world)
+        begin(self.policy, self.world.tables, n_brigades=self.world.n_brigades, seed=self.world.seed)
         observer = Observer(self.world)
         yield observer.record()
         while not (self.world.terminated or self.world.truncated):
@@ -43,21 +42,5 @@ def prepare_run(stage: Stage, named: NamedPolicy, *, seed: int, n_steps_max: int
         n_steps_max: last step; None: the scenario's.
     """
     world = stage.world(seed=seed, n_steps_max=n_steps_max)
-    header = stage.header(
-        seed=seed, policy=named.name, policy_digest=named.digest, n_steps_max=world.n_steps_max
-    )
+    header = stage.header(seed=seed, policy=named.name, policy_digest=named.digest, n_steps_max=world.n_steps_max)
     return Run(header=header, city=stage.city_record(), world=world, policy=named.policy)
-
-
-def begin(policy: Any, world: World) -> None:
-    """Tell a policy that a run begins, if it wants to know.
-
-    Raises:
-        PolicyError: the policy's own `begin` fails.
-    """
-    if not hasattr(policy, "begin"):
-        return
-    try:
-        policy.begin(world.tables, world.n_brigades, world.seed)
-    except Exception as error:
-        raise PolicyError(f"policy: begin: {type(error).__name__}: {error}") from error

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
-from contextlib import ExitStack
+import signal
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -46,7 +48,7 @@ def command(
     settings: tuple[str, ...],
     as_json: bool,
 ) -> None:
-    """Run SCENARIO (a shipped name or a YAML file; `default` if left out) and show how it ended.
+    r"""Run SCENARIO (a shipped name or a YAML file; `default` if left out) and show how it ended.
 
     \b
     fireworld run                                    the default scenario
@@ -63,33 +65,72 @@ def command(
     from fireworld.runs import prepare_run
     from fireworld.scenario import load_scenario, split_settings
     from fireworld.world.stage import build_stage
-    from recorder.chain import Digest
-    from recorder.writer import LogWriter
 
     named = load_policy(policy)
     chosen = load_scenario(scenario).with_settings(split_settings(settings))
     run = prepare_run(build_stage(chosen), named, seed=seed, n_steps_max=steps)
-    last: StepRecord | None = None
-    with ExitStack() as stack:
-        if output is not None:
-            sink: LogWriter | Digest = stack.enter_context(LogWriter(output, run.header, run.city, force=force))
-        else:
-            sink = Digest(run.city)
-        write = sink.write if isinstance(sink, LogWriter) else sink.add
-        try:
-            for record in _with_progress(run, quiet=as_json):
-                write(record)
-                last = record
-            interrupted = False
-        except KeyboardInterrupt:
-            interrupted = True
-    assert last is not None  # noqa: S101 - a run yields its start before anything else
-    outcome = _outcome(run, last, digest=sink.digest, output=output, interrupted=interrupted)
+    last, digest = _carry_out(run, output=output, force=force, quiet=as_json)
+    outcome = _outcome(run, last, digest=digest, output=output)
     if as_json:
         click.echo(json.dumps(outcome, indent=2))
     else:
         _show(outcome)
-    context.exit(INTERRUPTED if interrupted else 0)
+    context.exit(INTERRUPTED if outcome["ended"] == "interrupted" else 0)
+
+
+def _carry_out(run: Run, *, output: Path | None, force: bool, quiet: bool) -> tuple[StepRecord, str]:
+    """Let a run happen, recorded if there is an output; return its last record and its digest.
+
+    Raises:
+        PolicyError: the policy failed; the steps before are in the partial recording.
+        OutputError: the recording cannot be written.
+    """
+    from fireworld.errors import PolicyError
+    from recorder.chain import Digest
+    from recorder.writer import PARTIAL_SUFFIX, LogWriter
+
+    last: StepRecord | None = None
+    try:
+        with ExitStack() as stack:
+            interrupted = stack.enter_context(_gentle_interrupt())
+            if output is not None:
+                sink: LogWriter | Digest = stack.enter_context(LogWriter(output, run.header, run.city, force=force))
+            else:
+                sink = Digest(run.city)
+            write = sink.write if isinstance(sink, LogWriter) else sink.add
+            for record in _with_progress(run, quiet=quiet):
+                write(record)
+                last = record
+                if interrupted.is_set():
+                    break
+    except PolicyError as error:
+        if output is None or last is None:
+            raise
+        kept = f"{output}{PARTIAL_SUFFIX} holds the {last.step + 1} records up to step {last.step}"
+        raise PolicyError(f"{error}; {kept}") from error
+    assert last is not None  # noqa: S101 - a run yields its start before anything else
+    return last, sink.digest
+
+
+@contextmanager
+def _gentle_interrupt() -> Iterator[Event]:
+    """Let the first Ctrl-C but set an event, so that the step under way is done and recorded; a second one stops it."""
+    asked = Event()
+    previous = signal.getsignal(signal.SIGINT)
+    if previous is not signal.default_int_handler:  # ignored, as below nohup, or somebody else's concern
+        yield asked
+        return
+
+    def note(number: int, frame: object) -> None:
+        del number, frame
+        asked.set()
+        signal.signal(signal.SIGINT, previous)
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield asked
+    finally:
+        signal.signal(signal.SIGINT, previous)
 
 
 def _announce_compilation() -> None:
@@ -123,10 +164,10 @@ def _with_progress(run: Run, *, quiet: bool) -> Iterator[StepRecord]:
             yield record
 
 
-def _outcome(run: Run, last: StepRecord, *, digest: str, output: Path | None, interrupted: bool) -> dict[str, Any]:
+def _outcome(run: Run, last: StepRecord, *, digest: str, output: Path | None) -> dict[str, Any]:
     """Collect how a run ended."""
     score = last.score
-    ended = "terminated" if last.terminated else "interrupted" if interrupted else "truncated"
+    ended = "terminated" if last.terminated else "truncated" if last.truncated else "interrupted"
     return {
         "scenario": run.header.scenario,
         "policy": run.header.policy,
@@ -157,7 +198,7 @@ def _show(outcome: dict[str, Any]) -> None:
 
     table = Table(title=f"{outcome['scenario']}, {outcome['policy']}, seed {outcome['seed']}", show_header=False)
     table.add_column(style="bold")
-    table.add_column(justify="right")
+    table.add_column(justify="right", overflow="fold")
     complete = outcome["time_to_complete"]
     time = f"{complete} steps" if complete is not None else f"not within {outcome['steps']} steps"
     table.add_row("score", f"{outcome['score']:.3f} of {outcome['score_max']:.0f}")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import lzma
 import struct
+import tokenize
+import warnings
 import zipfile
 import zlib
 from collections.abc import Iterable, Mapping
@@ -30,6 +32,8 @@ UNREADABLE: Final = (
     zlib.error,
     lzma.LZMAError,
     struct.error,
+    tokenize.TokenError,
+    SyntaxError,
 )
 """What zipfile and numpy raise on damaged, encrypted or malicious files."""
 
@@ -39,7 +43,7 @@ class Arrays:
     """The arrays of one file. Shapes are asked for as lengths, None where any length will do."""
 
     where: str
-    stored: Mapping[str, Any]
+    stored: Mapping[str, Array]
 
     def __contains__(self, key: str) -> bool:
         return key in self.stored
@@ -57,11 +61,9 @@ class Arrays:
 
     def get(self, key: str) -> Array:
         """Return an array of numbers as it is stored."""
-        if key not in self.stored:
-            self.refuse(key, "this array to be there", "a file without it")
-        found = self.stored[key]
-        if not isinstance(found, np.ndarray) or found.dtype.kind not in "biuf":
-            self.refuse(key, "an array of numbers", f"one of {found.dtype}" if isinstance(found, np.ndarray) else found)
+        found = self._there(key)
+        if found.dtype.kind not in "biuf":
+            self.refuse(key, "an array of numbers", f"one of {found.dtype}")
         return found
 
     def floats(self, key: str, *shape: int | None) -> Float64Array:
@@ -85,11 +87,18 @@ class Arrays:
 
     def text(self, key: str) -> str:
         """Read a single text."""
-        found = self.stored.get(key)
-        if not isinstance(found, np.ndarray) or found.size != 1 or found.dtype.kind not in "US":
-            self.refuse(key, "a single text", "no text" if found is None else f"{getattr(found, 'dtype', 'something')}")
+        found = self._there(key)
+        if found.size != 1 or found.dtype.kind not in "US":
+            self.refuse(key, "a single text", f"{found.size} of {found.dtype}")
         single = found.reshape(-1)[0]
         return single.decode("utf-8", errors="replace") if isinstance(single, bytes) else str(single)
+
+    def _there(self, key: str) -> Array:
+        """Return what a key holds."""
+        if key not in self.stored:
+            self.refuse(key, "this array to be there", "a file without it")
+        found: Array = self.stored[key]
+        return found
 
     def _check_shape(self, key: str, found: Array, shape: tuple[int | None, ...]) -> None:
         """Refuse an array of another shape."""
@@ -127,10 +136,14 @@ def _opened(where: str, file: Any) -> Any:
     return archive
 
 
-def _member(where: str, archive: Any, key: str) -> Any:
+def _member(where: str, archive: Any, key: str) -> Array:
     """Read one array."""
     try:
-        return archive[key]
+        with warnings.catch_warnings(action="ignore"):  # arrays written by Python 2
+            found = archive[key]
     except UNREADABLE as error:
         got = "objects, which may hide programs" if "Object arrays" in str(error) else "a damaged one"
         raise TraceError(expected(where, key, "an array of numbers or text", got)) from None
+    if not isinstance(found, np.ndarray):
+        raise TraceError(expected(where, key, "an array of numbers or text", "a file of another kind"))
+    return found

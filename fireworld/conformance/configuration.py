@@ -74,7 +74,8 @@ class Configuration:
             TraceError: a key is missing or its value out of bounds.
         """
         kinds = {item.name: str(item.type) for item in fields(section)}
-        return section(**{name: self._number(key, name, kinds[name]) for key, name in keys.items()})
+        values: dict[str, Any] = {name: self._number(key, name, kinds[name]) for key, name in keys.items()}
+        return section(**values)
 
     def number(self, key: str) -> float:
         """Return the value of one key.
@@ -86,10 +87,8 @@ class Configuration:
         if found is None:
             self._refuse(key, "this key to be set", "nothing")
         try:
-            if not isinstance(found, str | int | float) or isinstance(found, bool):
-                raise ValueError  # noqa: TRY301 - the same complaint as for a text that is no number
-            return float(found)
-        except (ValueError, OverflowError):
+            return float("" if isinstance(found, bool) else found)
+        except (ValueError, TypeError, OverflowError):
             self._refuse(key, "a number", found)
 
     def _number(self, key: str, name: str, kind: str) -> int | float:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from fireworld.kernels.arrays import (
     Array,
     BrigadeConstants,
     BrigadeState,
-    CityTables,
     FireState,
     GeometryTables,
     StreetTables,
 )
+from fireworld.kernels.jit import inner, kernel
 
 IDLE, DRIVING, SPRAYING, TO_REFUGE, REFILLING, DEAD = 0, 1, 2, 3, 4, 5
 ACCEPTED, UNKNOWN_BRIGADE, OVER_POWER, TANK_TOO_LOW, OUT_OF_RANGE, NEGATIVE = 1, -1, -2, -3, -4, -5
@@ -21,10 +20,8 @@ NOWHERE = np.int64(1) << 60
 NO_TARGET = np.int64(-1)
 
 
-@njit(cache=True, nogil=True)
-def judge_request(
-    litres: int, sprayed: int, tank: int, distance_square: float, constants: BrigadeConstants
-) -> int:
+@kernel
+def judge_request(litres: int, sprayed: int, tank: int, distance_square: float, constants: BrigadeConstants) -> int:
     """Return the official result code of an extinguish request of a known brigade; MODEL 2.2.
 
     Args:
@@ -43,14 +40,14 @@ def judge_request(
     return NEGATIVE if litres < 0 else ACCEPTED
 
 
-@njit(cache=True, nogil=True)
-def distance_square(x: float, y: float, b: int, geometry: GeometryTables) -> float:
-    """Return the squared distance from a point to the centroid of building b, mm^2."""
-    dx, dy = geometry.x[b] - x, geometry.y[b] - y
+@kernel
+def distance_square(x: float, y: float, other_x: float, other_y: float) -> float:
+    """Return the squared distance between two points, mm^2."""
+    dx, dy = other_x - x, other_y - y
     return dx * dx + dy * dy
 
 
-@njit(cache=True, nogil=True)
+@inner
 def locate(street: int, offset: int, streets: StreetTables) -> tuple[float, float]:
     """Return the point at an offset along a street, mm."""
     first, second = streets.first[street], streets.second[street]
@@ -59,14 +56,16 @@ def locate(street: int, offset: int, streets: StreetTables) -> tuple[float, floa
     return x + (streets.node_x[second] - x) * part, y + (streets.node_y[second] - y) * part
 
 
-@njit(cache=True, nogil=True)
-def way(street: int, offset: int, goal_street: int, goal_offset: int, streets: StreetTables) -> tuple[int, int, int]:
+@inner
+def way(
+    street: int, offset: int, goal_street: int, goal_offset: int, streets: StreetTables
+) -> tuple[np.int64, np.int64, np.int64]:
     """Return the shortest way to a point of another street: its length, the node to leave by, the node to arrive at.
 
     Lengths in mm; NOWHERE and nodes -1 where there is no way. On the same street: the way along it, nodes -1.
     """
     if street == goal_street:
-        return abs(goal_offset - offset), np.int64(-1), np.int64(-1)
+        return np.int64(abs(goal_offset - offset)), np.int64(-1), np.int64(-1)
     best, best_leave, best_arrive = NOWHERE, np.int64(-1), np.int64(-1)
     for end in range(2):
         leave = np.int64(streets.first[street] if end == 0 else streets.second[street])
@@ -82,8 +81,8 @@ def way(street: int, offset: int, goal_street: int, goal_offset: int, streets: S
     return best, best_leave, best_arrive
 
 
-@njit(cache=True, nogil=True)
-def street_between(node: int, other: int, streets: StreetTables) -> int:
+@inner
+def street_between(node: int, other: int, streets: StreetTables) -> np.int64:
     """Return the shortest street that joins two neighbouring nodes (ties: lowest index)."""
     best, best_length = np.int64(-1), NOWHERE
     for k in range(streets.arc_ptr[node], streets.arc_ptr[node + 1]):
@@ -93,13 +92,13 @@ def street_between(node: int, other: int, streets: StreetTables) -> int:
     return best
 
 
-@njit(cache=True, nogil=True)
-def end_offset(street: int, node: int, streets: StreetTables) -> int:
+@inner
+def end_offset(street: int, node: int, streets: StreetTables) -> np.int64:
     """Return the offset of a street's end at a node."""
     return np.int64(0) if node == streets.first[street] else streets.length[street]
 
 
-@njit(cache=True, nogil=True)
+@inner
 def stop_in_range(
     street: int,
     offset: int,
@@ -117,28 +116,38 @@ def stop_in_range(
         return goal
     x, y = locate(street, offset, streets)
     goal_x, goal_y = locate(street, goal, streets)
-    span = float(abs(goal - offset))
+    span = abs(goal - offset)
+    ahead = 1 if goal > offset else -1
     ux, uy = (goal_x - x) / span, (goal_y - y) / span
     dx, dy = geometry.x[target] - x, geometry.y[target] - y
+    unit = ux * ux + uy * uy  # not quite 1, because the lengths of streets are whole millimetres
     along = dx * ux + dy * uy
-    rest = range_square - (dx * dx + dy * dy - along * along)
-    if rest < 0.0:
+    rest = along * along - unit * (dx * dx + dy * dy - range_square)
+    if along <= 0.0 or rest < 0.0:
         return goal
-    reach = np.int64(max(0.0, along - np.sqrt(rest))) + 1
-    if along < 0.0 or reach >= span:
-        return goal
-    return offset + reach if goal > offset else offset - reach
+    root = np.sqrt(rest)
+    nearest, farthest = int((along - root) / unit), int((along + root) / unit)
+    for way_mm in range(max(1, nearest), min(farthest + 1, span)):  # the second at the latest, unless it but grazes
+        x, y = locate(street, offset + ahead * way_mm, streets)
+        if distance_square(x, y, geometry.x[target], geometry.y[target]) <= range_square:
+            return offset + ahead * way_mm
+    return goal
 
 
-@njit(cache=True, nogil=True)
+@inner
 def drive(
-    brigade: int, goal_building: int, target: int, brigades: BrigadeState, city: CityTables, constants: BrigadeConstants
+    brigade: int,
+    goal_building: int,
+    target: int,
+    brigades: BrigadeState,
+    streets: StreetTables,
+    geometry: GeometryTables,
+    constants: BrigadeConstants,
 ) -> None:
     """Drive a brigade along the shortest way to where a building is entered, one step's worth at most.
 
     It stops early where the target (a building, -1 for none) comes into range. Without a way it stays.
     """
-    streets, geometry = city.streets, city.geometry
     goal_street, goal_offset = np.int64(streets.access_street[goal_building]), streets.access_offset[goal_building]
     left = constants.speed
     street, offset = np.int64(brigades.street[brigade]), brigades.offset[brigade]
@@ -168,14 +177,14 @@ def drive(
             break
         if target >= 0:
             x, y = locate(street, offset, streets)
-            if distance_square(x, y, target, geometry) <= constants.range_square:
+            if distance_square(x, y, geometry.x[target], geometry.y[target]) <= constants.range_square:
                 break
     brigades.street[brigade], brigades.offset[brigade] = street, offset
     brigades.x[brigade], brigades.y[brigade] = locate(street, offset, streets)
 
 
-@njit(cache=True, nogil=True)
-def refuge_at(street: int, offset: int, streets: StreetTables) -> int:
+@inner
+def refuge_at(street: int, offset: int, streets: StreetTables) -> np.int64:
     """Return the refuge building that is entered from a point of a street, -1 if none."""
     for k in range(len(streets.refuge)):
         b = streets.refuge[k]
@@ -184,8 +193,8 @@ def refuge_at(street: int, offset: int, streets: StreetTables) -> int:
     return np.int64(-1)
 
 
-@njit(cache=True, nogil=True)
-def nearest_refuge(street: int, offset: int, streets: StreetTables) -> int:
+@inner
+def nearest_refuge(street: int, offset: int, streets: StreetTables) -> np.int64:
     """Return the refuge building with the shortest way (ties: first listed), -1 if none can be reached."""
     best, best_length = np.int64(-1), NOWHERE
     for k in range(len(streets.refuge)):
@@ -196,7 +205,7 @@ def nearest_refuge(street: int, offset: int, streets: StreetTables) -> int:
     return best
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def refill(refuge: Array, hydrant: Array, hp: Array, tank: Array, constants: BrigadeConstants) -> None:
     """Fill the tanks of the brigades at a refuge, and of the lowest one at each hydrant; MODEL 2.1.
 
@@ -220,7 +229,7 @@ def refill(refuge: Array, hydrant: Array, hp: Array, tank: Array, constants: Bri
                 tank[brigade] = min(tank[brigade] + constants.hydrant_refill, constants.tank)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def find_stations(brigades: BrigadeState, streets: StreetTables) -> None:
     """Find the refuge and the hydrant that every brigade stands at."""
     for brigade in range(len(brigades.tank)):
@@ -233,7 +242,7 @@ def find_stations(brigades: BrigadeState, streets: StreetTables) -> None:
                 brigades.hydrant[brigade] = k
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def spray(brigade: int, target: int, litres: int, brigades: BrigadeState, fire: FireState) -> None:
     """Move litres from a brigade's tank onto a building."""
     brigades.tank[brigade] -= litres
@@ -242,10 +251,38 @@ def spray(brigade: int, target: int, litres: int, brigades: BrigadeState, fire: 
     fire.watered[target] = 1
 
 
-@njit(cache=True, nogil=True)
-def act(brigades: BrigadeState, fire: FireState, city: CityTables, constants: BrigadeConstants) -> int:
+@inner
+def fight(
+    brigade: int,
+    target: int,
+    brigades: BrigadeState,
+    fire: FireState,
+    streets: StreetTables,
+    geometry: GeometryTables,
+    constants: BrigadeConstants,
+) -> int:
+    """Spray the target if it is in range, else drive towards it; return the litres sprayed."""
+    square = distance_square(brigades.x[brigade], brigades.y[brigade], geometry.x[target], geometry.y[target])
+    litres = min(constants.power, brigades.tank[brigade])
+    if litres > 0 and judge_request(litres, 0, brigades.tank[brigade], square, constants) == ACCEPTED:
+        brigades.activity[brigade] = SPRAYING
+        spray(brigade, target, litres, brigades, fire)
+        return litres
+    if square > constants.range_square:
+        brigades.activity[brigade] = DRIVING
+        drive(brigade, target, target, brigades, streets, geometry, constants)
+    return 0
+
+
+@kernel
+def act(
+    brigades: BrigadeState,
+    fire: FireState,
+    streets: StreetTables,
+    geometry: GeometryTables,
+    constants: BrigadeConstants,
+) -> int:
     """Let every brigade do what it chose: refill, spray, or drive; return the litres sprayed. MODEL 2.1-2.2 and 4."""
-    streets, geometry = city.streets, city.geometry
     find_stations(brigades, streets)
     refill(brigades.refuge, brigades.hydrant, brigades.hp, brigades.tank, constants)
     total = 0
@@ -263,17 +300,9 @@ def act(brigades: BrigadeState, fire: FireState, city: CityTables, constants: Br
                 refuge = nearest_refuge(np.int64(brigades.street[brigade]), brigades.offset[brigade], streets)
                 if refuge >= 0:
                     brigades.activity[brigade] = TO_REFUGE
-                    drive(brigade, refuge, NO_TARGET, brigades, city, constants)
+                    drive(brigade, refuge, NO_TARGET, brigades, streets, geometry, constants)
         elif target >= 0:
-            square = distance_square(brigades.x[brigade], brigades.y[brigade], target, geometry)
-            litres = min(constants.power, brigades.tank[brigade])
-            if litres > 0 and judge_request(litres, 0, brigades.tank[brigade], square, constants) == ACCEPTED:
-                brigades.activity[brigade] = SPRAYING
-                spray(brigade, target, litres, brigades, fire)
-                total += litres
-            elif square > constants.range_square:
-                brigades.activity[brigade] = DRIVING
-                drive(brigade, target, target, brigades, city, constants)
+            total += fight(brigade, target, brigades, fire, streets, geometry, constants)
         if brigades.tank[brigade] == 0:
             brigades.refilling[brigade] = 1
         elif brigades.tank[brigade] == constants.tank:
@@ -281,7 +310,7 @@ def act(brigades: BrigadeState, fire: FireState, city: CityTables, constants: Br
     return total
 
 
-@njit(cache=True, nogil=True)
+@inner
 def shelter(brigades: BrigadeState) -> None:
     """Note the building each brigade is in: its refuge while it refills there, else none."""
     for brigade in range(len(brigades.tank)):

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from numba import njit
-
 from fireworld.draws import ACTION, EXPLORE
 from fireworld.kernels.arrays import Array, PolicyTables
 from fireworld.kernels.draws import below, uniform
+from fireworld.kernels.jit import inner, kernel
 from fireworld.kernels.observation import N_ACTIONS
 
 FIXED, RANDOM, TABLE = 0, 1, 2
 
 
-@njit(cache=True, nogil=True)
+@inner
 def greedy(values: Array) -> int:
     """Return the action with the highest value (ties: lowest action). values: (4,) float64."""
     best = 0
@@ -22,14 +21,14 @@ def greedy(values: Array) -> int:
     return best
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def explores(brigade: int, policy: PolicyTables, seed: int, step: int) -> bool:
     """Tell whether a brigade takes a random action in this step instead of the one its table prefers."""
     epsilon = policy.epsilon[0]
     return policy.kind[brigade] == TABLE and epsilon > 0.0 and uniform(seed, EXPLORE, brigade, step) < epsilon
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def choose(brigade: int, state: int, policy: PolicyTables, seed: int, step: int) -> int:
     """Return the action a brigade picks in a state.
 
@@ -48,7 +47,7 @@ def choose(brigade: int, state: int, policy: PolicyTables, seed: int, step: int)
     return greedy(policy.tables[policy.table_of[brigade], table_state(state, policy.tables.shape[1])])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def table_state(state: int, n_states: int) -> int:
     """Return the row of a table for a state of 4320: tables of 270 rows leave out the four flags."""
     return state if n_states == 4320 else state // 16

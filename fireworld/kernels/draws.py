@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numba import njit
 
 from fireworld import draws
+from fireworld.kernels.jit import inner
 
 _INCREMENT: Final = np.uint64(draws.INCREMENT)
 _MULTIPLIER_1: Final = np.uint64(draws.MULTIPLIER_1)
@@ -28,7 +28,7 @@ NORMAL_QUANTILES: Final = np.load(Path(__file__).with_name("normal_quantiles.npy
 NORMAL_QUANTILES.setflags(write=False)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def mix(word: np.uint64) -> np.uint64:
     """Scramble 64 bits one to one: the finaliser of SplitMix64 after its increment."""
     word = word + _INCREMENT
@@ -37,7 +37,7 @@ def mix(word: np.uint64) -> np.uint64:
     return word ^ (word >> _31)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def hash_key(seed: int, purpose: int, entity: int, step: int) -> np.uint64:
     """Return the 64-bit key of one draw.
 
@@ -55,13 +55,13 @@ def hash_key(seed: int, purpose: int, entity: int, step: int) -> np.uint64:
     return mix(word ^ np.uint64(entity))
 
 
-@njit(cache=True, nogil=True)
+@inner
 def uniform_of(key: np.uint64) -> float:
     """Turn a key into a number in [0, 1), from its top 53 bits."""
     return np.float64(key >> _11) * _UNIT
 
 
-@njit(cache=True, nogil=True)
+@inner
 def normal_of(key: np.uint64) -> float:
     """Turn a key into a deviate of N(0, 1).
 
@@ -73,19 +73,19 @@ def normal_of(key: np.uint64) -> float:
     return deviate * (1.0 - np.float64(key & _ONE) * 2.0)  # a branch would be mispredicted every other time
 
 
-@njit(cache=True, nogil=True)
+@inner
 def uniform(seed: int, purpose: int, entity: int, step: int) -> float:
     """Draw a number in [0, 1)."""
     return uniform_of(hash_key(seed, purpose, entity, step))
 
 
-@njit(cache=True, nogil=True)
+@inner
 def normal(seed: int, purpose: int, entity: int, step: int) -> float:
     """Draw a deviate of N(0, 1)."""
     return normal_of(hash_key(seed, purpose, entity, step))
 
 
-@njit(cache=True, nogil=True)
+@inner
 def below(seed: int, purpose: int, entity: int, step: int, bound: int) -> np.int64:
     """Draw a whole number in [0, bound) from the top 32 bits of the key; 1 <= bound <= 2**31."""
     return np.int64(((hash_key(seed, purpose, entity, step) >> _32) * np.uint64(bound)) >> _32)

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from fireworld.kernels.arrays import CityTables, Constants, PolicyTables, WorldArrays
 from fireworld.kernels.brigades import act
 from fireworld.kernels.choice import choose
 from fireworld.kernels.fire import advance_fire, draw_burn_rates
 from fireworld.kernels.health import harm_brigades, harm_civilians
+from fireworld.kernels.jit import kernel
 from fireworld.kernels.observation import can_choose, find_target, observe
 from fireworld.kernels.outcome import assess
 from fireworld.kernels.sites import find_sites
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def run_episode(
     city: CityTables,
     world: WorldArrays,
@@ -30,22 +30,22 @@ def run_episode(
     The phases of `World.step`, without a word to Python in between: for training, comparison and planning.
     """
     brigades, fire, people, sites, outcome = world.brigades, world.fire, world.civilians, world.sites, world.outcome
-    health, geometry = constants.health, city.geometry
+    health, buildings, geometry, streets = constants.health, city.buildings, city.geometry, city.streets
     features = np.zeros(8, dtype=np.int64)
     n_brigades = len(brigades.action)
     for step in range(first_step, last_step + 1):
-        find_sites(city, fire, people, brigades, sites)
+        find_sites(buildings, city.links, city.near, geometry, fire, people, brigades, sites)
         for brigade in range(n_brigades):
             action, target = -1, -1
             if can_choose(brigade, brigades, sites):
                 state = observe(brigade, brigades, sites, constants.observation, features)
                 action = choose(brigade, state, policy, seed, step)
-                target = find_target(brigade, action, brigades, city.buildings, fire, geometry, sites)
+                target = find_target(brigade, action, brigades, buildings, fire, geometry, sites)
             brigades.action[brigade] = action
             brigades.target[brigade] = target
-        outcome.water[0] += act(brigades, fire, city, constants.brigades)
-        outcome.draws[0] = draw_burn_rates(city.buildings, fire, constants.fire, seed, step)
-        advance_fire(city.buildings, city.cover, city.links, fire, constants.fire)
+        outcome.water[0] += act(brigades, fire, streets, geometry, constants.brigades)
+        outcome.draws[0] = draw_burn_rates(buildings, fire, constants.fire, seed, step)
+        advance_fire(buildings, city.cover, city.links, fire, constants.fire)
         outcome.draws[1] = harm_civilians(people, fire, health, seed, step)
         outcome.draws[1] += harm_brigades(brigades, fire, health, seed, step, len(people.hp))
         assess(fire, people, geometry, constants.reward_change, outcome)

@@ -6,11 +6,12 @@ MODEL section 2 in the docs has every equation. All temperatures are degrees abo
 from __future__ import annotations
 
 import numpy as np
-from numba import float32, njit
+from numba import float32
 
 from fireworld.draws import BURN_RATE
 from fireworld.kernels.arrays import Array, BuildingTables, CoverTables, FireConstants, FireState, LinkTables
 from fireworld.kernels.draws import normal
+from fireworld.kernels.jit import inner, kernel
 
 AMBIENT_KELVIN = 293.0
 STEFAN_BOLTZMANN = 5.6704e-8
@@ -20,7 +21,7 @@ PADDING = 5
 """Cells of a row of air that are no cells of the city: one before, four behind them."""
 
 
-@njit(cache=True, nogil=True)
+@inner
 def is_burning(energy: float, capacity: float, ignition_point: float, fuel: float, inflammable: int) -> bool:
     """Tell whether a building burns: hot enough, fuel left, inflammable (codes 1 to 3).
 
@@ -29,25 +30,20 @@ def is_burning(energy: float, capacity: float, ignition_point: float, fuel: floa
     return energy > 0.0 and energy / capacity >= ignition_point and fuel > 0.0 and inflammable != 0
 
 
-@njit(cache=True, nogil=True)
+@inner
 def fieryness_of(burning: bool, fuel: float, full: float, inflammable: int, watered: int) -> int:
     """Return the official code 0 to 8 of a building. fuel, full: energy left and at the start."""
     if inflammable == 0:
         return 0
+    third = 1 if fuel >= full * 0.66 else 2 if fuel >= full * 0.33 else 3
     if burning:
-        if fuel >= full * 0.66:
-            return 1
-        return 2 if fuel >= full * 0.33 else 3
+        return third
     if fuel == full:
         return 4 if watered != 0 else 0
-    if fuel >= full * 0.66:
-        return 5
-    if fuel >= full * 0.33:
-        return 6
-    return 7 if fuel > 0.0 else 8
+    return 4 + third if fuel > 0.0 else 8
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def draw_burn_rates(
     buildings: BuildingTables, fire: FireState, constants: FireConstants, seed: int, step: int
 ) -> float:
@@ -67,7 +63,7 @@ def draw_burn_rates(
     return total
 
 
-@njit(cache=True, nogil=True)
+@inner
 def burn(buildings: BuildingTables, fire: FireState) -> None:
     """Turn fuel into heat in every burning building.
 
@@ -85,7 +81,7 @@ def burn(buildings: BuildingTables, fire: FireState) -> None:
             fire.fuel[b] = fuel - used
 
 
-@njit(cache=True, nogil=True)
+@inner
 def cool(buildings: BuildingTables, fire: FireState, constants: FireConstants) -> None:
     """Let the water lying on hot buildings take heat; MODEL 2.4."""
     for b in range(len(fire.energy)):
@@ -111,7 +107,7 @@ def cool(buildings: BuildingTables, fire: FireState, constants: FireConstants) -
             fire.energy[b] -= taken
 
 
-@njit(cache=True, nogil=True)
+@inner
 def spread_air(fire: FireState, constants: FireConstants) -> None:
     """Mix every air cell with its eight neighbours and lose some heat; MODEL 2.5. Only the warm rows are touched.
 
@@ -143,7 +139,7 @@ def spread_air(fire: FireState, constants: FireConstants) -> None:
     shrink(air, warm)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def is_cold(air: Array, x0: int, x1: int, y0: int, y1: int) -> bool:
     """Tell whether all cells of a block of air are exactly zero."""
     for x in range(x0, x1):
@@ -153,7 +149,7 @@ def is_cold(air: Array, x0: int, x1: int, y0: int, y1: int) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True)
+@inner
 def shrink(air: Array, warm: Array) -> None:
     """Draw the warm box in to the cells that are not zero."""
     while warm[0] < warm[1] and is_cold(air, warm[0], warm[0] + 1, warm[2], warm[3]):
@@ -166,10 +162,8 @@ def shrink(air: Array, warm: Array) -> None:
         warm[3] -= 1
 
 
-@njit(cache=True, nogil=True)
-def exchange_with_air(
-    buildings: BuildingTables, cover: CoverTables, fire: FireState, constants: FireConstants
-) -> None:
+@inner
+def exchange_with_air(buildings: BuildingTables, cover: CoverTables, fire: FireState, constants: FireConstants) -> None:
     """Let each building in turn exchange heat with the air cells under it; MODEL 2.6.
 
     q = (T_cell - T_building) * weight; the cell loses q * cell_share, the building gains the sum. A building without
@@ -215,7 +209,7 @@ def exchange_with_air(
     warm[0], warm[1], warm[2], warm[3] = first, end, low, high
 
 
-@njit(cache=True, nogil=True)
+@inner
 def radiate(buildings: BuildingTables, links: LinkTables, fire: FireState) -> None:
     """Send out every building's radiation and share it among the buildings it is linked to; MODEL 2.7.
 
@@ -235,7 +229,7 @@ def radiate(buildings: BuildingTables, links: LinkTables, fire: FireState) -> No
             energy[b] -= sent
 
 
-@njit(cache=True, nogil=True)
+@inner
 def settle(buildings: BuildingTables, fire: FireState, constants: FireConstants) -> None:
     """Flush tiny heat to zero where asked, then give every building its code; MODEL 2 and its codes."""
     for b in range(len(fire.energy)):
@@ -247,7 +241,7 @@ def settle(buildings: BuildingTables, fire: FireState, constants: FireConstants)
         fire.fieryness[b] = fieryness_of(burning, fuel, buildings.initial_fuel[b], inflammable, fire.watered[b])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def ignite(b: int, buildings: BuildingTables, fire: FireState) -> bool:
     """Set building b on fire: E = capacity * ignition point * 1.5; only from code 0 or 4, and if inflammable."""
     code = fire.fieryness[b]
@@ -258,7 +252,7 @@ def ignite(b: int, buildings: BuildingTables, fire: FireState) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def advance_fire(
     buildings: BuildingTables, cover: CoverTables, links: LinkTables, fire: FireState, constants: FireConstants
 ) -> None:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from fireworld.draws import DAMAGE, DAMAGE_NOISE
 from fireworld.kernels.arrays import Array, BrigadeState, CivilianState, FireState, HealthConstants
 from fireworld.kernels.brigades import shelter
 from fireworld.kernels.draws import normal, uniform
+from fireworld.kernels.jit import inner, kernel
 
 
-@njit(cache=True, nogil=True)
+@inner
 def expose(uniform_draw: float, constants: HealthConstants) -> float:
     """Return the damage that one step in a burning building adds: slight, serious, critical or none."""
     if uniform_draw < constants.slight_below:
@@ -21,13 +21,13 @@ def expose(uniform_draw: float, constants: HealthConstants) -> float:
     return constants.critical_damage if uniform_draw < constants.critical_below else 0.0
 
 
-@njit(cache=True, nogil=True)
+@inner
 def worsen(damage: float, noise: float, constants: HealthConstants) -> float:
     """Let damage grow by one step: d + 0.00025 d^2 + 0.03 + noise; none stays none."""
     return damage + constants.growth * damage * damage + constants.constant + noise if damage > 0.0 else 0.0
 
 
-@njit(cache=True, nogil=True)
+@inner
 def harm(
     building: Array,
     hp: Array,
@@ -68,25 +68,24 @@ def harm(
             noise = constants.noise_mean + constants.noise_sd * normal(seed, DAMAGE_NOISE, first + person, step)
             damage[person] = worsen(damage[person], noise, constants)
             total += noise
-            hp[person] = max(0, hp[person] - int(damage[person] + 0.5))
+            hp[person] -= int(min(max(damage[person] + 0.5, 0.0), hp[person]))  # bounds first: damage may be immense
     return total
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def harm_civilians(
     civilians: CivilianState, fire: FireState, constants: HealthConstants, seed: int, step: int
 ) -> float:
     """Hurt the civilians; entities 0 to c-1 of the draws."""
-    return harm(civilians.building, civilians.hp, civilians.damage, fire.fieryness, constants, 1.0, seed, step, np.int64(0))
+    first = np.int64(0)
+    return harm(civilians.building, civilians.hp, civilians.damage, fire.fieryness, constants, 1.0, seed, step, first)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def harm_brigades(
     brigades: BrigadeState, fire: FireState, constants: HealthConstants, seed: int, step: int, first: int
 ) -> float:
     """Hurt the brigades that refill inside a burning refuge; entities from `first` on of the draws."""
     shelter(brigades)
     share = constants.brigade_share
-    return harm(
-        brigades.inside, brigades.hp, brigades.damage, fire.fieryness, constants, share, seed, step, first
-    )
+    return harm(brigades.inside, brigades.hp, brigades.damage, fire.fieryness, constants, share, seed, step, first)

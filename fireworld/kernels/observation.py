@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from numba import njit
-
 from fireworld.kernels.arrays import (
     Array,
     BrigadeState,
@@ -13,13 +11,14 @@ from fireworld.kernels.arrays import (
     ObservationConstants,
     SiteState,
 )
+from fireworld.kernels.jit import inner, kernel
 
 N_ACTIONS = 4
 EASIEST, NEAREST_TO_CIVILIAN, NEAREST_TO_CENTER, NEAREST_TO_ME = 0, 1, 2, 3
 N_FEATURES = 8
 
 
-@njit(cache=True, nogil=True)
+@inner
 def level(square: float, low: float, medium: float) -> int:
     """Class a squared distance: 0 low, 1 medium, 2 high."""
     if square < low:
@@ -27,7 +26,7 @@ def level(square: float, low: float, medium: float) -> int:
     return 1 if square < medium else 2
 
 
-@njit(cache=True, nogil=True)
+@inner
 def volume_class(volume: float, unit: float) -> int:
     """Class a burning volume: thresholds 1, 2, 4, 8, 16 times the unit volume."""
     found = 0
@@ -39,7 +38,7 @@ def volume_class(volume: float, unit: float) -> int:
     return found
 
 
-@njit(cache=True, nogil=True)
+@inner
 def state_index(features: Array) -> int:
     """Return the state of eight features: mixed radix 5, 3, 3, 6, 2, 2, 2, 2, the first the most significant."""
     index = features[0]
@@ -51,7 +50,7 @@ def state_index(features: Array) -> int:
     return index
 
 
-@njit(cache=True, nogil=True)
+@inner
 def site_place(brigade: int, brigades: BrigadeState, sites: SiteState) -> int:
     """Return the position of a brigade's site in the site arrays, -1 if it has none."""
     for site in range(sites.counts[0]):
@@ -60,7 +59,7 @@ def site_place(brigade: int, brigades: BrigadeState, sites: SiteState) -> int:
     return -1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def observe(
     brigade: int, brigades: BrigadeState, sites: SiteState, constants: ObservationConstants, features: Array
 ) -> int:
@@ -92,7 +91,7 @@ def observe(
     return state_index(features)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def find_target(
     brigade: int,
     action: int,
@@ -127,7 +126,7 @@ def find_target(
     return best
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def can_choose(brigade: int, brigades: BrigadeState, sites: SiteState) -> bool:
     """Tell whether a brigade picks an action: alive, not refilling, something burns."""
     return brigades.hp[brigade] > 0 and brigades.refilling[brigade] == 0 and sites.counts[0] > 0

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from fireworld.kernels.arrays import CivilianState, FireState, GeometryTables, Outcome
+from fireworld.kernels.jit import inner, kernel
 
 SAVED = np.array([1.0, 0.66, 0.33, 0.0, 0.9, 0.75, 0.5, 0.25, 0.0])
 """Part of a building that counts as saved, by fieryness code."""
 
 
-@njit(cache=True, nogil=True)
+@inner
 def exp_of_minus(x: float) -> float:
     """Return exp(-x) for 0 <= x <= 8, to 1e-15, from + - * / alone: libraries' exp differ between processors.
 
@@ -27,7 +27,7 @@ def exp_of_minus(x: float) -> float:
     return total
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def assess(
     fire: FireState, civilians: CivilianState, geometry: GeometryTables, reward_change: bool, outcome: Outcome
 ) -> None:

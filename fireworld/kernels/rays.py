@@ -10,11 +10,11 @@ import math
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from fireworld.draws import RAY
 from fireworld.kernels.draws import hash_key, mix, uniform_of
+from fireworld.kernels.jit import inner, kernel
 
 Array = NDArray[Any]
 
@@ -48,7 +48,7 @@ class WallGrid(NamedTuple):
     wall: Array  # int64
 
 
-@njit(cache=True, nogil=True)
+@inner
 def meet(walls: WallTable, w: int, px: int, py: int, rx: int, ry: int) -> float:
     """Return where wall w crosses the way from (px, py) to (px + rx, py + ry): 0 at its start, 1 at its end.
 
@@ -65,7 +65,7 @@ def meet(walls: WallTable, w: int, px: int, py: int, rx: int, ry: int) -> float:
     return math.inf
 
 
-@njit(cache=True, nogil=True)
+@inner
 def first_hit(walls: WallTable, grid: WallGrid, source: int, px: int, py: int, rx: int, ry: int) -> int:
     """Find the first wall other than `source` on the way from (px, py) to (px + rx, py + ry).
 
@@ -104,7 +104,7 @@ def first_hit(walls: WallTable, grid: WallGrid, source: int, px: int, py: int, r
     return best
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def first_hits(walls: WallTable, grid: WallGrid, source: Array, start: Array, end: Array) -> Array:
     """Find the first wall that each of r given rays meets.
 
@@ -125,7 +125,7 @@ def first_hits(walls: WallTable, grid: WallGrid, source: Array, start: Array, en
     return hits
 
 
-@njit(cache=True, nogil=True)
+@inner
 def random_ray(walls: WallTable, w: int, key: np.uint64, range_mm: int) -> tuple[int, int, int, int]:
     """Draw a ray from a random point of wall w in a random direction of the full circle.
 
@@ -148,7 +148,7 @@ def random_ray(walls: WallTable, w: int, key: np.uint64, range_mm: int) -> tuple
             return px, py, math.floor(x * stretch + 0.5), math.floor(y * stretch + 0.5)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def count_hits(
     walls: WallTable, grid: WallGrid, building_id: Array, seed: int, range_mm: int
 ) -> tuple[Array, Array, Array]:

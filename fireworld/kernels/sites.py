@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from numba import njit
-
 from fireworld.kernels.arrays import (
     BrigadeState,
     BuildingTables,
-    CityTables,
     CivilianState,
     FireState,
     GeometryTables,
@@ -15,12 +12,13 @@ from fireworld.kernels.arrays import (
     NearTables,
     SiteState,
 )
+from fireworld.kernels.jit import inner, kernel
 
 FAR = 1e300
 NORTH, EAST, SOUTH, WEST = 1, 2, 4, 8
 
 
-@njit(cache=True, nogil=True)
+@inner
 def gather(fire: FireState, near: NearTables, sites: SiteState) -> None:
     """Group the burning buildings into connected sets, in order of their lowest building index."""
     n = len(fire.fieryness)
@@ -50,39 +48,50 @@ def gather(fire: FireState, near: NearTables, sites: SiteState) -> None:
     sites.counts[2] = n_members
 
 
-@njit(cache=True, nogil=True)
+@inner
+def lowest_label(site: int, above: int, sites: SiteState) -> int:
+    """Return the lowest number above a bound that a building of a site had in the last step, 0 if none had one."""
+    lowest = 0
+    for k in range(sites.start[site], sites.start[site + 1]):
+        label = sites.label[sites.member[k]]
+        if label > above and (lowest == 0 or label < lowest):
+            lowest = label
+    return lowest
+
+
+@inner
 def number_sites(sites: SiteState) -> None:
     """Give every site its number: sites that merge keep the lowest, of a site that splits the largest part keeps it.
 
     Numbers rise with age and are never used again. Equal parts: the one with the lowest building index keeps it.
+    The old numbers go in rising order to the largest site that lays claim to them; a site that goes away empty-handed
+    claims its next higher one. A claim is noted as a negative number.
     """
-    n_sites = sites.counts[0]
+    n_sites, number = sites.counts[0], sites.number
     for site in range(n_sites):
-        lowest = 0
-        for k in range(sites.start[site], sites.start[site + 1]):
-            label = sites.label[sites.member[k]]
-            if label > 0 and (lowest == 0 or label < lowest):
-                lowest = label
-        sites.number[site] = lowest
+        number[site] = -lowest_label(site, 0, sites)
+    while True:
+        heir, heir_size = -1, 0
+        for site in range(n_sites):
+            size = sites.start[site + 1] - sites.start[site]
+            if number[site] < 0 and (
+                heir < 0 or number[site] > number[heir] or (number[site] == number[heir] and size > heir_size)
+            ):
+                heir, heir_size = site, size
+        if heir < 0:
+            break
+        given = -number[heir]
+        number[heir] = given
+        for site in range(n_sites):
+            if number[site] == -given:
+                number[site] = -lowest_label(site, given, sites)
     for site in range(n_sites):
-        claimed = sites.number[site]
-        if claimed <= 0:
-            continue
-        size = sites.start[site + 1] - sites.start[site]
-        for other in range(site + 1, n_sites):
-            if sites.number[other] == claimed:
-                other_size = sites.start[other + 1] - sites.start[other]
-                if other_size > size:
-                    sites.number[site] = 0
-                    break
-                sites.number[other] = 0
-    for site in range(n_sites):
-        if sites.number[site] == 0:
+        if number[site] == 0:
             sites.counts[1] += 1
-            sites.number[site] = sites.counts[1]
+            number[site] = sites.counts[1]
 
 
-@njit(cache=True, nogil=True)
+@inner
 def nearest_burning(x: float, y: float, geometry: GeometryTables, sites: SiteState) -> int:
     """Return the burning building whose centroid is nearest to a point (ties: lowest id), -1 if nothing burns."""
     best, best_square = -1, FAR
@@ -98,7 +107,7 @@ def nearest_burning(x: float, y: float, geometry: GeometryTables, sites: SiteSta
     return best
 
 
-@njit(cache=True, nogil=True)
+@inner
 def assign_brigades(brigades: BrigadeState, geometry: GeometryTables, sites: SiteState) -> None:
     """Keep every brigade with its site; follow a site that merged; send it to the nearest fire when its site is out.
 
@@ -124,7 +133,7 @@ def assign_brigades(brigades: BrigadeState, geometry: GeometryTables, sites: Sit
                 brigades.site[brigade] = sites.number[sites.place[b]]
 
 
-@njit(cache=True, nogil=True)
+@inner
 def relabel(sites: SiteState) -> None:
     """Remember the site of every burning building for the next step."""
     for b in range(len(sites.label)):
@@ -132,10 +141,8 @@ def relabel(sites: SiteState) -> None:
         sites.label[b] = sites.number[place] if place >= 0 else 0
 
 
-@njit(cache=True, nogil=True)
-def civilian_squares(
-    civilians: CivilianState, fire: FireState, geometry: GeometryTables, sites: SiteState
-) -> None:
+@inner
+def civilian_squares(civilians: CivilianState, fire: FireState, geometry: GeometryTables, sites: SiteState) -> None:
     """Find each burning building's squared distance to the nearest living civilian who is in no burning building."""
     for k in range(sites.counts[2]):
         sites.building_civilian_square[sites.member[k]] = FAR
@@ -151,7 +158,7 @@ def civilian_squares(
             sites.building_civilian_square[b] = min(square, sites.building_civilian_square[b])
 
 
-@njit(cache=True, nogil=True)
+@inner
 def measure_sites(geometry: GeometryTables, sites: SiteState) -> None:
     """Measure every site: volume, bounding box, distance from the centre and from a civilian."""
     for site in range(sites.counts[0]):
@@ -170,11 +177,11 @@ def measure_sites(geometry: GeometryTables, sites: SiteState) -> None:
         sites.east[site], sites.north[site] = east, north
 
 
-@njit(cache=True, nogil=True)
+@inner
 def find_free_sides(
     buildings: BuildingTables, links: LinkTables, geometry: GeometryTables, fire: FireState, sites: SiteState
 ) -> None:
-    """Find the sides over which a site can spread: an unburnt linked building's centroid lies beyond them; MODEL 5.1."""
+    """Find the sides over which a site can spread: the centroid of an unburnt linked building is beyond; MODEL 5.1."""
     for site in range(sites.counts[0]):
         sides = 0
         west, south = sites.west[site], sites.south[site]
@@ -184,7 +191,7 @@ def find_free_sides(
             for link in range(links.ptr[b], links.ptr[b + 1]):
                 there = links.building[link]
                 code = fire.fieryness[there]
-                if (code == 0 or code == 4) and buildings.inflammable[there] != 0:
+                if code in (0, 4) and buildings.inflammable[there] != 0:
                     x, y = geometry.x[there], geometry.y[there]
                     if y > north:
                         sides |= NORTH
@@ -199,15 +206,22 @@ def find_free_sides(
         sites.free_sides[site] = sides
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def find_sites(
-    city: CityTables, fire: FireState, civilians: CivilianState, brigades: BrigadeState, sites: SiteState
+    buildings: BuildingTables,
+    links: LinkTables,
+    near: NearTables,
+    geometry: GeometryTables,
+    fire: FireState,
+    civilians: CivilianState,
+    brigades: BrigadeState,
+    sites: SiteState,
 ) -> None:
     """Find and measure the fire sites of the moment and settle which brigade belongs to which."""
-    gather(fire, city.near, sites)
+    gather(fire, near, sites)
     number_sites(sites)
-    assign_brigades(brigades, city.geometry, sites)
+    assign_brigades(brigades, geometry, sites)
     relabel(sites)
-    civilian_squares(civilians, fire, city.geometry, sites)
-    measure_sites(city.geometry, sites)
-    find_free_sides(city.buildings, city.links, city.geometry, fire, sites)
+    civilian_squares(civilians, fire, geometry, sites)
+    measure_sites(geometry, sites)
+    find_free_sides(buildings, links, geometry, fire, sites)

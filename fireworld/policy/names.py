@@ -9,17 +9,19 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 from fireworld.errors import PolicyError, expected
+from fireworld.policy.asking import describe
 from fireworld.policy.chief import chief
 from fireworld.policy.kernel import KernelPolicy, always, at_random, each_another
 from fireworld.policy.protocol import Policy
 from fireworld.records import ACTIONS
 
 BUILT_IN: Final[dict[str, Callable[[], KernelPolicy]]] = {
-    **{name: (lambda action=action: always(action)) for action, name in enumerate(ACTIONS)},
+    **{name: partial(always, action) for action, name in enumerate(ACTIONS)},
     "each-another": each_another,
     "random": at_random,
     "chief": chief,
@@ -62,16 +64,17 @@ def _load_own(name: str) -> NamedPolicy:
         sys.path.insert(0, folder)
     try:
         module = importlib.import_module(module_name)
-    except Exception as error:
-        raise PolicyError(f"--policy: {module_name}: cannot be imported: {type(error).__name__}: {error}") from error
+    except (Exception, SystemExit) as error:
+        raise PolicyError(f"--policy: {module_name}: cannot be imported: {describe(error)}") from error
     made = getattr(module, class_name, None)
     if made is None:
         raise PolicyError(expected("--policy", module_name, "a class of that name", class_name))
     try:
         policy = made() if inspect.isclass(made) or inspect.isfunction(made) else made
-    except Exception as error:
-        raise PolicyError(f"--policy: {name}: cannot be made: {type(error).__name__}: {error}") from error
+    except (Exception, SystemExit) as error:
+        raise PolicyError(f"--policy: {name}: cannot be made: {describe(error)}") from error
     if not isinstance(policy, Policy):
-        raise PolicyError(expected("--policy", name, "a policy with a method decide(observation)", type(policy).__name__))
+        wanted = "a policy with a method decide(observation)"
+        raise PolicyError(expected("--policy", name, wanted, type(policy).__name__))
     source = Path(inspect.getfile(module)).read_bytes()
     return NamedPolicy(name, hashlib.sha256(source).hexdigest(), policy)

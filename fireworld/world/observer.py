@@ -42,7 +42,6 @@ class _Before:
     brigade_damage: Array
     tank: Array
     refilling: Array
-    sites: Array
 
 
 class Observer:
@@ -95,7 +94,6 @@ class Observer:
 
     def _remember(self) -> _Before:
         arrays = self.world.arrays
-        sites = arrays.sites
         return _Before(
             fieryness=arrays.fire.fieryness.copy(),
             civilian_hp=arrays.civilians.hp.copy(),
@@ -104,7 +102,6 @@ class Observer:
             brigade_damage=arrays.brigades.damage.copy(),
             tank=arrays.brigades.tank.copy(),
             refilling=arrays.brigades.refilling.copy(),
-            sites=sites.number[: sites.counts[0]].copy(),
         )
 
     def _observations(self, choices: Choices | None) -> Observations:
@@ -176,19 +173,18 @@ class Observer:
     def _events(self) -> Events:
         """Tell what changed, in the order of the phases."""
         before, arrays = self._before, self.world.arrays
-        brigades, civilians, sites = arrays.brigades, arrays.civilians, arrays.sites
+        brigades, civilians, site = arrays.brigades, arrays.civilians, arrays.sites.label
         code, code_before = arrays.fire.fieryness, before.fieryness
         burns, burnt_before = _is_burning(code), _is_burning(code_before)
-        site_out = np.setdiff1d(before.sites, sites.number[: sites.counts[0]])
         refilled = (before.refilling == 1) & (brigades.refilling == 0) & (brigades.activity == REFILLING)
         return _events(
             [
-                ("site-out", site_out),
                 ("refilled", np.flatnonzero(refilled)),
                 ("tank-empty", np.flatnonzero((before.tank > 0) & (brigades.tank == 0))),
                 ("ignited", np.flatnonzero(burns & ~burnt_before)),
                 ("extinguished", np.flatnonzero(burnt_before & ~burns & (code != BURNT_OUT))),
                 ("burnt-out", np.flatnonzero((code == BURNT_OUT) & (code_before != BURNT_OUT))),
+                ("site-out", np.setdiff1d(site[site > 0], site[burns])),
                 ("civilian-hurt", np.flatnonzero((before.civilian_damage == 0) & (civilians.damage > 0))),
                 ("civilian-died", np.flatnonzero((before.civilian_hp > 0) & (civilians.hp == 0))),
                 ("brigade-hurt", np.flatnonzero((before.brigade_damage == 0) & (brigades.damage > 0))),
@@ -219,6 +215,4 @@ def _events(found: list[tuple[str, Any]]) -> Events:
     kinds = [np.full(len(entities), KIND[name], dtype=np.uint8) for name, entities in found]
     entities = [np.asarray(entities, dtype=np.int32) for _, entities in found]
     none: list[Array] = [np.zeros(0, dtype=np.int32)]
-    return Events(
-        kind=np.concatenate([np.zeros(0, dtype=np.uint8), *kinds]), entity=np.concatenate(none + entities)
-    )
+    return Events(kind=np.concatenate([np.zeros(0, dtype=np.uint8), *kinds]), entity=np.concatenate(none + entities))

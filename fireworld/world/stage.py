@@ -61,7 +61,9 @@ class Stage:
             brigades=parameters.brigades,
         )
 
-    def header(self, *, seed: int, policy: str, policy_digest: str, n_steps_max: int, forked_from: str = "") -> RunHeader:
+    def header(
+        self, *, seed: int, policy: str, policy_digest: str, n_steps_max: int, forked_from: str = ""
+    ) -> RunHeader:
         """Return what identifies a run of this scenario."""
         return RunHeader(
             scenario=self.scenario.name,

@@ -134,7 +134,8 @@ def fresh_world(
 
 def named_arrays(world: WorldArrays) -> Iterator[tuple[str, Array]]:
     """Yield every array with its name, `group.field`."""
-    for group_name, group in zip(world._fields, world, strict=True):
+    groups: tuple[Any, ...] = world
+    for group_name, group in zip(world._fields, groups, strict=True):
         for name, array in zip(group._fields, group, strict=True):
             yield f"{group_name}.{name}", array
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from fireworld.city.city import City
-from fireworld.errors import PolicyError
 from fireworld.kernels.arrays import Array, CityTables, Constants, PolicyTables, WorldArrays
 from fireworld.kernels.brigades import act
 from fireworld.kernels.fire import advance_fire, draw_burn_rates, ignite
@@ -16,6 +15,7 @@ from fireworld.kernels.observation import can_choose, find_target, observe
 from fireworld.kernels.outcome import assess
 from fireworld.kernels.sites import find_sites
 from fireworld.parameters import Parameters
+from fireworld.policy.asking import ask
 from fireworld.policy.protocol import Decision, Observation, Policy
 from fireworld.world.state import fresh_world
 from fireworld.world.tables import city_tables, world_constants
@@ -124,6 +124,8 @@ class World:
 
     def run(self, policy: PolicyTables) -> int:
         """Run to the end without a word to Python; return the last step. Same phases, same luck, same outcome."""
+        if self.terminated or self.truncated:
+            return self.step_number
         from fireworld.kernels.episode import run_episode  # the largest kernel: compiled only where it is used
 
         self.step_number = int(
@@ -141,7 +143,17 @@ class World:
 
     def _look(self) -> None:
         arrays = self.arrays
-        find_sites(self.tables, arrays.fire, arrays.civilians, arrays.brigades, arrays.sites)
+        tables = self.tables
+        find_sites(
+            tables.buildings,
+            tables.links,
+            tables.near,
+            tables.geometry,
+            arrays.fire,
+            arrays.civilians,
+            arrays.brigades,
+            arrays.sites,
+        )
 
     def _decide(self, policy: Policy) -> Choices:
         features = np.zeros((self.n_brigades, 8), dtype=np.int64)
@@ -162,14 +174,13 @@ class World:
     def _target(self, brigade: int, action: int) -> int:
         arrays, tables = self.arrays, self.tables
         return int(
-            find_target(
-                brigade, action, arrays.brigades, tables.buildings, arrays.fire, tables.geometry, arrays.sites
-            )
+            find_target(brigade, action, arrays.brigades, tables.buildings, arrays.fire, tables.geometry, arrays.sites)
         )
 
     def _ask(self, policy: Policy, brigade: int, features: Array, state: int) -> Decision:
         seen = [int(feature) for feature in features]
-        decision = policy.decide(
+        return ask(
+            policy,
             Observation(
                 brigade=brigade,
                 step=self.step_number,
@@ -182,17 +193,13 @@ class World:
                 others=(bool(seen[4]), bool(seen[5]), bool(seen[6]), bool(seen[7])),
                 city=self.tables,
                 world=self.arrays,
-            )
+            ),
         )
-        if not isinstance(decision, Decision) or decision.action not in range(4):
-            raise PolicyError(
-                f"policy: step {self.step_number}, brigade {brigade}: expected a Decision with action 0..3, got {decision!r}"
-            )
-        return decision
 
     def _act(self) -> None:
         arrays = self.arrays
-        arrays.outcome.water[0] += act(arrays.brigades, arrays.fire, self.tables, self.constants.brigades)
+        streets, geometry = self.tables.streets, self.tables.geometry
+        arrays.outcome.water[0] += act(arrays.brigades, arrays.fire, streets, geometry, self.constants.brigades)
 
     def _burn(self) -> None:
         tables, fire, constants = self.tables, self.arrays.fire, self.constants.fire

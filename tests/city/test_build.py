@@ -20,7 +20,7 @@ from fireworld.parameters import BrigadeParameters, FireParameters
 from fireworld.records import DTYPES
 from tests.city.plans import plan, rectangle
 
-DIGEST = "961e84625f8c8cb4ecee505afe0e1ce777091c67ff70668f280938a52aeaa0c0"
+DIGEST = "d62f76caf11efe383776054e1d8dd10caeca1e58bbb062ac038bc3238355ea78"
 """Of the city below. It changes only with the model or the generator: say so in the commit."""
 
 

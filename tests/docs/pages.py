@@ -1,0 +1,51 @@
+"""The pages of the project, and what is to be found in them: headings, links, code."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
+README = ROOT / "README.md"
+FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"\[[^\]\[]*\]\(([^()\s]+)\)")
+
+
+def page_name(page: Path) -> str:
+    """Name a page in the output of the tests."""
+    return str(page.relative_to(ROOT))
+
+
+def fenced(page: Path, language: str) -> list[str]:
+    """Return the fenced blocks of one language."""
+    return [code for found, code in FENCED.findall(page.read_text(encoding="utf-8")) if found == language]
+
+
+def code(page: Path) -> list[str]:
+    """Return what a page shows as code: lines of blocks, indented or fenced for a shell, and what is in backticks."""
+    text = page.read_text(encoding="utf-8")
+    fences = [
+        line for language in ("", "sh", "console") for block in fenced(page, language) for line in block.splitlines()
+    ]
+    prose = FENCED.sub("", text)
+    return fences + re.findall(r"^    (.+)$", prose, re.MULTILINE) + re.findall(r"`([^`\n]+)`", prose)
+
+
+def commands(page: Path) -> list[list[str]]:
+    """Return the words after `fireworld` of every command in a page's code, remarks left out, `&&` taken apart."""
+    parts = [part.strip() for line in code(page) for part in line.removeprefix("$ ").split("&&")]
+    return [shlex.split(part, comments=True)[1:] for part in parts if part.startswith("fireworld ")]
+
+
+def links(page: Path) -> list[str]:
+    """Return the targets of all links, those in code left out."""
+    text = re.sub(r"`[^`\n]*`", "", FENCED.sub("", page.read_text(encoding="utf-8")))
+    return LINK.findall(text)
+
+
+def anchors(page: Path) -> set[str]:
+    """Return the anchors of a page's headings, as web pages of repositories make them."""
+    headings = re.findall(r"^#+ (.+)$", FENCED.sub("", page.read_text(encoding="utf-8")), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}

@@ -1,0 +1,28 @@
+"""The README: its example of a policy works, its two first commands are there."""
+
+import json
+import re
+import sys
+
+from click.testing import CliRunner
+
+from fireworld.cli.run import command
+from tests.docs.pages import README, ROOT, code, fenced
+
+
+def test_its_policy_runs(tmp_path, monkeypatch):
+    (example,) = fenced(README, "python")
+    (tmp_path / "my_policy.py").write_text(example, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)  # puts sys.path back afterwards
+    monkeypatch.delitem(sys.modules, "my_policy", raising=False)
+    result = CliRunner().invoke(command, ["quick", "--policy", "my_policy:SpreadOut", "--json"], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["policy"] == "my_policy:SpreadOut"
+
+
+def test_its_make_targets_exist():
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    named = {line.split()[1] for line in code(README) if line.startswith("make ")}
+    assert {"demo", "test"} <= named
+    assert named <= targets

@@ -1,0 +1,193 @@
+"""What must hold in every step of every run: fuel, water, codes, health, streets, speed, heat, luck."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fireworld.city.build import build_city
+from fireworld.city.city import Plan
+from fireworld.city.outlines import Building, assemble, centroid_mm
+from fireworld.draws import STEP, hash_key
+from fireworld.kernels.brigades import IDLE, REFILLING, SPRAYING, locate
+from fireworld.kernels.fire import draw_burn_rates
+from fireworld.parameters import PAPER
+from fireworld.world.observer import Observer
+from fireworld.world.state import copy_world, fresh_fire
+from fireworld.world.tables import air_inside, building_tables, fire_constants
+from tests.city.plans import rectangle, street_map
+from tests.world.town import POLICIES, begin, policy_named, town_world
+
+NEXT_CODES = {
+    0: {0, 1, 4},
+    1: {1, 2, 5, 6},
+    2: {2, 3, 6, 7},
+    3: {3, 7, 8},
+    4: {4, 1},
+    5: {5, 1},
+    6: {6, 2},
+    7: {7, 3},
+    8: {8},
+}
+"""Codes that may follow each other: a building burns down by one class at a time, and what is wet stays wet."""
+
+runs = st.fixed_dictionaries(
+    {
+        "seed": st.integers(0, 2**32 - 1),
+        "n_fires": st.integers(1, 12),
+        "n_people": st.integers(0, 6),
+        "n_brigades": st.integers(1, 5),
+        "flush": st.booleans(),
+    }
+)
+
+
+@given(run=runs, name=st.sampled_from(POLICIES))
+@settings(max_examples=40, deadline=None)
+def test_every_step(run, name):
+    world = town_world(**run, n_steps_max=40)
+    policy = begin(policy_named(name), world)
+    before = copy_world(world.arrays)
+    while not (world.terminated or world.truncated):
+        world.step(policy)
+        check_fire(world, before)
+        check_water(world, before)
+        check_people(world, before)
+        check_brigades(world, before)
+        before = copy_world(world.arrays)
+
+
+def check_fire(world, before):
+    fire = world.arrays.fire
+    assert (fire.fuel <= before.fire.fuel).all()
+    assert (fire.fuel >= 0).all()
+    assert np.isfinite(fire.energy).all()
+    air = air_inside(world.city, fire.air)
+    assert (air >= 0).all()
+    assert math.isclose(fire.air.sum(), air.sum()), "there is no heat outside the grid"
+    for code, old in zip(fire.fieryness.tolist(), before.fire.fieryness.tolist(), strict=True):
+        assert code in NEXT_CODES[old]
+    assert not fire.fieryness[world.city.footprints.inflammable == 0].any()
+    burning = (fire.fieryness >= 1) & (fire.fieryness <= 3)
+    assert world.arrays.outcome.counts[0] == burning.sum()
+    assert ((fire.fuel == 0) == (fire.fieryness == 8)).all()
+
+
+def check_water(world, before):
+    """Every litre sprayed left a tank, water on buildings comes from there, and tanks fill at stations only."""
+    brigades, constants = world.arrays.brigades, world.constants.brigades
+    sprayed = brigades.sprayed.astype(np.int64)
+    refilled = brigades.tank - before.brigades.tank + sprayed
+    assert (sprayed >= 0).all()
+    assert (sprayed <= constants.power).all()
+    assert (refilled >= 0).all()
+    at_refuge, at_hydrant = brigades.refuge >= 0, brigades.hydrant >= 0
+    assert (refilled[at_refuge] <= constants.refuge_refill).all()
+    assert (refilled[~at_refuge & at_hydrant] <= constants.hydrant_refill).all()
+    assert (refilled[~at_refuge & ~at_hydrant] == 0).all()
+    assert (brigades.tank >= 0).all()
+    assert (brigades.tank <= constants.tank).all()
+    poured = np.bincount(brigades.target[sprayed > 0], weights=sprayed[sprayed > 0], minlength=world.city.n_buildings)
+    assert (world.arrays.fire.water >= 0).all()
+    assert (world.arrays.fire.water <= before.fire.water + poured).all(), "water evaporates, it is never created"
+    assert world.arrays.outcome.water[0] == before.outcome.water[0] + sprayed.sum()
+
+
+def check_people(world, before):
+    for now, then in ((world.arrays.civilians, before.civilians), (world.arrays.brigades, before.brigades)):
+        assert (now.hp <= then.hp).all()
+        assert (now.hp >= 0).all()
+        assert (now.damage >= then.damage).all()
+
+
+def check_brigades(world, before):
+    brigades, streets, constants = world.arrays.brigades, world.tables.streets, world.constants.brigades
+    assert (brigades.driven <= constants.speed).all()
+    for b in range(world.n_brigades):
+        street, offset = brigades.street[b], brigades.offset[b]
+        assert 0 <= offset <= streets.length[street]
+        assert (brigades.x[b], brigades.y[b]) == locate(street, offset, streets)
+        moved = math.hypot(brigades.x[b] - before.brigades.x[b], brigades.y[b] - before.brigades.y[b])
+        assert moved <= brigades.driven[b] + 1.0, "streets have whole lengths"
+        if brigades.activity[b] in (IDLE, SPRAYING, REFILLING):
+            assert moved == 0.0
+        if brigades.sprayed[b] > 0:
+            reach = (world.tables.geometry.x[brigades.target[b]] - brigades.x[b]) ** 2
+            reach += (world.tables.geometry.y[brigades.target[b]] - brigades.y[b]) ** 2
+            assert reach <= constants.range_square
+            assert 1 <= before.fire.fieryness[brigades.target[b]] <= 3
+    for activity in brigades.activity.tolist():
+        assert activity in range(6)
+
+
+def block(*more):
+    """A row of houses, and more buildings behind them in the file."""
+    houses = [(10 + k, 20_000 * k, 0) for k in range(6)]
+    buildings = [
+        Building(
+            building_id=number,
+            corners_mm=rectangle(x, y, 10_000, 10_000),
+            centroid_mm=centroid_mm(rectangle(x, y, 10_000, 10_000)),
+            floors=1,
+            material=0,
+            ground_area_m2=100.0,
+            inflammable=True,
+            refuge=False,
+        )
+        for number, x, y in [*houses, *more]
+    ]
+    plan = Plan("block", assemble(buildings), street_map([(0, -5000), (200_000, -5000)], [(0, 1)]))
+    return build_city(plan, PAPER.fire, seed=1)
+
+
+@given(seed=st.integers(0, 2**32 - 1), step=st.integers(1, 500))
+@settings(max_examples=30, deadline=None)
+def test_a_building_far_away_changes_no_luck(seed, step):
+    constants = fire_constants(PAPER.fire)
+    rates = []
+    for city in (BLOCK, BLOCK_AND_FARM):
+        fire, buildings = fresh_fire(city), building_tables(city, PAPER.fire)
+        fire.energy[:6] = buildings.capacity[:6] * 100.0
+        draw_burn_rates(buildings, fire, constants, seed, step)
+        rates.append(fire.rate[:6].tolist())
+    assert rates[0] == rates[1]
+    assert len(set(rates[0])) == 6
+
+
+BLOCK, BLOCK_AND_FARM = block(), block((5, 2_000_000, 2_000_000))
+
+
+def test_the_luck_of_a_building_does_not_depend_on_what_else_burns():
+    constants, buildings = fire_constants(PAPER.fire), building_tables(BLOCK, PAPER.fire)
+    alone, together = fresh_fire(BLOCK), fresh_fire(BLOCK)
+    alone.energy[3] = 1e6
+    together.energy[:] = 1e6
+    total = draw_burn_rates(buildings, alone, constants, 4, 9)
+    draw_burn_rates(buildings, together, constants, 4, 9)
+    assert alone.rate[3] == together.rate[3] == total
+
+
+@pytest.mark.parametrize("names", [("fixed", "random"), ("table", "each-another")])
+def test_two_policies_on_one_seed_meet_the_same_luck(names):
+    keys = []
+    for name in names:
+        world = town_world(seed=8, n_steps_max=15)
+        observer, policy = Observer(world), begin(policy_named(name), world)
+        keys.append([observer.record(world.step(policy)).draws.key for _ in range(15)])
+    assert keys[0] == keys[1] == [hash_key(8, STEP, 0, step) for step in range(1, 16)]
+    assert len(set(keys[0])) == 15
+
+
+def test_another_seed_is_other_luck():
+    outcomes = set()
+    for seed in range(4):
+        world = town_world(seed=1)
+        world.seed = seed
+        policy = begin(policy_named("fixed"), world)
+        world.step(policy)
+        outcomes.add(float(world.arrays.outcome.draws[0]))
+    assert len(outcomes) == 4
