@@ -49,10 +49,11 @@ format: install  ## Format the code and mend what the linter can mend.
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-docs: install  ## Renew the pages of docs/ that are made from the code.
+docs: install  ## Renew what is made from the code in docs/, and the transcripts in the README.
 	$(BIN)/python -m recorder.schema --write
 	$(BIN)/python -m fireworld.scenario.reference
 	$(BIN)/python -m fireworld.cli.reference
+	$(BIN)/python -m tests.docs.transcripts
 
 bench: install  ## Measure speed; prints ratios taken within the run.
 	$(BIN)/python -m benchmarks.bench

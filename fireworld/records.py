@@ -212,9 +212,9 @@ class Buildings:
     """The fire after the step."""
 
     topic: ClassVar[str] = "/buildings"
-    temperature: Array = column(1, "float", "(n,) degrees above ambient, rounded to single precision")
+    temperature: Array = column(1, "float", "(n,) degrees above ambient, to the nearest 1/64; exact is energy / heat_capacity")
     energy: Array = column(2, "double", "(n,) heat, energy units, exact")
-    fuel: Array = column(3, "float", "(n,) fuel left, energy units")
+    fuel_share: Array = column(3, "float", "(n,) share of the initial fuel that is left, single precision")
     water_litres: Array = column(4, "sfixed32", "(n,) water lying on the building")
     fieryness: Array = column(5, "uint8", "(n,) official code 0..8")
 

@@ -102,7 +102,7 @@ def log_buildings(stage: Stage, recording: Recording, mesh: CityMesh) -> None:
     log_mesh(stage, mesh, shown_codes(city, fieryness), _BUILDING_COLORS)
 
     log_handles(stage, city, mesh)
-    columns = {name: recording.column("/buildings", name) for name in ("temperature", "fuel", "water_litres")}
+    columns = {name: recording.column("/buildings", name) for name in ("temperature", "fuel_share", "water_litres")}
     columns["fieryness"] = fieryness
     for block in stage.blocks(13 * len(city.building_id)):
         part = {name: numbers[block] for name, numbers in columns.items()}

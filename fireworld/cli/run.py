@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from fireworld.cli.compiling import announce_compilation
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -60,7 +62,7 @@ def command(
     """
     if force and output is None:
         raise click.UsageError("--force goes with --record.")
-    _announce_compilation()
+    announce_compilation()
     from fireworld.policy.names import load_policy
     from fireworld.runs import prepare_run
     from fireworld.scenario import load_scenario, split_settings
@@ -131,14 +133,6 @@ def _gentle_interrupt() -> Iterator[Event]:
         yield asked
     finally:
         signal.signal(signal.SIGINT, previous)
-
-
-def _announce_compilation() -> None:
-    """Say what is going on before the first-ever compilation, which takes a while."""
-    from fireworld import kernels
-
-    if kernels.is_cold():
-        click.echo("compiling the simulator for this machine, once; this takes about 10 seconds ...", err=True)
 
 
 def _with_progress(run: Run, *, quiet: bool) -> Iterator[StepRecord]:

@@ -79,8 +79,12 @@ class Arrays:
         """Read an array of whole numbers from low to high, stored as any type of number."""
         found = self.get(key)
         self._check_shape(key, found, shape)
+        fraction = found.dtype.kind == "f"
+        if fraction:
+            with np.errstate(over="ignore"):
+                found = found.astype(np.float64)
         outside = ~((found >= low) & (found <= high))  # true for NaN too
-        if found.dtype.kind == "f":
+        if fraction:
             outside |= np.floor(found) != found
         self.refuse_first(key, outside, f"a whole number from {low} to {high}", found)
         return found.astype(np.int64)

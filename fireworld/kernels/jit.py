@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
-from typing import Final
+from collections.abc import Callable
+from typing import Any, Final, NoReturn
 
 from numba import njit
+from numba.core.registry import CPUDispatcher
 
 OPEN: Final = os.environ.get("FIREWORLD_OPEN_KERNELS") == "1"
 """Let Python call inner functions too. The tests do; it makes the first compilation half as long again."""
@@ -13,4 +15,20 @@ OPEN: Final = os.environ.get("FIREWORLD_OPEN_KERNELS") == "1"
 # float64 as written, kept in the cache folder, without the interpreter's lock. numpy's error model, because a test for
 # zero before each division would keep loops from becoming vector instructions; no kernel divides by what can be zero.
 kernel = njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
-inner = njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True, no_cpython_wrapper=not OPEN)
+_closed = njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True, no_cpython_wrapper=True)
+
+
+class _Closed(CPUDispatcher):  # type: ignore[misc]  # numba is untyped
+    """An inner function: compiled code without the entry that Python would need, where numba itself would crash."""
+
+    def __call__(self, *args: object, **kwargs: object) -> NoReturn:
+        raise TypeError(f"{self.py_func.__name__} is for kernels only; FIREWORLD_OPEN_KERNELS=1 opens it to Python")
+
+
+def inner(function: Callable[..., Any]) -> Any:
+    """Compile a function for other kernels alone: that spares a third of the compilation."""
+    if OPEN:
+        return kernel(function)
+    closed = _closed(function)
+    closed.__class__ = _Closed
+    return closed

@@ -162,10 +162,11 @@ class Observer:
 
     def _buildings(self) -> Buildings:
         fire = self.world.arrays.fire
+        temperature = fire.energy / self.world.tables.buildings.capacity
         return Buildings(
-            temperature=(fire.energy / self.world.tables.buildings.capacity).astype(np.float32),
+            temperature=(np.rint(temperature * TEMPERATURE_STEPS) / TEMPERATURE_STEPS).astype(np.float32),
             energy=fire.energy.copy(),
-            fuel=fire.fuel.copy(),
+            fuel_share=fire.fuel / self.world.tables.buildings.initial_fuel,
             water_litres=fire.water.copy(),
             fieryness=fire.fieryness.copy(),
         )
@@ -194,6 +195,8 @@ class Observer:
 
 
 BURNT_OUT = 8
+TEMPERATURE_STEPS = 64.0
+"""Recorded temperatures are rounded to this part of a degree: noise in the last bits would not compress."""
 FEATURES = (
     "free_edges",
     "distance_from_center",

@@ -10,6 +10,8 @@ ROOT = Path(__file__).parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
 README = ROOT / "README.md"
 FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+SILENT = " > /dev/null"
+"""At the end of a command: its output is not shown."""
 LINK = re.compile(r"\[[^\]\[]*\]\(([^()\s]+)\)")
 
 
@@ -35,7 +37,8 @@ def code(page: Path) -> list[str]:
 
 def commands(page: Path) -> list[list[str]]:
     """Return the words after `fireworld` of every command in a page's code, remarks left out, `&&` taken apart."""
-    parts = [part.strip() for line in code(page) for part in line.removeprefix("$ ").split("&&")]
+    lines = [line.removeprefix("$ ").removesuffix(SILENT) for line in code(page)]
+    parts = [part.strip() for line in lines for part in line.split("&&")]
     return [shlex.split(part, comments=True)[1:] for part in parts if part.startswith("fireworld ")]
 
 

@@ -1,4 +1,4 @@
-"""The README: its example of a policy works, its two first commands are there."""
+"""The README: its policy runs, its targets exist, and its commands print what it says."""
 
 import json
 import re
@@ -7,6 +7,7 @@ import sys
 from click.testing import CliRunner
 
 from fireworld.cli.run import command
+from tests.docs import transcripts
 from tests.docs.pages import README, ROOT, code, fenced
 
 
@@ -26,3 +27,8 @@ def test_its_make_targets_exist():
     named = {line.split()[1] for line in code(README) if line.startswith("make ")}
     assert {"demo", "test"} <= named
     assert named <= targets
+
+
+def test_its_transcripts_are_current():
+    page = README.read_text(encoding="utf-8")
+    assert transcripts.renew(page) == page, "run `make docs`"

@@ -128,7 +128,7 @@ def record(step: int, *, city_record: CityRecord, last: int, seed: int = 7, snap
         buildings=records.Buildings(
             temperature=temperature.astype(np.float32),
             energy=temperature * 396.0,
-            fuel=np.full(n, 864000.0 - step, np.float32),
+            fuel_share=np.full(n, 1 - step / 4096, np.float32),
             water_litres=np.arange(n, dtype=np.int32),
             fieryness=(temperature // 80).astype(np.uint8),
         ),

@@ -259,7 +259,7 @@ def test_topics_and_fields_of_later_versions_are_skipped_and_kept_by_recover(tmp
     path = custom_log(tmp_path / "later.mcap", records[:4], city, channels=[extra], change=add)
     log = open_log(path)
     assert [record.step for record in log] == [0, 1, 2, 3]
-    assert log.column("/buildings", "fuel").shape == (4, 12)
+    assert log.column("/buildings", "fuel_share").shape == (4, 12)
     assert log.topics["/ambulances"].n_messages == 4
     recover(path, tmp_path / "copy.mcap")
     assert (tmp_path / "copy.mcap").read_bytes() == path.read_bytes()
@@ -365,4 +365,4 @@ def test_a_log_rewritten_by_another_tool_is_the_same_run(tmp_path, log_path, opt
     assert log.snapshots == [10, 20, 30]
     assert [record.step for record in log] == list(range(31))
     assert log.step(20).snapshot is not None
-    assert log.column("/buildings", "fuel").shape == (31, 12)
+    assert log.column("/buildings", "fuel_share").shape == (31, 12)

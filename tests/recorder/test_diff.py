@@ -155,7 +155,7 @@ def test_every_field_of_every_topic_is_compared(run, with_records, records):
 
 
 def test_the_first_phase_of_the_first_step_comes_first(run, with_records, records):
-    other = altered(records, 12, "buildings", fuel=(0, 1.0))
+    other = altered(records, 12, "buildings", fuel_share=(0, 0.5))
     other = altered(other, 12, "decisions", target=(2, 11))
     other = altered(other, 13, "draws", key=1)
     difference = compare(run, with_records(other))

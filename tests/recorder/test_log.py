@@ -139,7 +139,7 @@ def test_a_run_without_steps_is_a_log(tmp_path, city):
     assert len(log) == 0
     assert list(log) == []
     assert log.digest == Digest(city).digest
-    assert log.column("/buildings", "fuel").shape == (0, 0)
+    assert log.column("/buildings", "fuel_share").shape == (0, 0)
     assert log.column("/score", "score").shape == (0,)
 
 

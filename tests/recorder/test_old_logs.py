@@ -12,7 +12,7 @@ DATA = Path(__file__).with_name("data")
 
 def test_log_of_format_1():
     log = open_log(DATA / "fireworld-log-1.mcap")
-    assert log.digest == "e62e130072464037909548c77700de89281df9c00751417ba37ad4312307a603"
+    assert log.digest == "591dac7c1efaea2c0dd99a285bdbbb689287889db8a11f1497bd87c1f3951950"
     assert (log.header.scenario, log.header.seed, log.header.n_steps_max) == ("synthetic", 7, 500)
     assert sorted(log.header.attachments) == ["policy.npz", "scenario.yaml"]
     assert log.steps.tolist() == [0, 1, 2, 3, 4]

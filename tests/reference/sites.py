@@ -21,7 +21,7 @@ N_VOLUMES: Final = 6
 class SiteTables:
     """What is fixed of n buildings; lengths in millimetres."""
 
-    near: Array  # (most neighbours, n) the buildings of one site with each, padded with n
+    near: Array  # (most neighbours, n) those of lower index that make one site with each, padded with n
     links: Array  # (most links, n) the buildings that each radiates to, padded with n
     building_id: Array  # (n,)
     x: Float64Array  # (n,) centroid
@@ -44,7 +44,7 @@ class SiteTables:
             unit = 2.0 * (math.fsum(city.volume_m3.tolist()) / city.n_buildings)
         third = city.half_diagonal_mm / 3.0
         return cls(
-            near=padded(city.near),
+            near=padded(city.near, lower_only=True),
             links=padded(city.links),
             building_id=city.footprints.building_id,
             x=x,
@@ -65,12 +65,18 @@ class SiteTables:
         )
 
 
-def padded(relation: Links) -> Array:
-    """Turn a CSR relation of n buildings into a table, (most, n) int64, padded with n."""
-    n, counts = len(relation.ptr) - 1, np.diff(relation.ptr)
-    table = np.full((counts.max(initial=0), n), n, dtype=np.int64)
-    slot = np.arange(len(relation.building)) - np.repeat(relation.ptr[:-1], counts)
-    table[slot, np.repeat(np.arange(n), counts)] = relation.building
+def padded(relation: Links, *, lower_only: bool = False) -> Array:
+    """Turn a CSR relation of n buildings into a table, (most, n) int64, padded with n.
+
+    Without the neighbours of higher index, if only the lower ones are wanted.
+    """
+    n = len(relation.ptr) - 1
+    building, other = np.repeat(np.arange(n), np.diff(relation.ptr)), relation.building.astype(np.int64)
+    if lower_only:
+        building, other = building[other < building], other[other < building]
+    counts = np.bincount(building, minlength=n)
+    table = np.full((counts.max(), n), n, dtype=np.int64)
+    table[np.arange(len(other)) - np.repeat(np.cumsum(counts) - counts, counts), building] = other
     return table
 
 
@@ -167,13 +173,13 @@ def connect(near: Array, burning: Array) -> Array:
     position = np.full(n + 1, k)
     position[burning] = np.arange(k)
     other = position[near[:, burning]]
-    slot, low = np.nonzero(other < np.arange(k))  # each pair once, without those of which one does not burn
-    low, high = other[slot, low], low
+    slot, high = np.nonzero(other < k)  # without the pairs of which one does not burn
+    low = other[slot, high]
     root = np.arange(k)
     while len(low):
         root[np.maximum(low, high)] = np.minimum(low, high)
         jumped = root[root]
-        while not np.array_equal(jumped, root):
+        while (jumped != root).any():
             root, jumped = jumped, jumped[jumped]
         low, high = root[low], root[high]
         apart = low != high

@@ -146,7 +146,7 @@ def make_record(city: CityRecord, step: int, *, speed_m: float, fieryness_before
                 "<f4"
             ),
             energy=np.zeros(n),
-            fuel=(city.initial_fuel * (1 - code / 8)).astype("<f4"),
+            fuel_share=(1 - code / 8).astype("<f4"),
             water_litres=np.where(code >= 4, 500, 0).astype("<i4"),
             fieryness=code,
         ),

@@ -50,7 +50,7 @@ def test_geometry_is_sent_once_and_colors_only_when_they_change(small, saved):
     assert len(changes) < len(codes)
 
 
-@pytest.mark.parametrize("name", ["temperature", "fuel", "water_litres", "fieryness"])
+@pytest.mark.parametrize("name", ["temperature", "fuel_share", "water_litres", "fieryness"])
 def test_handles_carry_the_numbers_of_every_building(small, saved, name: str):
     shown = rrd.at_every_step(saved["/city/handles"][f"Building:{name}"], small.steps.tolist())
     assert np.array_equal(np.array(shown), small.column("/buildings", name))

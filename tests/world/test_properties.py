@@ -47,7 +47,7 @@ runs = st.fixed_dictionaries(
 
 
 @given(run=runs, name=st.sampled_from(POLICIES))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=100, deadline=None)
 def test_every_step(run, name):
     world = town_world(**run, n_steps_max=40)
     policy = begin(policy_named(name), world)
@@ -67,8 +67,10 @@ def check_fire(world, before):
     assert (fire.fuel >= 0).all()
     assert np.isfinite(fire.energy).all()
     air = air_inside(world.city, fire.air)
-    assert (air >= 0).all()
-    assert math.isclose(fire.air.sum(), air.sum()), "there is no heat outside the grid"
+    assert (air >= -1e-12).all(), "water may take a rounding error more heat than there is"
+    outside = fire.air.copy()
+    air_inside(world.city, outside)[:] = 0.0
+    assert not outside.any()
     for code, old in zip(fire.fieryness.tolist(), before.fire.fieryness.tolist(), strict=True):
         assert code in NEXT_CODES[old]
     assert not fire.fieryness[world.city.footprints.inflammable == 0].any()
@@ -120,8 +122,20 @@ def check_brigades(world, before):
             reach += (world.tables.geometry.y[brigades.target[b]] - brigades.y[b]) ** 2
             assert reach <= constants.range_square
             assert 1 <= before.fire.fieryness[brigades.target[b]] <= 3
-    for activity in brigades.activity.tolist():
-        assert activity in range(6)
+
+
+def test_these_runs_go_through_everything():
+    """What the test above sees: every code, every activity."""
+    codes, activities = set(), set()
+    for seed in range(4):
+        world = town_world(seed=seed, n_fires=9, n_brigades=4)
+        policy = begin(policy_named("random"), world)
+        while not (world.terminated or world.truncated):
+            world.step(policy)
+            codes |= set(world.arrays.fire.fieryness.tolist())
+            activities |= set(world.arrays.brigades.activity.tolist())
+    assert codes >= {0, 1, 2, 3, 5, 6, 7, 8}, "water damage without fire is not this team's work"
+    assert activities >= {1, 2, 3, 4}
 
 
 def block(*more):
