@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from fireworld.policy.names import BUILT_IN
-from fireworld.scenario import load_scenario
+from fireworld.scenario import load_scenario, scenario_names
 from fireworld.world.stage import Stage, build_stage
 
 POLICIES: Final = ("easiest", "nearest-to-civilian", "nearest-to-center", "nearest-to-me", "each-another", "random")
@@ -67,13 +67,22 @@ def parse_counts(text: str | None) -> list[int | None]:
 
 
 @click.command()
-@click.option("--scenarios", default="test-1,test-2,test-3", show_default=True, help="Names, with commas.")
+@click.option("--scenarios", default="test-1,test-2,test-3", show_default=True, help="Names, with commas; or all.")
 @click.option("--counts", help="Burning buildings at the start, as 8-12.  [default: the scenarios']")
 @click.option("--seeds", "n_seeds", default=10, show_default=True, help="Runs of each policy.")
-def main(scenarios: str, counts: str | None, n_seeds: int) -> None:
+@click.option("--markdown", is_flag=True, help="Write the table as it stands in docs/scenarios.md.")
+def main(scenarios: str, counts: str | None, n_seeds: int, *, markdown: bool) -> None:
     """Print score / maximum, burnt-out buildings and steps of every fixed policy."""
+    names = scenario_names() if scenarios == "all" else scenarios.split(",")
+    found = rows(names, parse_counts(counts), n_seeds=n_seeds)
+    if markdown:
+        print("| " + " | ".join(["scenario", "fire", "mean", *POLICIES]) + " |")
+        print("|---" * (3 + len(POLICIES)) + "|")
+        for row in found:
+            print("| " + " | ".join([f"`{row[0]}`", *row[1:3], *(cell.split()[0] for cell in row[3:])]) + " |")
+        return
     table = Table("scenario", "fire", "mean", *POLICIES, title=f"score / maximum, burnt out, steps; {n_seeds} seeds")
-    for row in rows(scenarios.split(","), parse_counts(counts), n_seeds=n_seeds):
+    for row in found:
         table.add_row(*row)
     Console(width=160).print(table)
 

@@ -6,12 +6,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from benchmarks.fires import CITY_SEED, LOTS, PARAMETERS, city_of, plan_of
+from benchmarks.fires import CITY_SEED, LOTS, city_of, plan_of
 from benchmarks.plain_rays import random_rays, walls_hit
 from benchmarks.timing import Contender, Row, compare, measure
 from fireworld.city import links
 from fireworld.city.build import build_city
 from fireworld.city.walls import walls_of
+from fireworld.parameters import PAPER
+from fireworld.policy.kernel import each_another
+from fireworld.scenario import load_scenario
+from fireworld.world.stage import build_stage
+from fireworld.world.world import World
 
 RAYS_COMPARED = 20_000
 
@@ -20,7 +25,7 @@ def ray_row(size: int, *, seconds: float) -> Row:
     """Time the search for the first wall on some of a city's rays; both ways must find the same walls."""
     city = city_of(size)
     walls = walls_of(city.footprints)
-    fire = PARAMETERS.fire
+    fire = PAPER.fire
     source, start, end = random_rays(walls, rays_per_mm=fire.ray_rate_per_mm, range_mm=fire.ray_range_mm, seed=1)
     chosen = np.sort(np.random.default_rng(1).permutation(len(source))[:RAYS_COMPARED])
     rays = {"source": source[chosen], "start_mm": start[chosen], "end_mm": end[chosen]}
@@ -43,10 +48,10 @@ def ray_row(size: int, *, seconds: float) -> Row:
 def links_row(size: int, *, seconds: float) -> Row:
     """Time all radiation links of a city."""
     city = city_of(size)
-    n_rays = int(links.wall_table(city.footprints, city.order, PARAMETERS.fire).n_rays.sum())
+    n_rays = int(links.wall_table(city.footprints, city.order, PAPER.fire).n_rays.sum())
 
     def run(_: None) -> object:
-        return links.radiation_links(city.footprints, city.order, PARAMETERS.fire, seed=CITY_SEED)
+        return links.radiation_links(city.footprints, city.order, PAPER.fire, seed=CITY_SEED)
 
     label = f"{city.n_buildings} buildings, {n_rays} rays"
     return measure("city", "radiation links", label, Contender("compiled", run), seconds=seconds)
@@ -57,10 +62,25 @@ def build_row(size: int, *, seconds: float) -> Row:
     plan = plan_of(size)
 
     def run(_: None) -> object:
-        return build_city(plan, PARAMETERS.fire, seed=CITY_SEED)
+        return build_city(plan, PAPER.fire, seed=CITY_SEED)
 
     label = f"{city_of(size).n_buildings} buildings"
     return measure("city", "build a city", label, Contender("build_city", run), seconds=seconds)
+
+
+def first_step_row(*, seconds: float) -> Row:
+    """Time the way from the text of the default scenario to the end of its first step."""
+    policy = each_another()
+
+    def run(_: None) -> World:
+        stage = build_stage(load_scenario("default"))
+        world = stage.world(seed=1)
+        policy.begin(world.tables, world.n_brigades, world.seed)
+        world.step(policy)
+        return world
+
+    label = f"{run(None).city.n_buildings} buildings"
+    return measure("city", "from YAML to the first step", label, Contender("in process", run), seconds=seconds)
 
 
 def rows(*, quick: bool) -> Iterator[Row]:
@@ -73,3 +93,4 @@ def rows(*, quick: bool) -> Iterator[Row]:
         yield links_row(size, seconds=seconds)
     for size in sizes:
         yield build_row(size, seconds=seconds)
+    yield first_step_row(seconds=seconds)

@@ -1,55 +1,39 @@
-"""Rows of the fire model: the compiled kernels against plain numpy, a step and whole episodes."""
+"""Rows of the fire model: steps inside the compiled kernels against plain numpy, and the bare call of a kernel."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from benchmarks.fires import LOTS, Blaze, Kind, blaze, no_policy
-from benchmarks.timing import Contender, Row, compare
-from fireworld.kernels.arrays import WorldArrays
-from fireworld.kernels.episode import run_episode
-from tests.reference import fire as plain
+from benchmarks.fires import KINDS, LOTS, STEPS_TIMED, Kind, after_timed_steps, blaze, n_burning
+from benchmarks.loops import do_nothing
+from benchmarks.timing import Contender, Row, compare, measure
 
-EPISODE_STEPS = 300
-KINDS: tuple[Kind, ...] = ("small", "hot")
-
-
-def label(burning: Blaze) -> str:
-    """Say how large the city is and how much of it burns."""
-    return f"{len(burning.rate)} buildings, {burning.n_burning()} burning"
+CALLS = 100
 
 
 def step_row(size: int, kind: Kind, *, seconds: float) -> Row:
-    """Time one step of a fire that has burnt for a while."""
+    """Time a step of a fire that has burnt for a while: ten of them in one compiled call, ten in numpy."""
     start = blaze(size, kind)
-    ours = Contender("compiled", start.step_compiled, start.fire_copy)
-    baseline = Contender("numpy", start.step_plain, start.plain_copy)
-    return compare("fire", f"one step, {kind} fire", label(start), ours, baseline, seconds=seconds)
+    first, last = n_burning(start.plain_fire.fieryness), n_burning(after_timed_steps(start))
+    label = f"{len(start.rate)} buildings, {first}..{last} burning"
+    ours = Contender("compiled", start.advance_compiled, start.compiled_copy, parts=STEPS_TIMED)
+    baseline = Contender("numpy", start.advance_plain, start.plain_copy, parts=STEPS_TIMED)
+    return compare("fire", f"one of {STEPS_TIMED} steps, {kind} fire", label, ours, baseline, seconds=seconds)
 
 
-def episode_row(size: int, kind: Kind, *, seconds: float) -> Row:
-    """Time a whole episode without brigades: one compiled call against a loop over numpy steps, from the ignition."""
-    start = blaze(size, kind, steps_before=0)
-    policy = no_policy()
+def call_row(*, seconds: float) -> Row:
+    """Time the call from Python of a kernel that takes what a step takes and does nothing."""
+    start = blaze(min(LOTS), "small")
+    tables, fire = start.tables, start.compiled_fire
+    groups = (tables.buildings, tables.cover, tables.links, fire, start.constants)
+    n_arrays = sum(len(group) for group in groups[:-1])
 
-    def compiled(world: WorldArrays) -> int:
-        return int(run_episode(start.tables, world, start.constants, policy, 1, 1, EPISODE_STEPS))
+    def call(_: None) -> None:
+        for _ in range(CALLS):
+            do_nothing(*groups)
 
-    def in_numpy(fire: plain.FireState) -> int:
-        for step in range(1, EPISODE_STEPS + 1):
-            start.step_plain(fire)
-            if not ((fire.fieryness >= 1) & (fire.fieryness <= 3)).any():
-                return step
-        return EPISODE_STEPS
-
-    world, fire = start.world_copy(), start.plain_copy()
-    assert compiled(world) == in_numpy(fire), "both engines stop in the same step"
-    start.assert_agreement(fire, world.fire)
-    ours = Contender("compiled", compiled, start.world_copy)
-    baseline = Contender("numpy", in_numpy, start.plain_copy)
-    return compare(
-        "fire", f"episode of {EPISODE_STEPS} steps, {kind} fire", label(start), ours, baseline, seconds=seconds
-    )
+    contender = Contender("compiled", call, parts=CALLS)
+    return measure("fire", "call from Python", f"{n_arrays} arrays", contender, seconds=seconds)
 
 
 def rows(*, quick: bool) -> Iterator[Row]:
@@ -58,6 +42,4 @@ def rows(*, quick: bool) -> Iterator[Row]:
     for size in list(LOTS)[:2] if quick else LOTS:
         for kind in KINDS:
             yield step_row(size, kind, seconds=seconds)
-    for size in list(LOTS)[:2] if quick else LOTS:
-        for kind in KINDS:
-            yield episode_row(size, kind, seconds=seconds)
+    yield call_row(seconds=seconds)

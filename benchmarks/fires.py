@@ -2,32 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cache
 from typing import Final, Literal
 
 import numpy as np
 
+from benchmarks.loops import advance_steps
 from fireworld.city.build import build_city
 from fireworld.city.city import Array, City, Plan
 from fireworld.city.generator import generate_plan
 from fireworld.kernels import fire as kernels
-from fireworld.kernels.arrays import CityTables, Constants, FireState, PolicyTables, WorldArrays
+from fireworld.kernels.arrays import CityTables, FireConstants, FireState
 from fireworld.parameters import PAPER
-from fireworld.world.state import copy_world, fresh_world
-from fireworld.world.tables import city_tables, world_constants
+from fireworld.records import MATERIALS
+from fireworld.world.state import fresh_fire
+from fireworld.world.tables import city_tables, fire_constants
 from tests.reference import fire as plain
 
 Kind = Literal["small", "hot"]
 
+KINDS: Final[tuple[Kind, ...]] = ("small", "hot")
 LOTS: Final = {100: (10, 10), 250: (16, 16), 1000: (32, 32), 4000: (64, 63)}
 """Columns and rows of lots, by about the number of buildings."""
 CITY_SEED: Final = 1
 BURN_RATE: Final = PAPER.fire.burn_rate_mean
-PARAMETERS: Final = replace(PAPER, fire=replace(PAPER.fire, burn_rate_sd=0.0))
-"""The paper's parameters; every building burns at the mean rate, so that both engines compute the same fire."""
-STEPS_BEFORE: Final = {"small": 20, "hot": 60}
-NOBODY: Final = np.zeros(0, dtype=np.int64)
+STEPS_BEFORE: Final[dict[Kind, int]] = {"small": 20, "hot": 60}
+STEPS_TIMED: Final = 10
 
 
 @cache
@@ -40,81 +42,104 @@ def plan_of(size: int) -> Plan:
 @cache
 def city_of(size: int) -> City:
     """Build the city of about `size` buildings."""
-    return build_city(plan_of(size), PARAMETERS.fire, seed=CITY_SEED)
+    return build_city(plan_of(size), PAPER.fire, seed=CITY_SEED)
 
 
-def ignited(city: City, kind: Kind) -> Array:
-    """Choose the buildings on fire: the one nearest to the middle, or every eighth; (k,) indices."""
-    inflammable = np.flatnonzero(city.footprints.inflammable)
-    if kind == "hot":
-        return inflammable[::8]
-    offset = city.footprints.centroid_mm[inflammable] - np.array(city.middle_mm)
-    return inflammable[[int(np.argmin((offset * offset).sum(axis=1)))]]
+@cache
+def tables_of(size: int) -> CityTables:
+    """Build the kernels' tables of a city once."""
+    return city_tables(city_of(size), PAPER.fire)
+
+
+def every_eighth(city: City) -> Array:
+    """Return every eighth inflammable building, (k,) indices: a hot fire's start."""
+    return np.flatnonzero(city.footprints.inflammable)[::8]
+
+
+def from_the_middle(city: City) -> Iterator[int]:
+    """Yield the wooden buildings, from the middle of the city outwards: where a small fire may start."""
+    wood = np.flatnonzero((city.footprints.inflammable != 0) & (city.footprints.material == MATERIALS.index("wood")))
+    offset = city.footprints.centroid_mm[wood] - np.array(city.middle_mm)
+    yield from wood[np.argsort((offset * offset).sum(axis=1), kind="stable")].tolist()
 
 
 @dataclass(frozen=True)
 class Blaze:
-    """One fire in one city for both engines."""
+    """One fire in one city for both engines, at the start of the steps that are timed. All burn at the mean rate."""
 
     plain_tables: plain.FireTables
     plain_fire: plain.FireState
     tables: CityTables
-    constants: Constants
-    world: WorldArrays
+    constants: FireConstants
+    compiled_fire: FireState
     rate: Array  # (n,)
 
     def plain_copy(self) -> plain.FireState:
         """Copy the numpy engine's state."""
         return self.plain_fire.copy()
 
-    def fire_copy(self) -> FireState:
+    def compiled_copy(self) -> FireState:
         """Copy the compiled engine's state."""
-        return FireState(*(array.copy() for array in self.world.fire))
+        return FireState(*(array.copy() for array in self.compiled_fire))
 
-    def world_copy(self) -> WorldArrays:
-        """Copy the whole world of the compiled engine."""
-        return copy_world(self.world)
+    def advance_plain(self, fire: plain.FireState, n_steps: int = STEPS_TIMED) -> None:
+        """Advance the numpy engine."""
+        for _ in range(n_steps):
+            plain.advance_fire(self.plain_tables, fire, self.rate)
 
-    def step_plain(self, fire: plain.FireState) -> None:
-        """Advance the numpy engine by a step."""
-        plain.advance_fire(self.plain_tables, fire, self.rate)
-
-    def step_compiled(self, fire: FireState) -> None:
-        """Advance the compiled engine by a step."""
-        kernels.advance_fire(self.tables.buildings, self.tables.cover, self.tables.links, fire, self.constants.fire)
-
-    def n_burning(self) -> int:
-        """Count the burning buildings."""
-        return int(np.count_nonzero(plain.is_burning(self.plain_tables, self.plain_fire)))
-
-    def assert_agreement(self, fire: plain.FireState, compiled: FireState) -> None:
-        """Make sure that both engines have computed the same fire."""
-        np.testing.assert_array_equal(compiled.fieryness, fire.fieryness)
-        np.testing.assert_allclose(compiled.energy, fire.energy, rtol=1e-9, atol=1e-6)
+    def advance_compiled(self, fire: FireState, n_steps: int = STEPS_TIMED) -> None:
+        """Advance the compiled engine in one call."""
+        tables = self.tables
+        advance_steps(tables.buildings, tables.cover, tables.links, fire, self.constants, n_steps)
 
 
-def no_policy() -> PolicyTables:
-    """Return the policy of a team without brigades."""
-    none = np.zeros(0, dtype=np.int32)
-    return PolicyTables(kind=none, action=none, table_of=none, tables=np.zeros((1, 270, 4)), epsilon=np.zeros(1))
+def n_burning(fieryness: Array) -> int:
+    """Count the burning buildings."""
+    return int(np.count_nonzero((fieryness >= 1) & (fieryness <= 3)))
 
 
-def blaze(size: int, kind: Kind, *, steps_before: int | None = None) -> Blaze:
-    """Set a city on fire and let both engines burn it for the usual number of steps, or for `steps_before`."""
-    city = city_of(size)
-    plain_tables = plain.FireTables.of_city(city, PARAMETERS.fire)
-    world = fresh_world(city, PARAMETERS, civilian_building=NOBODY, civilian_mm=np.zeros((0, 2)), brigade_refuge=NOBODY)
-    world.fire.rate[:] = BURN_RATE
-    rate = np.full(city.n_buildings, BURN_RATE)
-    state = plain.FireState.cold(plain_tables)
-    constants = world_constants(city, PARAMETERS)
-    made = Blaze(plain_tables, state, city_tables(city, PARAMETERS.fire), constants, world, rate)
-    chosen = ignited(city, kind)
-    plain.ignite(plain_tables, state, chosen)
+def kindle(size: int, chosen: Array, n_steps: int) -> Blaze:
+    """Set buildings on fire and let both engines burn for some steps."""
+    city, tables = city_of(size), tables_of(size)
+    plain_tables = plain.FireTables.of_city(city, PAPER.fire)
+    made = Blaze(
+        plain_tables=plain_tables,
+        plain_fire=plain.FireState.cold(plain_tables),
+        tables=tables,
+        constants=fire_constants(PAPER.fire),
+        compiled_fire=fresh_fire(city),
+        rate=np.full(city.n_buildings, BURN_RATE),
+    )
+    made.compiled_fire.rate[:] = BURN_RATE
+    plain.ignite(plain_tables, made.plain_fire, chosen)
     for building in chosen:
-        kernels.ignite(int(building), made.tables.buildings, world.fire)
-    for _ in range(STEPS_BEFORE[kind] if steps_before is None else steps_before):
-        made.step_plain(state)
-        made.step_compiled(world.fire)
-    made.assert_agreement(state, world.fire)
+        kernels.ignite(int(building), tables.buildings, made.compiled_fire)
+    made.advance_plain(made.plain_fire, n_steps)
+    made.advance_compiled(made.compiled_fire, n_steps)
     return made
+
+
+@cache
+def blaze(size: int, kind: Kind) -> Blaze:
+    """Return the fire of the step rows.
+
+    hot: every eighth building, after 60 steps. small: one building, after 20 steps: of the wooden ones that nearest to
+    the middle of the city whose fire still burns when the timed steps are over.
+    """
+    if kind == "hot":
+        made = kindle(size, every_eighth(city_of(size)), STEPS_BEFORE[kind])
+    else:
+        fires = (kindle(size, np.array([b]), STEPS_BEFORE[kind]) for b in from_the_middle(city_of(size)))
+        made = next(fire for fire in fires if n_burning(after_timed_steps(fire)))
+    assert n_burning(after_timed_steps(made)), "it burns until the end"
+    return made
+
+
+def after_timed_steps(start: Blaze) -> Array:
+    """(n,) fieryness codes when the timed steps are over; both engines must compute the same fire."""
+    fire, compiled = start.plain_copy(), start.compiled_copy()
+    start.advance_plain(fire)
+    start.advance_compiled(compiled)
+    np.testing.assert_array_equal(compiled.fieryness, fire.fieryness)
+    np.testing.assert_allclose(compiled.energy, fire.energy, rtol=1e-9, atol=1e-6)
+    return fire.fieryness

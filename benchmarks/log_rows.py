@@ -7,6 +7,7 @@ import tempfile
 import zlib
 from collections.abc import Iterator
 from dataclasses import fields, replace
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ import numpy as np
 from benchmarks.fires import city_of
 from benchmarks.runs import header, new_world, record_of, records, run_silently, write_log
 from benchmarks.timing import Contender, Row, compare, measure
+from fireworld.policy.kernel import each_another
 from fireworld.records import STEP_TOPICS, StepRecord
 from fireworld.world.world import World
 from recorder.reader import open_log
@@ -60,11 +62,15 @@ def run_row(size: int, n_steps: int, folder: Path, *, seconds: float) -> Row:
     def fresh() -> World:
         return new_world(size, n_steps)
 
-    def recorded(world: World) -> None:
-        write_log(folder / "run.mcap", world)
+    path = folder / "run.mcap"
 
-    ours, baseline = Contender("recorded", recorded, fresh), Contender("not recorded", run_silently, fresh)
-    label = f"{city_of(size).n_buildings} buildings"
+    def recorded(world: World) -> None:
+        write_log(path, world)
+
+    recorded(fresh())
+    ours = Contender("recorded", recorded, fresh)
+    baseline = Contender("not recorded", partial(run_silently, policy=each_another()), fresh)
+    label = f"{city_of(size).n_buildings} buildings, {path.stat().st_size / 1e6:.2f} MB"
     return compare("log", f"run of {n_steps} steps", label, ours, baseline, seconds=seconds)
 
 

@@ -3,70 +3,64 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from benchmarks.fires import city_of, ignited
+from benchmarks.fires import city_of, every_eighth, tables_of
+from fireworld.city.city import Array
 from fireworld.city.record import city_record
-from fireworld.kernels.arrays import CityTables
 from fireworld.parameters import PAPER
 from fireworld.policy.kernel import KernelPolicy, each_another
 from fireworld.records import CityRecord, RunHeader, StepRecord
 from fireworld.world.observer import Observer
-from fireworld.world.tables import city_tables
 from fireworld.world.world import World
 from recorder.writer import LogWriter
 
 N_BRIGADES: Final = 4
-N_CIVILIANS: Final = 12
+N_CIVILIANS: Final = 10
 SEED: Final = 1
 
 
-@cache
-def tables_of(size: int) -> CityTables:
-    """Build the kernels' tables of a city once."""
-    return city_tables(city_of(size), PAPER.fire)
-
-
-def new_world(size: int, n_steps: int) -> World:
-    """Put four brigades and twelve civilians into a city of which every eighth building burns."""
+def start_of(size: int, ignited: Array) -> dict[str, Array]:
+    """Place ten civilians all over a city, and four brigades at its refuges in turn; (k,) buildings burn."""
     city = city_of(size)
     inflammable = np.flatnonzero(city.footprints.inflammable)
     civilians = inflammable[:: len(inflammable) // N_CIVILIANS][:N_CIVILIANS]
     refuges = np.flatnonzero(city.footprints.refuge)
+    return {
+        "ignited": ignited,
+        "civilian_building": civilians,
+        "civilian_mm": city.footprints.centroid_mm[civilians],
+        "brigade_refuge": refuges[np.arange(N_BRIGADES) % len(refuges)],
+    }
+
+
+def new_world(size: int, n_steps: int) -> World:
+    """Set up a world with a team and a hot fire."""
+    city = city_of(size)
     return World(
         city,
         PAPER,
-        ignited=ignited(city, "hot"),
-        civilian_building=civilians,
-        civilian_mm=city.footprints.centroid_mm[civilians],
-        brigade_refuge=refuges[np.arange(N_BRIGADES) % len(refuges)],
+        **start_of(size, every_eighth(city)),
         seed=SEED,
         n_steps_max=n_steps,
         tables=tables_of(size),
     )
 
 
-def ready_policy(world: World) -> KernelPolicy:
-    """Return a policy that has begun: brigade b always takes action b."""
-    policy = each_another()
-    policy.begin(world.tables, world.n_brigades, world.seed)
-    return policy
-
-
-def run_silently(world: World) -> None:
+def run_silently(world: World, policy: KernelPolicy) -> None:
     """Run a world step by step without looking at it."""
-    policy = ready_policy(world)
+    policy.begin(world.tables, world.n_brigades, world.seed)
     while not (world.terminated or world.truncated):
         world.step(policy)
 
 
 def records(world: World) -> Iterator[StepRecord]:
     """Run a world step by step and tell of every step."""
-    policy, observer = ready_policy(world), Observer(world)
+    policy, observer = each_another(), Observer(world)
+    policy.begin(world.tables, world.n_brigades, world.seed)
     yield observer.record()
     while not (world.terminated or world.truncated):
         yield observer.record(world.step(policy))

@@ -20,6 +20,8 @@ class Contender:
     name: str
     run: Callable[[Any], object]
     prepare: Callable[[], Any] = lambda: None
+    parts: int = 1
+    """Into how many equal parts the time is divided: steps or calls of one repetition."""
 
 
 @dataclass(frozen=True)
@@ -42,11 +44,11 @@ class Row:
 
 
 def once(contender: Contender) -> float:
-    """Time one repetition, seconds."""
+    """Time one repetition; seconds of one of its parts."""
     work = contender.prepare()
     start = time.perf_counter()
     contender.run(work)
-    return time.perf_counter() - start
+    return (time.perf_counter() - start) / contender.parts
 
 
 def measure(group: str, what: str, size: str, contender: Contender, *, seconds: float) -> Row:

@@ -1,36 +1,139 @@
-"""Rows of the whole world: episodes with a team, in one compiled call and step by step from Python."""
+"""Rows of the whole world: episodes with a team, in one compiled call, step by step from Python, and in plain numpy."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache, partial
 
-from benchmarks.fires import LOTS, city_of
-from benchmarks.runs import new_world, run_silently
+import numpy as np
+
+from benchmarks.fires import KINDS, LOTS, Kind, city_of, every_eighth, from_the_middle, tables_of
+from benchmarks.runs import SEED, new_world, run_silently, start_of
 from benchmarks.timing import Contender, Row, compare
-from fireworld.policy.kernel import each_another
+from fireworld.parameters import PAPER, Parameters
+from fireworld.policy.kernel import KernelPolicy, always
+from fireworld.records import ACTIONS
 from fireworld.world.state import copy_into, copy_world
 from fireworld.world.world import World
+from tests.reference import episode
+
+N_STEPS = 100
+POLICY = always(ACTIONS.index("nearest-to-me"))
+N_CANDIDATES = 30
 
 
-def episode_row(size: int, n_steps: int, *, seconds: float) -> Row:
-    """Time an episode with four brigades: `World.run` against `World.step`; the outcome is the same."""
-    world = new_world(size, n_steps)
-    start = copy_world(world.arrays)
+def parameters_of(kind: Kind) -> Parameters:
+    """Return the paper's parameters; a small fire gets a tenth of the water, or it would be out in a few steps."""
+    brigades = PAPER.brigades
+    if kind == "hot":
+        return PAPER
+    return replace(
+        PAPER,
+        brigades=replace(
+            brigades,
+            tank_litres=brigades.tank_litres // 10,
+            power_litres=brigades.power_litres // 10,
+            refuge_refill_litres=brigades.refuge_refill_litres // 10,
+        ),
+    )
 
-    def again() -> World:
+
+def world_of(size: int, kind: Kind, ignited: np.ndarray) -> World:
+    """Set up a compiled world of the episode rows."""
+    return World(
+        city_of(size),
+        parameters_of(kind),
+        **start_of(size, ignited),
+        seed=SEED,
+        n_steps_max=N_STEPS,
+        tables=tables_of(size),
+    )
+
+
+@cache
+def smallest_fire(size: int) -> int:
+    """Return the building whose fire stays smallest while it outlasts the episode.
+
+    Of the thirty wooden buildings nearest to the middle, that with the fewest burning buildings at every tenth step.
+    """
+    best, fewest = -1, None
+    for building, _ in zip(from_the_middle(city_of(size)), range(N_CANDIDATES), strict=False):
+        world, total = world_of(size, "small", np.array([building])), 0
+        ready = POLICY.for_brigades(world.n_brigades)
+        for last in range(10, N_STEPS + 1, 10):
+            world.n_steps_max = last
+            world.run(ready)
+            total += int(world.arrays.outcome.counts[0])
+        if not world.terminated and (fewest is None or total < fewest):
+            best, fewest = building, total
+    assert best >= 0, "some fire outlasts the episode"
+    return best
+
+
+def episode_row(size: int, kind: Kind, *, seconds: float) -> Row:
+    """Time an episode with four brigades: one compiled call against plain numpy; both end alike."""
+    city = city_of(size)
+    ignited = every_eighth(city) if kind == "hot" else np.array([smallest_fire(size)])
+    tables = episode.Tables.of_city(city, parameters_of(kind))
+    begin = episode.World.at_start(tables, **start_of(size, ignited))
+    world = world_of(size, kind, ignited)
+    ours = Contender("compiled", partial(run_compiled, policy=POLICY), again(world))
+
+    def in_numpy(fresh: episode.World) -> int:
+        return episode.run_episode(tables, fresh, POLICY, seed=SEED, first_step=1, last_step=N_STEPS)
+
+    end = begin.copy()
+    n_steps = in_numpy(end)
+    assert n_steps == run_compiled(again(world)(), policy=POLICY) == N_STEPS
+    assert_same_end(end, world)
+    label = f"{city.n_buildings} buildings, {len(ignited)} ignited, {end.outcome.n_burning} burning at the end"
+    baseline = Contender("numpy", in_numpy, begin.copy)
+    return compare("world", f"episode of {N_STEPS} steps, {kind} fire", label, ours, baseline, seconds=seconds)
+
+
+def again(world: World) -> partial[World]:
+    """Return what sets a world back to where it is now."""
+    start, step = copy_world(world.arrays), world.step_number
+
+    def reset() -> World:
         copy_into(world.arrays, start)
-        world.step_number = 0
+        world.step_number = step
         return world
 
-    def compiled(fresh: World) -> object:
-        return fresh.run(each_another().for_brigades(fresh.n_brigades))
+    return partial(reset)
 
-    ours, baseline = Contender("World.run", compiled, again), Contender("World.step", run_silently, again)
+
+def run_compiled(world: World, *, policy: KernelPolicy) -> int:
+    """Run a world to its end in one compiled call."""
+    return world.run(policy.for_brigades(world.n_brigades))
+
+
+def assert_same_end(plain: episode.World, compiled: World) -> None:
+    """Make sure that both engines have come to the same end."""
+    arrays, outcome = compiled.arrays, plain.outcome
+    np.testing.assert_array_equal(arrays.fire.fieryness, plain.fire.fieryness)
+    np.testing.assert_array_equal(arrays.fire.water, plain.fire.water)
+    np.testing.assert_allclose(arrays.fire.energy, plain.fire.energy, rtol=1e-9, atol=1e-6)
+    assert arrays.brigades.tank.tolist() == [brigade.tank_litres for brigade in plain.team]
+    assert arrays.outcome.counts[3] == outcome.n_civilians_alive
+    assert arrays.outcome.water[0] == outcome.water_litres
+
+
+def stepping_row(size: int, n_steps: int, *, seconds: float) -> Row:
+    """Time what it costs to go step by step from Python, as a recorded run does."""
+    world = new_world(size, n_steps)
+    fresh = again(world)
+    ours = Contender("World.run", partial(run_compiled, policy=POLICY), fresh)
+    baseline = Contender("World.step", partial(run_silently, policy=POLICY), fresh)
     label = f"{city_of(size).n_buildings} buildings, {world.n_brigades} brigades"
-    return compare("world", f"episode of {n_steps} steps", label, ours, baseline, seconds=seconds)
+    return compare("world", f"episode of {n_steps} steps, hot fire", label, ours, baseline, seconds=seconds)
 
 
 def rows(*, quick: bool) -> Iterator[Row]:
     """Yield the rows of the world."""
+    seconds = 0.3 if quick else 2.0
     for size in list(LOTS)[:2] if quick else LOTS:
-        yield episode_row(size, 100 if quick else 300, seconds=0.3 if quick else 2.0)
+        for kind in KINDS:
+            yield episode_row(size, kind, seconds=seconds)
+    yield stepping_row(100 if quick else 1000, N_STEPS, seconds=seconds)

@@ -96,6 +96,6 @@ PAPER: Final = Parameters(
 PRESETS: Final = {"official-2011": OFFICIAL_2011, "official-2013": OFFICIAL_2013, "paper": PAPER}
 
 
-def field_names(section: type[FireParameters] | type[HealthParameters] | type[BrigadeParameters]) -> list[str]:
+def field_names(section: type[FireParameters | HealthParameters | BrigadeParameters]) -> list[str]:
     """List the keys that a scenario may set in one section."""
     return [item.name for item in fields(section)]

@@ -212,7 +212,9 @@ class Buildings:
     """The fire after the step."""
 
     topic: ClassVar[str] = "/buildings"
-    temperature: Array = column(1, "float", "(n,) degrees above ambient, to the nearest 1/64; exact is energy / heat_capacity")
+    temperature: Array = column(
+        1, "float", "(n,) degrees above ambient, to the nearest 1/64; exact is energy / heat_capacity"
+    )
     energy: Array = column(2, "double", "(n,) heat, energy units, exact")
     fuel_share: Array = column(3, "float", "(n,) share of the initial fuel that is left, single precision")
     water_litres: Array = column(4, "sfixed32", "(n,) water lying on the building")
@@ -275,8 +277,11 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class StepRecord:
-    """One committed step. Step 0 is the state before the first step: it has no draws, choices or rewards yet
-    (empty arrays and zeros), but buildings, brigades, civilians and score are there."""
+    """One committed step.
+
+    Step 0 is the state before the first step: it has no draws, choices or rewards yet (empty arrays and zeros), but
+    buildings, brigades, civilians and score are there.
+    """
 
     step: int
     draws: Draws
@@ -326,9 +331,15 @@ class Recording(Protocol):
     """A recorded run as a viewer or a table reads it."""
 
     @property
-    def header(self) -> RunHeader: ...
+    def header(self) -> RunHeader:
+        """What identifies the run."""
+        ...
+
     @property
-    def city(self) -> CityRecord: ...
+    def city(self) -> CityRecord:
+        """The city it ran in."""
+        ...
+
     @property
     def steps(self) -> Array:
         """(k,) int64: the committed steps, rising."""

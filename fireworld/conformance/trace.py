@@ -182,7 +182,9 @@ def _requests(arrays: Arrays, city: CityFile, *, n_steps: int) -> Int64Array | N
     """Read the requests with their results, by step; they must be those of the city file."""
     if "requests" not in arrays:
         return None
-    rows = arrays.integers("requests", None, 5, low=-INTEGER_MAX, high=INTEGER_MAX)
+    rows = np.zeros((0, 5), dtype=np.int64)
+    if arrays.get("requests").size:  # a list of no requests is often stored without its second axis
+        rows = arrays.integers("requests", None, 5, low=-INTEGER_MAX, high=INTEGER_MAX)
     rows = rows[np.argsort(rows[:, 0], kind="stable")]
     asked = [
         [step, request.brigade_id, request.target_id, request.litres]

@@ -22,6 +22,7 @@ class _Closed(CPUDispatcher):  # type: ignore[misc]  # numba is untyped
     """An inner function: compiled code without the entry that Python would need, where numba itself would crash."""
 
     def __call__(self, *args: object, **kwargs: object) -> NoReturn:
+        del args, kwargs
         raise TypeError(f"{self.py_func.__name__} is for kernels only; FIREWORLD_OPEN_KERNELS=1 opens it to Python")
 
 

@@ -1,4 +1,4 @@
-"""A rule that a sensible chief would give: one brigade between the fire and the people, the others at the nearest front."""
+"""A sensible chief's rule: one brigade between the fire and the people, the others at the nearest front."""
 
 from __future__ import annotations
 

@@ -190,6 +190,10 @@ def test_a_list_of_burn_rates_for_each_building(write):
     assert not check(MINI, write("mini_sd", burn_rate_draws=each)).passed
 
 
+def test_no_requests_at_all(write):
+    assert check(MINI, write(requests=np.array([]), tank=np.zeros((121, 0)), brigade_id=np.array([]))).passed
+
+
 def test_thin_traces(write):
     arrays, kept = trace_arrays("mini"), np.array([0, 7, 50, 119])
     thin = {key: arrays[key][kept] for key in ("energy", "temperature", "fuel", "water", "ever_watered")}

@@ -252,12 +252,12 @@ TABLE_1 = {
     "train-6": (14, 9, 4),
     "train-7": (20, 9, 4),
     "train-8": (6, 11, 4),
-    "test-1": (11, 11, 4),
+    "test-1": (9, 11, 4),
     "test-2": (10, 11, 4),
-    "test-3": (16, 9, 4),
-    "test-1-brigades-7": (11, 11, 7),
+    "test-3": (11, 9, 4),
+    "test-1-brigades-7": (9, 11, 7),
     "test-2-brigades-8": (10, 11, 8),
-    "test-3-brigades-8": (16, 9, 8),
+    "test-3-brigades-8": (11, 9, 8),
 }
 """Burning buildings, civilians, brigades."""
 
