@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import sys
 from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Final
@@ -11,7 +12,7 @@ from typing import Final
 import click
 
 from benchmarks.machine import describe
-from benchmarks.timing import Row
+from benchmarks.timing import Row, duration
 
 SECTIONS: Final = {
     "fire": "fire_rows",
@@ -22,23 +23,12 @@ SECTIONS: Final = {
     "start-up": "start_rows",
 }
 """Module of each section; each has `rows(*, quick) -> Iterator[Row]`."""
+WIDTH: Final = 150
+"""Of the table in a file."""
 CAPTION: Final = (
     "Medians. The ratio is baseline / ours, the median of rounds in turn, with its quartiles; "
     "below 1 where ours does more than the baseline, and shows what that costs."
 )
-UNITS: Final = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
-
-
-def duration(seconds: float | None) -> str:
-    """Write a time with three digits and a fitting unit.
-
-    >>> duration(0.0123456)
-    '12.3 ms'
-    """
-    if seconds is None:
-        return ""
-    scale, unit = next((item for item in UNITS if seconds >= item[0]), UNITS[-1])
-    return f"{seconds / scale:.3g} {unit}"
 
 
 def times(ratio: float | None, low: float | None, high: float | None) -> str:
@@ -57,7 +47,7 @@ def print_table(found: list[Row], machine: dict[str, str]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    console = Console()
+    console = Console(width=None if sys.stdout.isatty() else WIDTH)
     console.print(", ".join(f"{name} {value}" for name, value in machine.items()), highlight=False)
     table = Table(caption=CAPTION)
     for name in ("", "what", "size"):

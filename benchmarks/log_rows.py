@@ -16,7 +16,7 @@ import numpy as np
 
 from benchmarks.fires import city_of
 from benchmarks.runs import header, new_world, record_of, records, run_silently, write_log
-from benchmarks.timing import Contender, Row, compare, measure
+from benchmarks.timing import Contender, Row, compare, duration, measure
 from fireworld.policy.kernel import each_another
 from fireworld.records import STEP_TOPICS, StepRecord
 from fireworld.world.world import World
@@ -71,7 +71,9 @@ def run_row(size: int, n_steps: int, folder: Path, *, seconds: float) -> Row:
     ours = Contender("recorded", recorded, fresh)
     baseline = Contender("not recorded", partial(run_silently, policy=each_another()), fresh)
     label = f"{city_of(size).n_buildings} buildings, {path.stat().st_size / 1e6:.2f} MB"
-    return compare("log", f"run of {n_steps} steps", label, ours, baseline, seconds=seconds)
+    row = compare("log", f"run of {n_steps} steps", label, ours, baseline, seconds=seconds)
+    extra = (row.seconds - (row.baseline_seconds or 0.0)) / n_steps
+    return replace(row, size=f"{label}, recording adds {duration(extra)} a step")
 
 
 def read_rows(size: int, n_steps: int, folder: Path, *, seconds: float) -> Iterator[Row]:

@@ -11,6 +11,7 @@ from typing import Any, Final
 
 ROUNDS_MIN: Final = 5
 ROUNDS_MAX: Final = 2000
+UNITS: Final = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,18 @@ class Row:
     ratio_high: float | None = None  # third quartile
     rounds: int = 0
     note: str = ""
+
+
+def duration(seconds: float | None) -> str:
+    """Write a time with three digits and a fitting unit.
+
+    >>> duration(0.0123456)
+    '12.3 ms'
+    """
+    if seconds is None:
+        return ""
+    scale, unit = next((item for item in UNITS if seconds >= item[0]), UNITS[-1])
+    return f"{seconds / scale:.3g} {unit}"
 
 
 def once(contender: Contender) -> float:

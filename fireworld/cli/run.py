@@ -108,8 +108,7 @@ def _carry_out(run: Run, *, output: Path | None, force: bool, quiet: bool) -> tu
     except PolicyError as error:
         if output is None or last is None:
             raise
-        kept = f"{output}{PARTIAL_SUFFIX} holds the {last.step + 1} records up to step {last.step}"
-        raise PolicyError(f"{error}; {kept}") from error
+        raise PolicyError(f"{error}; steps 0 to {last.step} are kept in {output}{PARTIAL_SUFFIX}") from error
     assert last is not None  # noqa: S101 - a run yields its start before anything else
     return last, sink.digest
 

@@ -50,8 +50,9 @@ def load_policy(name: str) -> NamedPolicy:
     if ":" in name:
         return _load_own(name)
     if name not in BUILT_IN:
-        near = get_close_matches(name, BUILT_IN, n=1)
-        hint = f"did you mean {near[0]}?" if near else "MODULE:CLASS names one of your own"
+        meant = name.lower()
+        near = [known for known in BUILT_IN if meant and meant in known] or get_close_matches(meant, BUILT_IN, n=1)
+        hint = "try " + " or ".join(near) if near else "MODULE:CLASS names one of your own"
         raise PolicyError(expected("--policy", "", "one of " + ", ".join(BUILT_IN), name, hint))
     policy = BUILT_IN[name]()
     return NamedPolicy(name, policy.digest, policy)

@@ -177,13 +177,13 @@ def health_constants(health: HealthParameters) -> HealthConstants:
 
 def brigade_constants(brigades: BrigadeParameters) -> BrigadeConstants:
     """Turn metres into millimetres."""
-    range_mm = brigades.range_m * 1000.0
+    range_mm = round(brigades.range_m * 1000.0)  # whole, so that a brigade exactly at its range may spray
     return BrigadeConstants(
         tank=brigades.tank_litres,
         power=brigades.power_litres,
         refuge_refill=brigades.refuge_refill_litres,
         hydrant_refill=brigades.hydrant_refill_litres,
-        range_square=range_mm * range_mm,
+        range_square=float(range_mm * range_mm),
         speed=round(brigades.speed_m * 1000.0),
     )
 

@@ -1,0 +1,87 @@
+"""Ctrl-C and kill: a recording ends with the last step done, whatever happens and wherever it happens."""
+
+from __future__ import annotations
+
+import json
+import signal
+
+import pytest
+
+from recorder.reader import open_log
+from recorder.writer import StepFile
+
+RECORD = ("run", "quick", "--record", "a.mcap", "--policy")
+
+
+def test_ctrl_c_ends_the_recording_at_the_step_under_way(here, fireworld, fireworld_process, files):
+    done = fireworld_process(*RECORD, "policies:Interrupted", "--json")
+    assert done.code == 130
+    outcome = json.loads(done.out)
+    assert (outcome["ended"], outcome["steps"]) == ("interrupted", 5)
+    assert files() == ["a.mcap"]
+    info = json.loads(fireworld("info", "a.mcap", "--json").out)
+    assert (info["state"], info["steps"]["last"], info["digest"]) == ("complete", 5, outcome["digest"])
+    assert info["ending"] == "stopped before its end"
+    assert fireworld("verify", "a.mcap").code == 0
+
+
+def test_ctrl_c_without_a_recording(here, fireworld_process, files):
+    done = fireworld_process("run", "quick", "--policy", "policies:Interrupted")
+    assert done.code == 130
+    assert "interrupted after step 5" in done.err
+    assert "Traceback" not in done.err
+    assert files() == []
+
+
+def test_a_second_ctrl_c_stops_at_once(here, fireworld, fireworld_process, files):
+    done = fireworld_process(*RECORD, "policies:InterruptedTwice")
+    assert done.code == 130
+    assert "Traceback" not in done.err
+    assert files() == ["a.mcap.partial"]
+    assert fireworld("recover", "a.mcap.partial", "-o", "b.mcap").code == 0
+    assert open_log(here / "b.mcap").steps.tolist() == [0, 1, 2, 3, 4]
+
+
+@pytest.mark.parametrize("moment", ["before", "after"])
+def test_ctrl_c_while_a_step_is_written(here, fireworld, files, monkeypatch, moment):
+    """The writer is in the middle of a step when the signal comes: the step is finished, the recording whole."""
+    commit = StepFile.commit
+
+    def interrupted_commit(self, step, messages):
+        if step == 7 and moment == "before":
+            signal.raise_signal(signal.SIGINT)
+        commit(self, step, messages)
+        if step == 7 and moment == "after":
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(StepFile, "commit", interrupted_commit)
+    monkeypatch.setattr(signal, "getsignal", lambda number: signal.default_int_handler)
+    done = fireworld(*RECORD, "policies:Near")
+    assert done.code == 130
+    assert files() == ["a.mcap"]
+    assert open_log(here / "a.mcap").steps.tolist() == list(range(8))
+
+
+def test_the_handler_is_taken_back(here, fireworld):
+    before = signal.getsignal(signal.SIGINT)
+    assert fireworld(*RECORD, "policies:Near", "--steps", 3).code == 0
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_killed_run_loses_the_step_under_way_and_no_more(here, fireworld, fireworld_process, files):
+    assert fireworld_process(*RECORD, "policies:Killed").code == -signal.SIGKILL
+    assert files() == ["a.mcap.partial"]
+    info = fireworld("info", "a.mcap.partial", "--json")
+    assert info.code == 1
+    assert json.loads(info.out)["steps"]["last"] == 4
+    again = fireworld(*RECORD, "policies:Near")
+    assert again.code == 2
+    assert "try `fireworld recover` to keep its steps, or --force to replace it" in again.err
+    recovered = fireworld("recover", "a.mcap.partial", "-o", "b.mcap")
+    assert recovered.code == 0
+    assert "5 steps, up to step 4" in recovered.out
+    assert fireworld("info", "b.mcap").code == 0
+    assert fireworld("verify", "b.mcap").code == 0
+    assert fireworld(*RECORD, "policies:Near", "--force", "--steps", 4).code == 0
+    assert fireworld("diff", "a.mcap", "b.mcap").code == 1, "one ended there, the other was cut off"
+    assert files() == ["a.mcap", "b.mcap"]

@@ -1,0 +1,99 @@
+"""The conformance test that any policy inherits: the built-in ones pass, policies with a fault do not."""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+import pytest
+
+from fireworld.errors import PolicyError
+from fireworld.policy.kernel import from_tables
+from fireworld.policy.names import BUILT_IN, load_policy
+from fireworld.policy.protocol import Action, Decision
+from fireworld.testing import PolicyConformance
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+class TestBuiltIn(PolicyConformance):
+    @pytest.fixture(autouse=True)
+    def _named(self, name):
+        self.name = name
+
+    def make_policy(self):
+        return load_policy(self.name).policy
+
+
+class TestExploringTable(PolicyConformance):
+    def make_policy(self):
+        tables = np.random.default_rng(1).normal(size=(2, 4320, 4))
+        return from_tables(tables, epsilon=0.5)
+
+
+class AlwaysNear:
+    def decide(self, observation):
+        return Decision(Action.NEAREST_TO_ME)
+
+
+class TestOwn(PolicyConformance):
+    def make_policy(self):
+        return AlwaysNear()
+
+
+class Global:
+    def decide(self, observation):
+        return Decision(random.randrange(4))  # noqa: S311 - the fault
+
+
+class GlobalNumpy:
+    def decide(self, observation):
+        return Decision(int(np.random.randint(4)))  # noqa: NPY002 - the fault
+
+
+class Meddler:
+    def decide(self, observation):
+        observation.world.fire.energy[0] += 1.0
+        return Decision(0)
+
+
+class Unseeded:
+    def __init__(self):
+        self.random = np.random.default_rng()
+
+    def decide(self, observation):
+        return Decision(int(self.random.integers(4)))
+
+
+class Forgetful:
+    """Counts on through runs, because it has no `begin`."""
+
+    def __init__(self):
+        self.asked = 0
+
+    def decide(self, observation):
+        self.asked += 1
+        return Decision(min(self.asked // 20, 3))
+
+
+class Wordless:
+    def decide(self, observation):
+        return None
+
+
+@pytest.mark.parametrize(
+    ("make", "test", "message"),
+    [
+        (object, "test_has_a_method_decide", "has a method decide"),
+        (Wordless, "test_decides_in_every_step", "expected a Decision"),
+        (Meddler, "test_decides_in_every_step", "changed the world's fire.energy"),
+        (Global, "test_decides_in_every_step", "global randomness"),
+        (GlobalNumpy, "test_decides_in_every_step", "global randomness"),
+        (Unseeded, "test_same_seed_same_decisions", "one seed led to two runs"),
+        (Forgetful, "test_begins_anew", "something of the run before is left"),
+    ],
+)
+def test_faults_are_found(make, test, message):
+    conformance = PolicyConformance()
+    conformance.make_policy = make
+    with pytest.raises((AssertionError, PolicyError), match=message):
+        getattr(conformance, test)()
