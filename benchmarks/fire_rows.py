@@ -29,7 +29,7 @@ def call_row(*, seconds: float) -> Row:
     n_arrays = sum(len(group) for group in groups[:-1])
 
     def call(_: None) -> None:
-        for _ in range(CALLS):
+        for _call in range(CALLS):
             do_nothing(*groups)
 
     contender = Contender("compiled", call, parts=CALLS)

@@ -56,6 +56,23 @@ def write_row(size: int, folder: Path, *, seconds: float) -> Row:
     return row
 
 
+def observe_row(size: int, n_steps: int, *, seconds: float) -> Row:
+    """Time the making of records that nobody writes, step by step of a run."""
+
+    def fresh() -> World:
+        return new_world(size, n_steps)
+
+    def observed(world: World) -> None:
+        for _ in records(world):
+            pass
+
+    n_made = sum(1 for _ in records(fresh()))
+    ours = Contender("observed", observed, fresh, parts=n_made)
+    baseline = Contender("not observed", partial(run_silently, policy=each_another()), fresh, parts=n_made)
+    label = f"{city_of(size).n_buildings} buildings"
+    return compare("log", "run and record in memory, a step", label, ours, baseline, seconds=seconds)
+
+
 def run_row(size: int, n_steps: int, folder: Path, *, seconds: float) -> Row:
     """Time a run that is recorded against the same run that is not."""
 
@@ -68,6 +85,7 @@ def run_row(size: int, n_steps: int, folder: Path, *, seconds: float) -> Row:
         write_log(path, world)
 
     recorded(fresh())
+    n_steps = len(open_log(path)) - 1  # all of them, unless nothing burns any more
     ours = Contender("recorded", recorded, fresh)
     baseline = Contender("not recorded", partial(run_silently, policy=each_another()), fresh)
     label = f"{city_of(size).n_buildings} buildings, {path.stat().st_size / 1e6:.2f} MB"
@@ -101,5 +119,6 @@ def rows(*, quick: bool) -> Iterator[Row]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         yield write_row(size, folder, seconds=seconds)
+        yield observe_row(size, n_steps, seconds=seconds)
         yield run_row(size, n_steps, folder, seconds=seconds)
         yield from read_rows(size, n_steps, folder, seconds=seconds)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
-from benchmarks.fires import city_of, every_eighth, tables_of
-from fireworld.city.city import Array
+from benchmarks.fires import city_of, tables_of
+from fireworld.city.city import Array, City
 from fireworld.city.record import city_record
 from fireworld.parameters import PAPER
 from fireworld.policy.kernel import KernelPolicy, each_another
@@ -20,10 +20,11 @@ from recorder.writer import LogWriter
 
 N_BRIGADES: Final = 4
 N_CIVILIANS: Final = 10
+N_CORNER: Final = 40
 SEED: Final = 1
 
 
-def start_of(size: int, ignited: Array) -> dict[str, Array]:
+def start_of(size: int, ignited: Array) -> dict[str, Any]:
     """Place ten civilians all over a city, and four brigades at its refuges in turn; (k,) buildings burn."""
     city = city_of(size)
     inflammable = np.flatnonzero(city.footprints.inflammable)
@@ -37,13 +38,20 @@ def start_of(size: int, ignited: Array) -> dict[str, Array]:
     }
 
 
+def from_the_corner(city: City) -> Array:
+    """Return the forty inflammable buildings nearest to the south-west corner: a fire that lasts hundreds of steps."""
+    inflammable = np.flatnonzero(city.footprints.inflammable)
+    distance = city.footprints.centroid_mm[inflammable].astype(np.int64).sum(axis=1)
+    return np.sort(inflammable[np.argsort(distance, kind="stable")[:N_CORNER]])
+
+
 def new_world(size: int, n_steps: int) -> World:
-    """Set up a world with a team and a hot fire."""
+    """Set up a world with a team and a fire that spreads from a corner."""
     city = city_of(size)
     return World(
         city,
         PAPER,
-        **start_of(size, every_eighth(city)),
+        **start_of(size, from_the_corner(city)),
         seed=SEED,
         n_steps_max=n_steps,
         tables=tables_of(size),

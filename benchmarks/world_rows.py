@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache, partial
@@ -11,6 +12,7 @@ import numpy as np
 from benchmarks.fires import KINDS, LOTS, Kind, city_of, every_eighth, from_the_middle, tables_of
 from benchmarks.runs import SEED, new_world, run_silently, start_of
 from benchmarks.timing import Contender, Row, compare
+from fireworld.city.city import Array
 from fireworld.parameters import PAPER, Parameters
 from fireworld.policy.kernel import KernelPolicy, always
 from fireworld.records import ACTIONS
@@ -39,7 +41,7 @@ def parameters_of(kind: Kind) -> Parameters:
     )
 
 
-def world_of(size: int, kind: Kind, ignited: np.ndarray) -> World:
+def world_of(size: int, kind: Kind, ignited: Array) -> World:
     """Set up a compiled world of the episode rows."""
     return World(
         city_of(size),
@@ -57,7 +59,7 @@ def smallest_fire(size: int) -> int:
 
     Of the thirty wooden buildings nearest to the middle, that with the fewest burning buildings at every tenth step.
     """
-    best, fewest = -1, None
+    best, fewest = -1, math.inf
     for building, _ in zip(from_the_middle(city_of(size)), range(N_CANDIDATES), strict=False):
         world, total = world_of(size, "small", np.array([building])), 0
         ready = POLICY.for_brigades(world.n_brigades)
@@ -65,7 +67,7 @@ def smallest_fire(size: int) -> int:
             world.n_steps_max = last
             world.run(ready)
             total += int(world.arrays.outcome.counts[0])
-        if not world.terminated and (fewest is None or total < fewest):
+        if not world.terminated and total < fewest:
             best, fewest = building, total
     assert best >= 0, "some fire outlasts the episode"
     return best
@@ -127,7 +129,7 @@ def stepping_row(size: int, n_steps: int, *, seconds: float) -> Row:
     ours = Contender("World.run", partial(run_compiled, policy=POLICY), fresh)
     baseline = Contender("World.step", partial(run_silently, policy=POLICY), fresh)
     label = f"{city_of(size).n_buildings} buildings, {world.n_brigades} brigades"
-    return compare("world", f"episode of {n_steps} steps, hot fire", label, ours, baseline, seconds=seconds)
+    return compare("world", f"episode of {n_steps} steps, spreading fire", label, ours, baseline, seconds=seconds)
 
 
 def rows(*, quick: bool) -> Iterator[Row]:

@@ -85,6 +85,7 @@ def _carry_out(run: Run, *, output: Path | None, force: bool, quiet: bool) -> tu
 
     Raises:
         PolicyError: the policy failed; the steps before are in the partial recording.
+        SystemExit: a second Ctrl-C; likewise.
         OutputError: the recording cannot be written.
     """
     from fireworld.errors import PolicyError
@@ -105,10 +106,14 @@ def _carry_out(run: Run, *, output: Path | None, force: bool, quiet: bool) -> tu
                 last = record
                 if interrupted.is_set():
                     break
-    except PolicyError as error:
-        if output is None or last is None:
-            raise
-        raise PolicyError(f"{error}; steps 0 to {last.step} are kept in {output}{PARTIAL_SUFFIX}") from error
+    except (PolicyError, KeyboardInterrupt) as error:
+        where = ""
+        if output is not None and last is not None:
+            where = f"; steps 0 to {last.step} are kept in {output}{PARTIAL_SUFFIX}"
+        if isinstance(error, PolicyError):
+            raise PolicyError(f"{error}{where}") from error
+        click.echo(f"interrupted within a step{where}", err=True)
+        raise SystemExit(INTERRUPTED) from error
     assert last is not None  # noqa: S101 - a run yields its start before anything else
     return last, sink.digest
 

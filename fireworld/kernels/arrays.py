@@ -158,6 +158,7 @@ class ObservationConstants(NamedTuple):
     civilian_low_square: float
     civilian_medium_square: float
     unit_volume: float
+    in_turn: bool  # brigades see what those before them chose in this step; if not, what all chose in the last
 
 
 class Constants(NamedTuple):
@@ -252,3 +253,21 @@ class PolicyTables(NamedTuple):
     table_of: Array  # (b,) int32, the table of kind 2
     tables: Array  # (tables, states, 4) float64
     epsilon: Array  # (1,) float64, probability of a random action instead of the greedy one
+    commit: Array  # (1,) int64, steps that a choice is kept for; 1: a new choice every step
+
+
+class Learner(NamedTuple):
+    """What a team that learns changes and remembers; b brigades."""
+
+    learning: Array  # (1,) uint8, 0: leave everything as it is
+    rule: Array  # (1,) int64: 0 SARSA, 1 expected SARSA, 2 Q-learning
+    alpha: Array  # (1,) float64, learning rate
+    alpha_decay: Array  # (1,) float64: the rate of the n-th visit is alpha / (1 + alpha_decay * (n - 1))
+    gamma: Array  # (1,) float64, discount
+    tables: Array  # (tables, states, 4) float64, the policy's own
+    visits: Array  # (tables, states, 4) int64
+    state: Array  # (b,) int64, row of the last choice, -1 none
+    action: Array  # (b,) int64
+    reward: Array  # (b,) float64, discounted reward since
+    discount: Array  # (b,) float64, discount since
+    td_error: Array  # (b,) float64, error of the last update

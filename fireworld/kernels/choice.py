@@ -48,6 +48,16 @@ def choose(brigade: int, state: int, policy: PolicyTables, seed: int, step: int)
 
 
 @kernel
+def keeps_choice(brigade: int, last_action: int, commit: int, step: int) -> bool:
+    """Tell whether a brigade goes on with what it chose before.
+
+    Choices are kept for `commit` steps by a clock that all share, brigade after brigade; a brigade that did nothing
+    chooses at once.
+    """
+    return commit > 1 and last_action >= 0 and (step + brigade) % commit != 0
+
+
+@kernel
 def table_state(state: int, n_states: int) -> int:
     """Return the row of a table for a state of 4320: tables of 270 rows leave out the four flags."""
     return state if n_states == 4320 else state // 16

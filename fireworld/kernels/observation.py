@@ -61,15 +61,21 @@ def site_place(brigade: int, brigades: BrigadeState, sites: SiteState) -> int:
 
 @kernel
 def observe(
-    brigade: int, brigades: BrigadeState, sites: SiteState, constants: ObservationConstants, features: Array
+    brigade: int,
+    actions: Array,
+    brigades: BrigadeState,
+    sites: SiteState,
+    constants: ObservationConstants,
+    features: Array,
 ) -> int:
     """Write the eight features that a brigade sees and return its state; -1 (features 0) without a site. MODEL 5.
 
-    The flags tell what the other brigades chose: those before it in this step, those after it in the last one,
-    because choices are written into `brigades.action` one after another.
+    Given `brigades.action`, into which choices are written one after another, the flags tell what the others chose:
+    those before it in this step, those after it in the last one.
 
     Args:
         brigade: who looks.
+        actions: (b,) what the brigades do, -1 nothing.
         brigades: the team.
         sites: fire sites of the moment.
         constants: thresholds.
@@ -85,9 +91,9 @@ def observe(
     features[1] = level(sites.center_square[site], constants.center_low_square, constants.center_medium_square)
     features[2] = level(sites.civilian_square[site], constants.civilian_low_square, constants.civilian_medium_square)
     features[3] = volume_class(sites.volume[site], constants.unit_volume)
-    for other in range(len(brigades.action)):
-        if other != brigade and brigades.action[other] >= 0:
-            features[4 + brigades.action[other]] = 1
+    for other in range(len(actions)):
+        if other != brigade and actions[other] >= 0:
+            features[4 + actions[other]] = 1
     return state_index(features)
 
 

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from fireworld.kernels.arrays import Array, CityTables, PolicyTables
-from fireworld.kernels.choice import FIXED, RANDOM, TABLE, choose, explores, table_state
+from fireworld.kernels.choice import FIXED, RANDOM, TABLE, choose, explores, keeps_choice, table_state
 from fireworld.policy.protocol import Decision, Observation
 from fireworld.records import ACTIONS
 
@@ -29,6 +29,8 @@ class KernelPolicy:
     tables: Array
     """(tables, states, 4) float64, states 4320 or 270."""
     epsilon: float = 0.0
+    commit: int = 1
+    """Steps that a choice is kept for."""
     _ready: PolicyTables | None = field(default=None, init=False, repr=False, compare=False)
 
     def for_brigades(self, n_brigades: int) -> PolicyTables:
@@ -40,6 +42,7 @@ class KernelPolicy:
             table_of=np.array(self.table_of, dtype=np.int32)[turn],
             tables=np.ascontiguousarray(self.tables, dtype=np.float64),
             epsilon=np.array([self.epsilon]),
+            commit=np.array([self.commit], dtype=np.int64),
         )
 
     def begin(self, city: CityTables, n_brigades: int, seed: int) -> None:
@@ -64,10 +67,14 @@ class KernelPolicy:
             epsilon=self.epsilon,
         )
 
+    def keeps(self, brigade: int, last_action: int, step: int) -> bool:
+        """Tell whether a brigade goes on with what it chose before."""
+        return bool(keeps_choice(brigade, last_action, self.commit, step))
+
     @property
     def digest(self) -> str:
         """SHA-256 of what the policy does."""
-        content = hashlib.sha256(repr((self.kinds, self.actions, self.table_of, self.epsilon)).encode())
+        content = hashlib.sha256(repr((self.kinds, self.actions, self.table_of, self.epsilon, self.commit)).encode())
         content.update(repr(self.tables.shape).encode() + np.ascontiguousarray(self.tables, dtype="<f8").tobytes())
         return content.hexdigest()
 
@@ -88,7 +95,13 @@ def at_random() -> KernelPolicy:
     return KernelPolicy((RANDOM,), (0,), (0,), NO_TABLES)
 
 
-def from_tables(tables: Array, *, epsilon: float = 0.0) -> KernelPolicy:
-    """Return the policy that follows one table per brigade. tables: (tables, 4320 or 270, 4)."""
+def from_tables(tables: Array, *, epsilon: float = 0.0, commit: int = 1) -> KernelPolicy:
+    """Return the policy that follows one table per brigade.
+
+    Args:
+        tables: (tables, 4320 or 270, 4) values.
+        epsilon: probability of a random action.
+        commit: steps that a choice is kept for.
+    """
     n = len(tables)
-    return KernelPolicy((TABLE,) * n, (0,) * n, tuple(range(n)), tables, epsilon)
+    return KernelPolicy((TABLE,) * n, (0,) * n, tuple(range(n)), tables, epsilon, commit)

@@ -96,7 +96,8 @@ class Policy(Protocol):
             def decide(self, observation):
                 return Decision(Action.NEAREST_TO_ME)
 
-    A policy may also have `begin(city, n_brigades, seed)`, called before the first step of every run.
+    A policy may also have `begin(city, n_brigades, seed)`, called before the first step of every run, and
+    `keeps(brigade, last_action, step)`, true if a brigade goes on with its last action and is not to be asked.
     """
 
     def decide(self, observation: Observation) -> Decision:

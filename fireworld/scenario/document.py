@@ -18,6 +18,7 @@ from fireworld.parameters import PRESETS, BrigadeParameters, FireParameters, Hea
 
 Preset = Literal["official-2011", "official-2013", "paper"]
 Reward = Literal["stock", "change"]
+Choices = Literal["in-turn", "simultaneous"]
 Direction = Literal["N", "E", "S", "W"]
 DIRECTIONS: Final[tuple[Direction, ...]] = ("N", "E", "S", "W")
 
@@ -188,6 +189,10 @@ class Document(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     reward: Annotated[
         Reward, Meta(description="`stock`, the paper's: the state's cost at every step; `change`: how it changed.")
     ] = "stock"
+    choices: Annotated[
+        Choices,
+        Meta(description="`in-turn`: brigades see what those before them chose in this step; or `simultaneous`."),
+    ] = "in-turn"
     unit_volume_m3: Annotated[
         Annotated[float, POSITIVE] | None,
         Meta(description="Unit of the burning volume a brigade sees; null is twice the mean building volume."),

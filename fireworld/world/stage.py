@@ -45,6 +45,7 @@ class Stage:
             n_steps_max=self.scenario.steps if n_steps_max is None else n_steps_max,
             reward_change=self.scenario.reward == "change",
             unit_volume_m3=self.scenario.unit_volume_m3,
+            in_turn=self.scenario.choices == "in-turn",
             tables=self.tables,
         )
 

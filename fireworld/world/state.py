@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from fireworld.kernels.arrays import (
     BrigadeState,
     CivilianState,
     FireState,
+    Learner,
     Outcome,
     SiteState,
     WorldArrays,
@@ -116,6 +117,30 @@ def fresh_outcome() -> Outcome:
         water=np.zeros(1),
         draws=np.zeros(2),
     )
+
+
+def fresh_learner(
+    tables: Array, n_brigades: int, *, rule: int = 0, alpha: float = 0.7, alpha_decay: float = 0.0, gamma: float = 0.5
+) -> Learner:
+    """Return the memory of a team that learns into `tables`, (tables, states, 4); the rates are the paper's."""
+    return Learner(
+        learning=np.ones(1, dtype=np.uint8),
+        rule=np.array([rule], dtype=np.int64),
+        alpha=np.array([alpha]),
+        alpha_decay=np.array([alpha_decay]),
+        gamma=np.array([gamma]),
+        tables=tables,
+        visits=np.zeros(tables.shape, dtype=np.int64),
+        state=np.full(n_brigades, -1, dtype=np.int64),
+        action=np.zeros(n_brigades, dtype=np.int64),
+        reward=np.zeros(n_brigades),
+        discount=np.ones(n_brigades),
+        td_error=np.zeros(n_brigades),
+    )
+
+
+NO_LEARNER: Final = fresh_learner(np.zeros((1, 1, 4)), 0)._replace(learning=np.zeros(1, dtype=np.uint8))
+"""Of a team that learns nothing."""
 
 
 def fresh_world(

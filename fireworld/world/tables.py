@@ -188,7 +188,7 @@ def brigade_constants(brigades: BrigadeParameters) -> BrigadeConstants:
     )
 
 
-def observation_constants(city: City, unit_volume_m3: float | None) -> ObservationConstants:
+def observation_constants(city: City, unit_volume_m3: float | None, *, in_turn: bool) -> ObservationConstants:
     """Derive the thresholds of the features: thirds of the half diagonal, 30 and 80 m, the unit volume."""
     third = city.half_diagonal_mm / 3.0
     mean_volume = math.fsum(city.volume_m3.tolist()) / city.n_buildings
@@ -199,18 +199,24 @@ def observation_constants(city: City, unit_volume_m3: float | None) -> Observati
         civilian_low_square=low * low,
         civilian_medium_square=medium * medium,
         unit_volume=float(unit_volume_m3) if unit_volume_m3 is not None else 2.0 * mean_volume,
+        in_turn=in_turn,
     )
 
 
 def world_constants(
-    city: City, parameters: Parameters, *, reward_change: bool = False, unit_volume_m3: float | None = None
+    city: City,
+    parameters: Parameters,
+    *,
+    reward_change: bool = False,
+    unit_volume_m3: float | None = None,
+    in_turn: bool = True,
 ) -> Constants:
     """Collect all scalars of a world."""
     return Constants(
         fire=fire_constants(parameters.fire),
         health=health_constants(parameters.health),
         brigades=brigade_constants(parameters.brigades),
-        observation=observation_constants(city, unit_volume_m3),
+        observation=observation_constants(city, unit_volume_m3, in_turn=in_turn),
         reward_change=reward_change,
     )
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fireworld.city.city import City
-from fireworld.kernels.arrays import Array, CityTables, Constants, PolicyTables, WorldArrays
+from fireworld.kernels.arrays import Array, CityTables, Constants, Learner, PolicyTables, WorldArrays
 from fireworld.kernels.brigades import act
 from fireworld.kernels.fire import advance_fire, draw_burn_rates, ignite
 from fireworld.kernels.health import harm_brigades, harm_civilians
@@ -17,7 +17,7 @@ from fireworld.kernels.sites import find_sites
 from fireworld.parameters import Parameters
 from fireworld.policy.asking import ask
 from fireworld.policy.protocol import Decision, Observation, Policy
-from fireworld.world.state import fresh_world
+from fireworld.world.state import NO_LEARNER, fresh_world
 from fireworld.world.tables import city_tables, world_constants
 
 NO_DECISION = Decision(-1)
@@ -58,6 +58,7 @@ class World:
         n_steps_max: int,
         reward_change: bool = False,
         unit_volume_m3: float | None = None,
+        in_turn: bool = True,
         tables: CityTables | None = None,
     ) -> None:
         """Set up the world before its first step.
@@ -73,13 +74,14 @@ class World:
             n_steps_max: last step.
             reward_change: reward the change of the stock instead of the stock.
             unit_volume_m3: unit of the volume feature; None: twice the mean building.
+            in_turn: brigades see what those before them chose in this step; if not, what all chose in the last one.
             tables: of the same city and parameters, if they have been built already.
         """
         self.city = city
         self.parameters = parameters
         self.tables = tables if tables is not None else city_tables(city, parameters.fire)
         self.constants: Constants = world_constants(
-            city, parameters, reward_change=reward_change, unit_volume_m3=unit_volume_m3
+            city, parameters, reward_change=reward_change, unit_volume_m3=unit_volume_m3, in_turn=in_turn
         )
         self.seed = seed
         self.n_steps_max = n_steps_max
@@ -122,8 +124,13 @@ class World:
         self._assess()
         return choices
 
-    def run(self, policy: PolicyTables) -> int:
-        """Run to the end without a word to Python; return the last step. Same phases, same luck, same outcome."""
+    def run(self, policy: PolicyTables, learner: Learner = NO_LEARNER) -> int:
+        """Run to the end without a word to Python; return the last step. Same phases, same luck, same outcome.
+
+        Args:
+            policy: what the brigades follow.
+            learner: what they learn meanwhile; by default nothing.
+        """
         if self.terminated or self.truncated:
             return self.step_number
         from fireworld.kernels.episode import run_episode  # the largest kernel: compiled only where it is used
@@ -134,6 +141,7 @@ class World:
                 self.arrays,
                 self.constants,
                 policy,
+                learner,
                 self.seed,
                 self.step_number + 1,
                 self.n_steps_max,
@@ -161,12 +169,18 @@ class World:
         decisions = [NO_DECISION] * self.n_brigades
         brigades = self.arrays.brigades
         brigades.target[:] = -1
+        before = brigades.action.copy()
+        shown = brigades.action if self.constants.observation.in_turn else before
+        keeps = getattr(policy, "keeps", None)
         for brigade in range(self.n_brigades):
             states[brigade] = observe(
-                brigade, self.arrays.brigades, self.arrays.sites, self.constants.observation, features[brigade]
+                brigade, shown, brigades, self.arrays.sites, self.constants.observation, features[brigade]
             )
-            if can_choose(brigade, self.arrays.brigades, self.arrays.sites):
-                decisions[brigade] = self._ask(policy, brigade, features[brigade], int(states[brigade]))
+            if can_choose(brigade, brigades, self.arrays.sites):
+                if keeps is not None and keeps(brigade, int(before[brigade]), self.step_number):
+                    decisions[brigade] = Decision(int(before[brigade]))
+                else:
+                    decisions[brigade] = self._ask(policy, brigade, features[brigade], int(states[brigade]))
                 brigades.target[brigade] = self._target(brigade, decisions[brigade].action)
             brigades.action[brigade] = decisions[brigade].action
         return Choices(features=features, state_index=states, decisions=tuple(decisions))

@@ -113,7 +113,7 @@ def fireworld_process():
             capture_output=True,
             text=True,
             check=False,
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509 - no threads here
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         )
         return Done(done.returncode, done.stdout, done.stderr)
 

@@ -36,7 +36,7 @@ def test_ctrl_c_without_a_recording(here, fireworld_process, files):
 def test_a_second_ctrl_c_stops_at_once(here, fireworld, fireworld_process, files):
     done = fireworld_process(*RECORD, "policies:InterruptedTwice")
     assert done.code == 130
-    assert "Traceback" not in done.err
+    assert done.err == "interrupted within a step; steps 0 to 4 are kept in a.mcap.partial\n"
     assert files() == ["a.mcap.partial"]
     assert fireworld("recover", "a.mcap.partial", "-o", "b.mcap").code == 0
     assert open_log(here / "b.mcap").steps.tolist() == [0, 1, 2, 3, 4]
@@ -55,7 +55,7 @@ def test_ctrl_c_while_a_step_is_written(here, fireworld, files, monkeypatch, mom
             signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr(StepFile, "commit", interrupted_commit)
-    monkeypatch.setattr(signal, "getsignal", lambda number: signal.default_int_handler)
+    monkeypatch.setattr(signal, "getsignal", lambda _: signal.default_int_handler)
     done = fireworld(*RECORD, "policies:Near")
     assert done.code == 130
     assert files() == ["a.mcap"]

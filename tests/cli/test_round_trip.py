@@ -7,6 +7,8 @@ import shutil
 
 import pytest
 
+from fireworld.city.generator import generate_plan
+from fireworld.city.plan_file import dump_plan
 from recorder.reader import open_log
 
 
@@ -60,17 +62,25 @@ def test_a_replay_needs_the_recording_alone(here, fireworld, policy):
 
 
 def test_a_replay_of_a_changed_scenario(here, fireworld):
-    record(fireworld, "a.mcap", "--set", "brigades.n=5", "--set", "reward=change", "--set", "parameters.fire.burn_rate_sd=0.1")
+    record(
+        fireworld,
+        "a.mcap",
+        "--set",
+        "brigades.n=5",
+        "--set",
+        "reward=change",
+        "--set",
+        "parameters.fire.burn_rate_sd=0.1",
+    )
     assert fireworld("verify", "a.mcap").code == 0
     assert "5 brigades" in fireworld("info", "a.mcap").out
 
 
 def test_a_scenario_of_ones_own_in_a_city_of_ones_own(here, fireworld):
     """The city file travels with the recording."""
-    (here / "city.json").write_text(CITY)
-    (here / "mine.yaml").write_text(
-        "city: {file: city.json}\nfires: [{buildings: [1]}]\ncivilians: {buildings: [2]}\nbrigades: {n: 1}\nsteps: 20\n"
-    )
+    plan = generate_plan(columns=5, rows=4, seed=9)
+    (here / "city.json").write_text(json.dumps(dump_plan(plan)))
+    (here / "mine.yaml").write_text("city: {file: city.json}\nfires: [{at: [0.5, 0.5], n_buildings: 2}]\nsteps: 20\n")
     done = fireworld("run", "mine.yaml", "--record", "a.mcap", "--json")
     assert done.code == 0, done.err
     (here / "city.json").unlink()

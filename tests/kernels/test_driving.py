@@ -73,6 +73,14 @@ def test_ways(world, start, goal, expected):
     assert (length // METRE, leave, arrive) == expected
 
 
+def test_of_two_ways_of_one_length_the_one_by_the_first_nodes_is_taken():
+    """Halfway along one side of a square, the goal halfway along the opposite one."""
+    corners = [(0, 0), (100, 0), (100, 100), (0, 100)]
+    city = make_city(square(50, 112), nodes_m=corners, streets=[(0, 1), (1, 2), (3, 2), (3, 0)])
+    streets = make_world(city).tables.streets
+    assert way(0, 50 * METRE, 2, 50 * METRE, streets) == (200 * METRE, 0, 3)
+
+
 def test_of_two_streets_between_two_nodes_the_first_shortest_is_taken():
     city = make_city(square(50, 12), nodes_m=[(0, 0), (100, 0)], streets=[(0, 1), (1, 0)])
     assert street_between(0, 1, make_world(city).tables.streets) == 0

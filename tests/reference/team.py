@@ -335,4 +335,4 @@ def first_in_range(
         for mm in range(max(1, enters - 1), min(enters + 3, way_mm + 1)):
             if square(mm) <= range_square:
                 return mm
-    return way_mm if square(way_mm) <= range_square else None
+    return None

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 from fireworld import draws
 from fireworld.city.build import build_city
-from fireworld.city.city import City
+from fireworld.city.city import City, StreetMap
 from fireworld.city.generator import generate_plan
+from fireworld.city.streets import streets_of
 from fireworld.kernels.observation import observe
 from fireworld.parameters import PAPER
 from fireworld.policy.kernel import always, at_random, each_another, from_tables
@@ -22,7 +23,7 @@ from fireworld.records import ACTIVITIES
 from fireworld.scenario import load_scenario
 from fireworld.world.stage import build_stage
 from fireworld.world.world import World
-from tests.reference import episode, luck, team
+from tests.reference import episode, luck, sites, team
 
 RANDOM = np.random.default_rng(5)
 POLICIES = {
@@ -63,14 +64,18 @@ def assert_same(compiled: World, plain: episode.World) -> None:
     assert np.concatenate([some.hp for some in everybody]).tolist() == plain.people.hp.tolist(), step
     np.testing.assert_allclose(np.concatenate([some.damage for some in everybody]), plain.people.damage, rtol=1e-12)
 
-    told = plain.outcome
+    assert outcome.water[0] == plain.outcome.water_litres, step
+    assert_same_outcome(compiled, plain)
+
+
+def assert_same_outcome(compiled: World, plain: episode.World) -> None:
+    """Compare counts, rewards and scores."""
+    step, outcome, told = f"step {compiled.step_number}", compiled.arrays.outcome, plain.outcome
     counts = [told.n_burning, told.n_water_damaged, told.n_burnt_out, told.n_civilians_alive]
     assert outcome.counts.tolist() == counts, step
     assert outcome.reward.tolist() == [*told.reward, sum(told.reward), told.reward_so_far], step
-    assert outcome.water[0] == told.water_litres, step
-    assert outcome.score.tolist() == pytest.approx(
-        [told.score, plain.people.n_civilians + 1, told.score_now], rel=1e-12, abs=1e-12
-    ), step
+    scores = [told.score, plain.people.n_civilians + 1, told.score_now]
+    assert outcome.score.tolist() == pytest.approx(scores, rel=1e-12, abs=1e-12), step
 
 
 @dataclass(frozen=True)
@@ -81,10 +86,9 @@ class Play:
     tables: episode.Tables
     start: dict[str, Any]  # what both take to set up a world
 
-    def run(self, policy: str, *, seed: int, n_steps: int) -> tuple[episode.World, list[set[int]]]:
-        """Live through an episode; return the numpy world at its end, and what each brigade has done."""
+    def worlds(self, *, seed: int, n_steps: int) -> tuple[World, episode.World]:
+        """Set up both worlds."""
         tables = self.tables
-        plain = episode.World.at_start(tables, **self.start)
         compiled = World(
             self.city,
             tables.parameters,
@@ -94,18 +98,27 @@ class Play:
             reward_change=tables.reward_change,
             unit_volume_m3=tables.sites.volume_bounds[0],
         )
-        ready, done = POLICIES[policy].for_brigades(compiled.n_brigades), [set() for _ in plain.team]
+        return compiled, episode.World.at_start(tables, **self.start)
+
+    def run(self, policy: str, *, seed: int, n_steps: int) -> tuple[episode.World, set[int]]:
+        """Live through an episode; return the numpy world at its end, and all that brigades have done."""
+        compiled, plain = self.worlds(seed=seed, n_steps=n_steps)
+        done: set[int] = set()
         assert_same(compiled, plain)
         for step in range(1, n_steps + 1):
-            compiled.n_steps_max = step  # the whole-episode kernel, a step at a time
-            compiled.run(ready)
-            episode.advance(tables, plain, POLICIES[policy], seed=seed, step=step)
-            assert_same(compiled, plain)
-            for activities, brigade in zip(done, plain.team, strict=True):
-                activities.add(brigade.activity)
+            step_both(compiled, plain, self.tables, policy, step=step)
+            done |= {brigade.activity for brigade in plain.team}
             if compiled.terminated:
                 break
         return plain, done
+
+
+def step_both(compiled: World, plain: episode.World, tables: episode.Tables, policy: str, *, step: int) -> None:
+    """Run one step in both worlds and compare them."""
+    compiled.n_steps_max = step  # the whole-episode kernel, a step at a time
+    compiled.run(POLICIES[policy].for_brigades(compiled.n_brigades))
+    episode.advance(tables, plain, POLICIES[policy], seed=compiled.seed, step=step)
+    assert_same(compiled, plain)
 
 
 @cache
@@ -141,7 +154,7 @@ def rough(seed: int) -> Play:
     plan = replace(plan, footprints=replace(plan.footprints, inflammable=np.ones_like(plan.footprints.inflammable)))
     parameters = replace(
         PAPER,
-        health=replace(PAPER.health, brigade_share=1.0),
+        health=replace(PAPER.health, brigade_share=0.6),
         brigades=replace(
             PAPER.brigades, tank_litres=1700, power_litres=800, refuge_refill_litres=300, range_m=23.7, speed_m=51.3
         ),
@@ -164,47 +177,114 @@ def test_a_town_where_everything_happens(policy):
     seen: set[int] = set()
     for seed in (1, 2, 3):
         plain, done = rough(seed).run(policy, seed=seed, n_steps=250)
-        seen |= set().union(*done)
+        seen |= done
         assert plain.outcome.n_burnt_out > 20
         assert plain.memory.last_number > 5
     assert seen >= set(range(1, len(ACTIVITIES))), "from driving to death"
+
+
+def lattice() -> StreetMap:
+    """Make streets of 25 m, all listed twice in no order: most ways tie with others, and every street with its twin."""
+    side = np.arange(9)
+    x, y = (axis.ravel() for axis in np.meshgrid(side, side))
+    node = np.arange(len(x)).reshape(9, 9)
+    east, north = np.stack([node[:, :-1], node[:, 1:]]), np.stack([node[:-1], node[1:]])
+    street = np.concatenate([east.reshape(2, -1).T, north.reshape(2, -1).T] * 2)
+    return StreetMap(
+        node_mm=(np.stack([x, y], axis=1) * 25_000).astype(np.int32),
+        street=np.random.default_rng(2).permutation(street).astype(np.int32),
+        hydrant_node=np.array([40, 12], dtype=np.int32),
+    )
+
+
+def place_at(play: Play, compiled: World, plain: episode.World, places: list[team.Place]) -> None:
+    """Put the brigades somewhere, in both worlds."""
+    for who, place in enumerate(places):
+        brigades, brigade = compiled.arrays.brigades, plain.team[who]
+        brigades.street[who], brigades.offset[who] = place
+        brigade.place = place
+        brigade.x, brigade.y = play.tables.streets.locate(place)
+        brigades.x[who], brigades.y[who] = brigade.x, brigade.y
+
+
+def test_driving_where_ways_tie_and_refilling_where_brigades_queue():
+    play = rough(3)
+    streets = streets_of(lattice(), play.city.footprints.centroid_mm)
+    city = replace(play.city, streets=streets)
+    play = Play(city, episode.Tables.of_city(city, play.tables.parameters), play.start)
+    random = np.random.default_rng(4)
+    for seed in range(60):
+        compiled, plain = play.worlds(seed=seed, n_steps=3)
+        street = random.integers(0, len(streets.street), len(plain.team))
+        offset = random.integers(0, 3, len(plain.team)) * 12_500  # at an end, or halfway
+        places = [team.Place(int(a), int(b)) for a, b in zip(street, offset, strict=True)]
+        of_hydrant = int(np.flatnonzero((streets.street == streets.hydrant_node[seed % 2]).any(axis=1))[0])
+        places[2:5] = [play.tables.streets.end(of_hydrant, int(streets.hydrant_node[seed % 2]))] * 3
+        place_at(play, compiled, plain, places)
+        for brigade, tank in enumerate(random.choice([0, 300, 1700], len(plain.team)).tolist()):
+            compiled.arrays.brigades.tank[brigade] = plain.team[brigade].tank_litres = tank
+            compiled.arrays.brigades.refilling[brigade] = plain.team[brigade].refilling = tank == 0
+        for step in (1, 2, 3):
+            step_both(compiled, plain, play.tables, "random", step=step)
 
 
 @given(st.integers(0, 2**32 - 1))
 @settings(deadline=None, max_examples=60)
 def test_sites_of_fires_that_jump_about(seed):
     """Far wilder than real fires: sites merge, split and trade numbers at every step."""
-    play, random = shipped("quick"), np.random.default_rng(seed)
-    compiled = World(play.city, play.tables.parameters, **play.start, seed=0, n_steps_max=1)
-    fire, found = compiled.arrays.fire, compiled.arrays.sites
-    plain = episode.World.at_start(play.tables, **play.start)
+    play, random = rough(1), np.random.default_rng(seed)
+    compiled, plain = play.worlds(seed=0, n_steps=1)
+    fire, people, found = compiled.arrays.fire, compiled.arrays.civilians, compiled.arrays.sites
     n = play.city.n_buildings
+    share = random.choice([0.03, 0.1, 0.2])  # that burns
     for _ in range(12):
-        changing = random.random(n) < random.choice([0.05, 0.3])
-        fire.fieryness[changing] = random.choice([0, 1, 3, 4, 8], changing.sum(), p=[0.7, 0.1, 0.1, 0.05, 0.05])
-        people = compiled.arrays.civilians
-        people.hp[:] = random.integers(0, 2, len(people.hp))
-        compiled._look()
+        changing = random.random(n) < random.choice([0.05, 0.5])
+        codes = random.choice([0, 1, 3, 4, 6, 8], n, p=[0.8 - share, share / 2, share / 2, 0.1, 0.05, 0.05])
+        fire.fieryness[changing] = codes[changing]
         plain.fire.fieryness = fire.fieryness.copy()
+        people.hp[:] = random.integers(0, 2, len(people.hp))
         plain.people.hp[: len(people.hp)] = people.hp
+        if random.random() < 0.5:  # as if the buildings had burnt in quite other sites
+            last = int(found.counts[1]) + 1
+            found.label[:] = random.integers(0, last, n)
+            plain.memory.label = found.label.astype(np.int64)
+            for who, brigade in enumerate(plain.team):
+                brigade.site = compiled.arrays.brigades.site[who] = int(random.integers(0, last))
+        compiled._look()
         seen = episode.look(play.tables, plain)
         assert found.label.tolist() == plain.memory.label.tolist()
         assert found.counts[1] == plain.memory.last_number
         assert compiled.arrays.brigades.site.tolist() == [brigade.site for brigade in plain.team]
-        if seen is None:
-            assert found.counts[0] == 0
-            continue
-        n_sites = found.counts[0]
-        assert found.number[:n_sites].tolist() == seen.number
-        assert found.free_sides[:n_sites].tolist() == seen.free_sides
-        for site in range(n_sites):
-            of_site = found.member[found.start[site] : found.start[site + 1]]
-            assert sorted(of_site.tolist()) == seen.member[seen.members(site)].tolist()
-        np.testing.assert_array_equal(found.building_civilian_square[seen.member], seen.civilian_square)
-        for who in range(compiled.n_brigades):
-            features = np.zeros(8, dtype=np.int64)
-            state = observe(who, compiled.arrays.brigades, found, compiled.constants.observation, features)
-            assert state == team.observe(plain.team, who, seen)
+        assert_same_sites(compiled, plain, seen)
+        compiled._assess()
+        episode.assess(play.tables, plain)
+        assert_same_outcome(compiled, plain)
+
+
+def assert_same_sites(compiled: World, plain: episode.World, seen: sites.Sites | None) -> None:
+    """Compare the sites of a moment, and what the brigades make of them."""
+    found = compiled.arrays.sites
+    n_sites = found.counts[0]
+    assert n_sites == (0 if seen is None else len(seen.number))
+    if seen is None:
+        return
+    assert found.number[:n_sites].tolist() == seen.number
+    assert found.free_sides[:n_sites].tolist() == seen.free_sides
+    for site in range(n_sites):
+        of_site = found.member[found.start[site] : found.start[site + 1]]
+        assert sorted(of_site.tolist()) == seen.member[seen.members(site)].tolist()
+    np.testing.assert_array_equal(found.building_civilian_square[seen.member], seen.civilian_square)
+    for who in range(compiled.n_brigades):
+        features = np.zeros(8, dtype=np.int64)
+        state = observe(
+            who,
+            compiled.arrays.brigades.action,
+            compiled.arrays.brigades,
+            found,
+            compiled.constants.observation,
+            features,
+        )
+        assert state == team.observe(plain.team, who, seen)
 
 
 @given(
