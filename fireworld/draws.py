@@ -29,6 +29,8 @@ STEP: Final = 9
 """Purpose: the key that names all the luck of a step. Entity: 0."""
 TABLE: Final = 10
 """Purpose: which brigade's table is taken over between scenarios. Entity: scenario."""
+EPISODE: Final = 11
+"""Purpose: the seed of an episode of training. Entity: scenario; step: episode."""
 
 MASK: Final = (1 << 64) - 1
 INCREMENT: Final = 0x9E3779B97F4A7C15

@@ -23,6 +23,10 @@ class PolicyError(FireworldError):
     """A policy that cannot be found, loaded or asked for a decision."""
 
 
+class TrainingError(FireworldError):
+    """A curriculum, method, team file or checkpoint that cannot be used."""
+
+
 class LogError(FireworldError):
     """A recording that cannot be read, written, compared or replayed."""
 

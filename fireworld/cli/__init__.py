@@ -8,6 +8,9 @@ from typing import Final
 
 import click
 
+USER_ERROR: Final = 2
+INTERRUPTED: Final = 130
+
 COMMANDS: Final = {
     "run": "Run a scenario and record it.",
     "scenarios": "List the scenarios, or draw one.",
@@ -55,11 +58,18 @@ def root() -> None:
 
 
 def main() -> None:
-    """Run the command line; a user's mistake ends in one line and exit code 2."""
+    """Run the command line; a user's mistake ends in one line and exit code 2, Ctrl-C in exit code 130."""
     from fireworld.errors import FireworldError
 
     try:
-        root.main(standalone_mode=True)
+        code = root.main(standalone_mode=False)
     except FireworldError as error:
         click.echo(f"fireworld: {error}", err=True)
-        sys.exit(2)
+        code = USER_ERROR
+    except click.ClickException as error:
+        error.show()
+        code = error.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("interrupted", err=True)
+        code = INTERRUPTED
+    sys.exit(code)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
 
 if TYPE_CHECKING:
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from fireworld.records import StepRecord
     from fireworld.runs import Run
 
-INTERRUPTED: Final = 130
 POLICIES_HELP: Final = (
     "easiest, nearest-to-civilian, nearest-to-center, nearest-to-me, each-another, random, chief, "
     "or MODULE:CLASS of your own."

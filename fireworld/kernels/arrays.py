@@ -16,6 +16,7 @@ Array = NDArray[Any]
 class BuildingTables(NamedTuple):
     """What is fixed of each building, (n,)."""
 
+    building_id: Array  # int64, keys the building's luck and breaks ties
     order: Array  # uint32, in which the air exchange visits the buildings
     capacity: Array  # float64, energy per degree (a float32 number)
     initial_fuel: Array  # float32, energy
@@ -74,7 +75,6 @@ class FireState(NamedTuple):
 class GeometryTables(NamedTuple):
     """Where the buildings are and how big they are, (n,) float64; lengths in millimetres."""
 
-    building_id: Array  # int64, breaks ties
     x: Array  # centroid
     y: Array
     west: Array  # bounding box of the outline

@@ -49,7 +49,7 @@ def draw_burn_rates(
 ) -> float:
     """Draw the burn rate of every burning building from N(mean, sd) and return their sum; MODEL 2.3.
 
-    Keyed by building and step: which other buildings burn changes nobody's luck.
+    Keyed by the building's id and the step: which other buildings burn changes nobody's luck.
     """
     total = 0.0
     for b in range(len(fire.energy)):
@@ -57,7 +57,9 @@ def draw_burn_rates(
             fire.energy[b], buildings.capacity[b], buildings.ignition_point[b], fire.fuel[b], buildings.inflammable[b]
         )
         if hot:
-            rate = constants.burn_rate_mean + constants.burn_rate_sd * normal(seed, BURN_RATE, b, step)
+            rate = constants.burn_rate_mean + constants.burn_rate_sd * normal(
+                seed, BURN_RATE, buildings.building_id[b], step
+            )
             fire.rate[b] = rate
             total += rate
     return total

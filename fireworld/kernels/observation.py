@@ -126,7 +126,7 @@ def find_target(
         if (
             best < 0
             or measure < best_measure
-            or (measure == best_measure and geometry.building_id[b] < geometry.building_id[best])
+            or (measure == best_measure and buildings.building_id[b] < buildings.building_id[best])
         ):
             best, best_measure = b, measure
     return best

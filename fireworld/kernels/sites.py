@@ -16,31 +16,38 @@ from fireworld.kernels.jit import inner, kernel
 
 FAR = 1e300
 NORTH, EAST, SOUTH, WEST = 1, 2, 4, 8
+NOWHERE, WAITING = -1, -2
+"""Places of buildings that do not burn, and of burning ones whose site is not known yet."""
 
 
 @inner
 def gather(fire: FireState, near: NearTables, sites: SiteState) -> None:
     """Group the burning buildings into connected sets, in order of their lowest building index."""
-    n = len(fire.fieryness)
-    for b in range(n):
-        sites.place[b] = -1
+    place, member = sites.place, sites.member
+    n_burning = 0
+    for b in range(len(place)):
+        burning = 1 <= fire.fieryness[b] <= 3
+        place[b] = WAITING if burning else NOWHERE
+        n_burning += burning
     n_sites, n_members = 0, 0
-    for b in range(n):
-        if not 1 <= fire.fieryness[b] <= 3 or sites.place[b] >= 0:
+    for b in range(len(place)):
+        if n_members == n_burning:
+            break
+        if place[b] != WAITING:
             continue
         sites.start[n_sites] = n_members
-        sites.place[b] = n_sites
-        sites.member[n_members] = b
+        place[b] = n_sites
+        member[n_members] = b
         head = n_members
         n_members += 1
-        while head < n_members:
-            here = sites.member[head]
+        while head < n_members < n_burning:
+            here = member[head]
             head += 1
             for k in range(near.ptr[here], near.ptr[here + 1]):
                 there = near.building[k]
-                if 1 <= fire.fieryness[there] <= 3 and sites.place[there] < 0:
-                    sites.place[there] = n_sites
-                    sites.member[n_members] = there
+                if place[there] == WAITING:
+                    place[there] = n_sites
+                    member[n_members] = there
                     n_members += 1
         n_sites += 1
     sites.start[n_sites] = n_members
@@ -92,7 +99,7 @@ def number_sites(sites: SiteState) -> None:
 
 
 @inner
-def nearest_burning(x: float, y: float, geometry: GeometryTables, sites: SiteState) -> int:
+def nearest_burning(x: float, y: float, buildings: BuildingTables, geometry: GeometryTables, sites: SiteState) -> int:
     """Return the burning building whose centroid is nearest to a point (ties: lowest id), -1 if nothing burns."""
     best, best_square = -1, FAR
     for k in range(sites.counts[2]):
@@ -100,7 +107,7 @@ def nearest_burning(x: float, y: float, geometry: GeometryTables, sites: SiteSta
         dx, dy = geometry.x[b] - x, geometry.y[b] - y
         square = dx * dx + dy * dy
         closer = square < best_square or (
-            square == best_square and geometry.building_id[b] < geometry.building_id[best]
+            square == best_square and buildings.building_id[b] < buildings.building_id[best]
         )
         if closer:
             best, best_square = b, square
@@ -108,7 +115,9 @@ def nearest_burning(x: float, y: float, geometry: GeometryTables, sites: SiteSta
 
 
 @inner
-def assign_brigades(brigades: BrigadeState, geometry: GeometryTables, sites: SiteState) -> None:
+def assign_brigades(
+    brigades: BrigadeState, buildings: BuildingTables, geometry: GeometryTables, sites: SiteState
+) -> None:
     """Keep every brigade with its site; follow a site that merged; send it to the nearest fire when its site is out.
 
     Runs before the labels of the step before are overwritten: they tell where a merged site went.
@@ -128,7 +137,7 @@ def assign_brigades(brigades: BrigadeState, geometry: GeometryTables, sites: Sit
                     brigades.site[brigade] = sites.number[sites.place[b]]
                     break
         if brigades.site[brigade] == 0:
-            b = nearest_burning(brigades.x[brigade], brigades.y[brigade], geometry, sites)
+            b = nearest_burning(brigades.x[brigade], brigades.y[brigade], buildings, geometry, sites)
             if b >= 0:
                 brigades.site[brigade] = sites.number[sites.place[b]]
 
@@ -178,31 +187,43 @@ def measure_sites(geometry: GeometryTables, sites: SiteState) -> None:
 
 
 @inner
+def sides_beyond(x: float, y: float, west: float, south: float, east: float, north: float) -> int:
+    """Return the sides of a box, as bits, beyond which a point lies."""
+    sides = NORTH if y > north else 0
+    if x > east:
+        sides |= EAST
+    if y < south:
+        sides |= SOUTH
+    return sides | WEST if x < west else sides
+
+
+@inner
 def find_free_sides(
     buildings: BuildingTables, links: LinkTables, geometry: GeometryTables, fire: FireState, sites: SiteState
 ) -> None:
-    """Find the sides over which a site can spread: the centroid of an unburnt linked building is beyond; MODEL 5.1."""
+    """Find the sides over which a site can spread: the centroid of an unburnt linked building is beyond; MODEL 5.1.
+
+    Beyond some sides of a large fire there is nothing left to burn: the search ends once all others are found free.
+    """
+    low_x, low_y, high_x, high_y = FAR, FAR, -FAR, -FAR  # bounds of all that can still catch fire
+    for b in range(len(fire.fieryness)):
+        if (fire.fieryness[b] == 0 or fire.fieryness[b] == 4) and buildings.inflammable[b] != 0:
+            x, y = geometry.x[b], geometry.y[b]
+            low_x, low_y, high_x, high_y = min(low_x, x), min(low_y, y), max(high_x, x), max(high_y, y)
     for site in range(sites.counts[0]):
+        west, south, east, north = sites.west[site], sites.south[site], sites.east[site], sites.north[site]
+        possible = sides_beyond(low_x, low_y, west, south, east, north)
+        possible |= sides_beyond(high_x, high_y, west, south, east, north)
         sides = 0
-        west, south = sites.west[site], sites.south[site]
-        east, north = sites.east[site], sites.north[site]
         for k in range(sites.start[site], sites.start[site + 1]):
+            if sides == possible:
+                break
             b = sites.member[k]
             for link in range(links.ptr[b], links.ptr[b + 1]):
                 there = links.building[link]
                 code = fire.fieryness[there]
-                if code in (0, 4) and buildings.inflammable[there] != 0:
-                    x, y = geometry.x[there], geometry.y[there]
-                    if y > north:
-                        sides |= NORTH
-                    if x > east:
-                        sides |= EAST
-                    if y < south:
-                        sides |= SOUTH
-                    if x < west:
-                        sides |= WEST
-            if sides == NORTH | EAST | SOUTH | WEST:
-                break
+                if (code == 0 or code == 4) and buildings.inflammable[there] != 0:  # noqa: PLR1714
+                    sides |= sides_beyond(geometry.x[there], geometry.y[there], west, south, east, north)
         sites.free_sides[site] = sides
 
 
@@ -220,7 +241,7 @@ def find_sites(
     """Find and measure the fire sites of the moment and settle which brigade belongs to which."""
     gather(fire, near, sites)
     number_sites(sites)
-    assign_brigades(brigades, geometry, sites)
+    assign_brigades(brigades, buildings, geometry, sites)
     relabel(sites)
     civilian_squares(civilians, fire, geometry, sites)
     measure_sites(geometry, sites)

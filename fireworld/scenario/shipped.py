@@ -13,7 +13,7 @@ from fireworld.scenario.scenario import Scenario, read_scenario
 
 def scenario_names() -> list[str]:
     """Name the scenarios that come with fireworld, numbers in counting order."""
-    return sorted((path.stem for path in _folder().glob("*.yaml")), key=_counting_order)
+    return sorted((path.stem for path in shipped_folder().glob("*.yaml")), key=_counting_order)
 
 
 def load_scenario(name_or_path: str | Path) -> Scenario:
@@ -24,7 +24,7 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     """
     names = scenario_names()
     if str(name_or_path) in names:
-        return read_scenario(_folder() / f"{name_or_path}.yaml", source=str(name_or_path))
+        return read_scenario(shipped_folder() / f"{name_or_path}.yaml", source=str(name_or_path))
     path = Path(name_or_path)
     if path.suffix in {".yaml", ".yml"} or path.parent != Path() or path.is_file():
         return read_scenario(path)
@@ -32,7 +32,7 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     raise ScenarioError(expected("scenario", "", "the name of a scenario or a .yaml file", str(name_or_path), hint))
 
 
-def _folder() -> Path:
+def shipped_folder() -> Path:
     """Return the folder of the shipped scenarios: inside the package, or at the top of a checkout."""
     package = Path(fireworld.__file__).parent
     inside = package / "scenarios"

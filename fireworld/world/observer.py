@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -174,24 +173,36 @@ class Observer:
     def _events(self) -> Events:
         """Tell what changed, in the order of the phases."""
         before, arrays = self._before, self.world.arrays
-        brigades, civilians, site = arrays.brigades, arrays.civilians, arrays.sites.label
-        code, code_before = arrays.fire.fieryness, before.fieryness
-        burns, burnt_before = _is_burning(code), _is_burning(code_before)
+        brigades, civilians = arrays.brigades, arrays.civilians
         refilled = (before.refilling == 1) & (brigades.refilling == 0) & (brigades.activity == REFILLING)
         return _events(
             [
                 ("refilled", np.flatnonzero(refilled)),
                 ("tank-empty", np.flatnonzero((before.tank > 0) & (brigades.tank == 0))),
-                ("ignited", np.flatnonzero(burns & ~burnt_before)),
-                ("extinguished", np.flatnonzero(burnt_before & ~burns & (code != BURNT_OUT))),
-                ("burnt-out", np.flatnonzero((code == BURNT_OUT) & (code_before != BURNT_OUT))),
-                ("site-out", np.setdiff1d(site[site > 0], site[burns])),
-                ("civilian-hurt", np.flatnonzero((before.civilian_damage == 0) & (civilians.damage > 0))),
-                ("civilian-died", np.flatnonzero((before.civilian_hp > 0) & (civilians.hp == 0))),
-                ("brigade-hurt", np.flatnonzero((before.brigade_damage == 0) & (brigades.damage > 0))),
-                ("brigade-died", np.flatnonzero((before.brigade_hp > 0) & (brigades.hp == 0))),
+                *self._fire_events(),
+                ("civilian-hurt", _zero_against_more(before.civilian_damage, civilians.damage)),
+                ("civilian-died", _zero_against_more(civilians.hp, before.civilian_hp)),
+                ("brigade-hurt", _zero_against_more(before.brigade_damage, brigades.damage)),
+                ("brigade-died", _zero_against_more(brigades.hp, before.brigade_hp)),
             ]
         )
+
+    def _fire_events(self) -> list[tuple[str, Array]]:
+        """Tell what happened to buildings and sites; most steps change few codes, so only those are looked at."""
+        code, site = self.world.arrays.fire.fieryness, self.world.arrays.sites.label
+        changed = np.flatnonzero(code != self._before.fieryness)
+        if len(changed) == 0:
+            return []
+        new, old = code[changed], self._before.fieryness[changed]
+        burns, burnt_before = _is_burning(new), _is_burning(old)
+        stopped = burnt_before & ~burns
+        outs = np.setdiff1d(site[changed[stopped]], site[_is_burning(code)]) if stopped.any() else stopped[:0]
+        return [
+            ("ignited", changed[burns & ~burnt_before]),
+            ("extinguished", changed[stopped & (new != BURNT_OUT)]),
+            ("burnt-out", changed[(new == BURNT_OUT) & (old != BURNT_OUT)]),
+            ("site-out", outs[outs > 0]),
+        ]
 
 
 BURNT_OUT = 8
@@ -214,8 +225,15 @@ def _is_burning(code: Array) -> Array:
     return burning
 
 
-def _events(found: list[tuple[str, Any]]) -> Events:
-    kinds = [np.full(len(entities), KIND[name], dtype=np.uint8) for name, entities in found]
-    entities = [np.asarray(entities, dtype=np.int32) for _, entities in found]
-    none: list[Array] = [np.zeros(0, dtype=np.int32)]
-    return Events(kind=np.concatenate([np.zeros(0, dtype=np.uint8), *kinds]), entity=np.concatenate(none + entities))
+def _zero_against_more(zero: Array, more: Array) -> Array:
+    """Return the indices where the one array holds zero and the other more."""
+    return np.flatnonzero((zero == 0) & (more > 0))
+
+
+def _events(found: list[tuple[str, Array]]) -> Events:
+    kinds: list[int] = []
+    entities: list[int] = []
+    for name, indices in found:
+        kinds += [KIND[name]] * len(indices)
+        entities += indices.tolist()
+    return Events(kind=np.array(kinds, dtype=np.uint8), entity=np.array(entities, dtype=np.int32))

@@ -8,7 +8,7 @@ import numpy as np
 
 from fireworld import __version__
 from fireworld.city.build import build_city
-from fireworld.city.city import City
+from fireworld.city.city import City, Plan
 from fireworld.city.record import city_record
 from fireworld.kernels.arrays import CityTables
 from fireworld.placement import Setup, attachments, place, scenario_plan
@@ -79,19 +79,41 @@ class Stage:
         )
 
 
-def build_stage(scenario: Scenario, *, city_json: bytes | None = None) -> Stage:
+@dataclass(frozen=True)
+class Ground:
+    """A city built, without anybody in it."""
+
+    plan: Plan
+    city: City
+    tables: CityTables
+
+
+def build_stage(
+    scenario: Scenario, *, city_json: bytes | None = None, grounds: dict[str, Ground] | None = None
+) -> Stage:
     """Build a scenario's city and place everybody in it.
 
     Args:
         scenario: the scenario.
         city_json: content of its city file, where it comes from a recording; None reads the file.
+        grounds: cities built before, by what makes them; used and added to, so that scenarios share their city.
 
     Raises:
         ScenarioError: the city has not what the scenario asks for.
         CityError: the city cannot be built.
     """
+    key = repr((scenario.city, scenario.city_sha256, scenario.parameters.fire))
+    ground = grounds.get(key) if grounds is not None else None
+    if ground is None:
+        ground = build_ground(scenario, city_json=city_json)
+    if grounds is not None:
+        grounds[key] = ground
+    return Stage(scenario=scenario, city=ground.city, tables=ground.tables, setup=place(scenario, ground.plan))
+
+
+def build_ground(scenario: Scenario, *, city_json: bytes | None = None) -> Ground:
+    """Build a scenario's city; arguments and errors as for `build_stage`."""
     plan = scenario_plan(scenario, city_json=city_json)
-    setup = place(scenario, plan)
-    parameters = scenario.parameters
-    city = build_city(plan, parameters.fire, seed=scenario.city.ray_seed)
-    return Stage(scenario=scenario, city=city, tables=city_tables(city, parameters.fire), setup=setup)
+    fire = scenario.parameters.fire
+    city = build_city(plan, fire, seed=scenario.city.ray_seed)
+    return Ground(plan=plan, city=city, tables=city_tables(city, fire))

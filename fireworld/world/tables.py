@@ -41,6 +41,7 @@ def single(value: float) -> float:
 def building_tables(city: City, fire: FireParameters) -> BuildingTables:
     """Collect what the fire model needs of every building."""
     return BuildingTables(
+        building_id=city.footprints.building_id.astype(np.int64),
         order=city.order.astype(np.uint32),
         capacity=city.heat_capacity.astype(np.float64),
         initial_fuel=city.initial_fuel.astype(np.float32),
@@ -80,7 +81,6 @@ def geometry_tables(city: City) -> GeometryTables:
     middle_x, middle_y = city.middle_mm
     floor_area = city.footprints.ground_area_m2.astype(np.float64) * city.footprints.floors
     return GeometryTables(
-        building_id=city.footprints.building_id.astype(np.int64),
         x=x,
         y=y,
         west=low[:, 0].copy(),

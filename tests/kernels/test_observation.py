@@ -19,7 +19,14 @@ LINE = [square(50.0 * k, 0.0) for k in range(7)]
 def see(world, brigade=0):
     """Return the features and the state of a brigade."""
     features = np.zeros(8, dtype=np.int64)
-    state = observe(brigade, world.arrays.brigades, world.arrays.sites, world.constants.observation, features)
+    state = observe(
+        brigade,
+        world.arrays.brigades.action,
+        world.arrays.brigades,
+        world.arrays.sites,
+        world.constants.observation,
+        features,
+    )
     return features.tolist(), state
 
 
@@ -70,7 +77,7 @@ def test_the_distance_from_the_center(burning, expected):
 
 def test_the_thresholds_of_the_center_are_thirds_of_the_half_diagonal():
     city = make_city(square(0, 0), square(290, 390))
-    constants = observation_constants(city, unit_volume_m3=None)
+    constants = observation_constants(city, unit_volume_m3=None, in_turn=True)
     assert city.half_diagonal_mm == 250_000.0
     assert constants.center_low_square == pytest.approx((250_000 / 3) ** 2)
     assert constants.center_medium_square == pytest.approx((500_000 / 3) ** 2)

@@ -94,10 +94,10 @@ def test_a_brigade_whose_site_is_out_goes_to_the_nearest_fire():
 def test_a_tie_for_the_nearest_fire_goes_to_the_lowest_id():
     world = make_world(make_city(square(-100, 0), square(100, 0), ids=[7, 5]))
     burn(world, 0, 1)
-    assert nearest_burning(0.0, 0.0, world.tables.geometry, world.arrays.sites) == 1
-    assert nearest_burning(-1.0, 0.0, world.tables.geometry, world.arrays.sites) == 0
+    assert nearest_burning(0.0, 0.0, world.tables.buildings, world.tables.geometry, world.arrays.sites) == 1
+    assert nearest_burning(-1.0, 0.0, world.tables.buildings, world.tables.geometry, world.arrays.sites) == 0
     burn(world)
-    assert nearest_burning(0.0, 0.0, world.tables.geometry, world.arrays.sites) == -1
+    assert nearest_burning(0.0, 0.0, world.tables.buildings, world.tables.geometry, world.arrays.sites) == -1
 
 
 def test_sites_are_measured():

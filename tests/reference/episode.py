@@ -25,10 +25,17 @@ class Tables:
     streets: team.StreetTables
     floor_area: Float64Array  # (n,) m2
     reward_change: bool
+    in_turn: bool  # brigades see what those before them have chosen in this step
 
     @classmethod
     def of_city(
-        cls, city: City, parameters: Parameters, *, unit_volume_m3: float | None = None, reward_change: bool = False
+        cls,
+        city: City,
+        parameters: Parameters,
+        *,
+        unit_volume_m3: float | None = None,
+        reward_change: bool = False,
+        in_turn: bool = True,
     ) -> Self:
         """Prepare a city."""
         return cls(
@@ -38,6 +45,7 @@ class Tables:
             streets=team.StreetTables.of_city(city),
             floor_area=city.footprints.ground_area_m2.astype(np.float64) * city.footprints.floors,
             reward_change=reward_change,
+            in_turn=in_turn,
         )
 
 
@@ -156,15 +164,18 @@ def look(tables: Tables, world: World) -> sites.Sites | None:
 
 
 def decide(tables: Tables, world: World, policy: KernelPolicy, *, seed: int, step: int) -> None:
-    """Let the brigades look and choose, one after another: each hears what those before it have chosen just now."""
+    """Let the brigades look and choose, one after another."""
     found = look(tables, world)
+    before = [brigade.action for brigade in world.team]
     for who, (brigade, lives) in enumerate(zip(world.team, alive(world), strict=True)):
         brigade.target = -1
         if found is None or brigade.refilling or not lives:
             brigade.action = -1
             continue
-        state = team.observe(world.team, who, found)
-        brigade.action = team.choose(policy, who, state, seed=seed, step=step)
+        if not team.keeps_choice(policy, who, before[who], step):
+            known = [other.action for other in world.team] if tables.in_turn else before
+            state = team.observe(brigade, known[:who] + known[who + 1 :], found)
+            brigade.action = team.choose(policy, who, state, seed=seed, step=step)
         brigade.target = team.find_target(
             brigade, tables=tables.sites, found=found, energy=world.fire.energy, capacity=tables.fire.capacity
         )

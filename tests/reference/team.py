@@ -155,14 +155,18 @@ def join_sites(team: list[Brigade], tables: sites.SiteTables, found: sites.Sites
             brigade.site = found.number[found.place[found.member == nearest].item()]
 
 
-def observe(team: list[Brigade], who: int, found: sites.Sites) -> int:
-    """Return the state that a brigade sees: four features of its site and what the others were last heard to do."""
-    free_edges, center, civilian, volume = found.features[found.of_number(team[who].site)]
-    others = [other.action for k, other in enumerate(team) if k != who]
+def observe(brigade: Brigade, others: list[int], found: sites.Sites) -> int:
+    """Return the state that a brigade sees: four features of its site, and which actions the others are known to do."""
+    free_edges, center, civilian, volume = found.features[found.of_number(brigade.site)]
     state = ((free_edges * 3 + center) * 3 + civilian) * 6 + volume
     for action in range(len(ACTIONS)):
         state = state * 2 + (action in others)
     return state
+
+
+def keeps_choice(policy: KernelPolicy, who: int, last_action: int, step: int) -> bool:
+    """Tell whether a brigade goes on with its last choice: choices last some steps; brigades renew them by turns."""
+    return last_action >= 0 and (step + who) % policy.commit != 0
 
 
 def choose(policy: KernelPolicy, who: int, state: int, *, seed: int, step: int) -> int:

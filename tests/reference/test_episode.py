@@ -35,6 +35,7 @@ POLICIES = {
     "random": at_random(),
     "table": from_tables(RANDOM.random((2, 4320, 4)), epsilon=0.2),
     "small table": from_tables(RANDOM.random((3, 270, 4))),
+    "kept choices": from_tables(RANDOM.random((2, 4320, 4)), epsilon=0.5, commit=3),
 }
 
 
@@ -96,6 +97,7 @@ class Play:
             seed=seed,
             n_steps_max=n_steps,
             reward_change=tables.reward_change,
+            in_turn=tables.in_turn,
             unit_volume_m3=tables.sites.volume_bounds[0],
         )
         return compiled, episode.World.at_start(tables, **self.start)
@@ -122,11 +124,13 @@ def step_both(compiled: World, plain: episode.World, tables: episode.Tables, pol
 
 
 @cache
-def shipped(name: str) -> Play:
+def shipped(name: str, *, in_turn: bool = True) -> Play:
     """Build a shipped scenario."""
     scenario = load_scenario(name)
     stage = build_stage(scenario)
-    tables = episode.Tables.of_city(stage.city, scenario.parameters, unit_volume_m3=scenario.unit_volume_m3)
+    tables = episode.Tables.of_city(
+        stage.city, scenario.parameters, unit_volume_m3=scenario.unit_volume_m3, in_turn=in_turn
+    )
     setup = stage.setup
     start = {
         "ignited": setup.ignited,
@@ -143,6 +147,13 @@ def test_shipped_scenarios(scenario, policy):
     for seed in (1, 2):
         plain, _ = shipped(scenario).run(policy, seed=seed, n_steps=200)
         assert plain.outcome.water_litres > 0
+
+
+@pytest.mark.parametrize("policy", ["table", "kept choices"])
+def test_simultaneous_choices(policy):
+    plain, _ = shipped("test-1", in_turn=False).run(policy, seed=3, n_steps=200)
+    other, _ = shipped("test-1").run(policy, seed=3, n_steps=200)
+    assert plain.outcome.reward_so_far != other.outcome.reward_so_far, "what brigades hear of each other matters"
 
 
 @cache
@@ -284,7 +295,8 @@ def assert_same_sites(compiled: World, plain: episode.World, seen: sites.Sites |
             compiled.constants.observation,
             features,
         )
-        assert state == team.observe(plain.team, who, seen)
+        others = [brigade.action for brigade in plain.team if brigade is not plain.team[who]]
+        assert state == team.observe(plain.team[who], others, seen)
 
 
 @given(

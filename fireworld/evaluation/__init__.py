@@ -1,0 +1,1 @@
+"""Evaluation: what policies achieve, compared honestly, as tables and figures."""
