@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from fireworld.kernels.arrays import Array, CityTables, Constants, Learner, PolicyTables, WorldArrays
+from fireworld.kernels.arrays import CityTables, Constants, Learner, PolicyTables, WorldArrays
 from fireworld.kernels.brigades import act
 from fireworld.kernels.choice import choose, keeps_choice, table_state
 from fireworld.kernels.fire import advance_fire, draw_burn_rates
 from fireworld.kernels.health import harm_brigades, harm_civilians
-from fireworld.kernels.jit import inner, kernel
+from fireworld.kernels.jit import kernel
 from fireworld.kernels.learning import choose_and_learn, forget, take_reward, update
 from fireworld.kernels.observation import can_choose, find_target, observe
 from fireworld.kernels.outcome import assess
@@ -17,7 +17,7 @@ from fireworld.kernels.sites import find_sites
 
 
 @kernel
-def run_episode(
+def run_episode(  # noqa: C901, PLR0912 - handing all arrays to a function of its own costs more than the loop
     city: CityTables,
     world: WorldArrays,
     constants: Constants,
@@ -35,13 +35,34 @@ def run_episode(
     """
     brigades, fire, people, sites, outcome = world.brigades, world.fire, world.civilians, world.sites, world.outcome
     health, buildings, geometry, streets = constants.health, city.buildings, city.geometry, city.streets
-    features, before = np.zeros(8, dtype=np.int64), np.zeros(len(brigades.action), dtype=np.int32)
+    n_brigades = len(brigades.action)
+    features, before = np.zeros(8, dtype=np.int64), np.zeros(n_brigades, dtype=np.int32)
     learning = learner.learning[0] != 0
     if learning:
         forget(learner)
-    for step in range(first_step, last_step + 1):
+    for step in range(first_step, last_step + 2):
+        if step > last_step and not learning:
+            break
         find_sites(buildings, city.links, city.near, geometry, fire, people, brigades, sites)
-        decide(city, world, constants, policy, learner, seed, step, features, before)
+        for brigade in range(n_brigades):
+            before[brigade] = brigades.action[brigade]
+        shown = brigades.action if constants.observation.in_turn else before
+        for brigade in range(n_brigades):
+            action, target = -1, -1
+            if can_choose(brigade, brigades, sites):
+                if keeps_choice(brigade, before[brigade], policy.commit[0], step):
+                    action = before[brigade]
+                else:
+                    state = observe(brigade, shown, brigades, sites, constants.observation, features)
+                    action = choose(brigade, state, policy, seed, step)
+                    if learning:
+                        row = table_state(state, policy.tables.shape[1])
+                        choose_and_learn(brigade, policy.table_of[brigade], row, action, policy.epsilon[0], learner)
+                target = find_target(brigade, action, brigades, buildings, fire, geometry, sites)
+            brigades.action[brigade] = action
+            brigades.target[brigade] = target
+        if step > last_step:
+            break
         outcome.water[0] += act(brigades, fire, streets, geometry, constants.brigades)
         outcome.draws[0] = draw_burn_rates(buildings, fire, constants.fire, seed, step)
         advance_fire(buildings, city.cover, city.links, fire, constants.fire)
@@ -52,56 +73,7 @@ def run_episode(
             take_reward(outcome.reward[4], learner)
         if outcome.counts[0] == 0:
             if learning:
-                for brigade in range(len(brigades.action)):
+                for brigade in range(n_brigades):
                     update(brigade, policy.table_of[brigade], 0.0, learner)
             return step
-    if learning:
-        find_sites(buildings, city.links, city.near, geometry, fire, people, brigades, sites)
-        decide(city, world, constants, policy, learner, seed, last_step + 1, features, before)
     return last_step
-
-
-@inner
-def decide(
-    city: CityTables,
-    world: WorldArrays,
-    constants: Constants,
-    policy: PolicyTables,
-    learner: Learner,
-    seed: int,
-    step: int,
-    features: Array,
-    before: Array,
-) -> None:
-    """Let every brigade choose, one after another, and learn from its choice before if the team learns.
-
-    Args:
-        city: the city.
-        world: the world; actions and targets are written.
-        constants: scalars of the model.
-        policy: what the brigades follow.
-        learner: what they learn.
-        seed: seed of the run.
-        step: simulated step.
-        features: (8,) int64, scratch.
-        before: (b,) int32, scratch: what the brigades did before this step.
-    """
-    brigades, sites = world.brigades, world.sites
-    for brigade in range(len(brigades.action)):
-        before[brigade] = brigades.action[brigade]
-    for brigade in range(len(brigades.action)):
-        action, target = -1, -1
-        if can_choose(brigade, brigades, sites):
-            if keeps_choice(brigade, before[brigade], policy.commit[0], step):
-                action = before[brigade]
-            else:
-                shown = brigades.action if constants.observation.in_turn else before
-                state = observe(brigade, shown, brigades, sites, constants.observation, features)
-                action = choose(brigade, state, policy, seed, step)
-                if learner.learning[0] != 0:
-                    table = policy.table_of[brigade]
-                    row = table_state(state, policy.tables.shape[1])
-                    choose_and_learn(brigade, table, row, action, policy.epsilon[0], learner)
-            target = find_target(brigade, action, brigades, city.buildings, world.fire, city.geometry, sites)
-        brigades.action[brigade] = action
-        brigades.target[brigade] = target

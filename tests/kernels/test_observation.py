@@ -82,7 +82,7 @@ def test_the_thresholds_of_the_center_are_thirds_of_the_half_diagonal():
     assert constants.center_low_square == pytest.approx((250_000 / 3) ** 2)
     assert constants.center_medium_square == pytest.approx((500_000 / 3) ** 2)
     assert constants.unit_volume == 2 * 300.0, "by default twice the mean building, 10 m x 10 m x 3 m"
-    assert observation_constants(city, unit_volume_m3=77.0).unit_volume == 77.0
+    assert observation_constants(city, unit_volume_m3=77.0, in_turn=True).unit_volume == 77.0
 
 
 @pytest.mark.parametrize(("n_burning", "expected"), [(1, 0), (2, 1), (3, 1), (4, 2), (6, 2)])
