@@ -310,7 +310,7 @@ def act(
     return total
 
 
-@inner
+@kernel
 def shelter(brigades: BrigadeState) -> None:
     """Note the building each brigade is in: its refuge while it refills there, else none."""
     for brigade in range(len(brigades.tank)):

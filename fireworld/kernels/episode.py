@@ -5,15 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from fireworld.kernels.arrays import CityTables, Constants, Learner, PolicyTables, WorldArrays
-from fireworld.kernels.brigades import act
+from fireworld.kernels.brigades import act, shelter
 from fireworld.kernels.choice import choose, keeps_choice, table_state
 from fireworld.kernels.fire import advance_fire, draw_burn_rates
-from fireworld.kernels.health import harm_brigades, harm_civilians
+from fireworld.kernels.health import harm
 from fireworld.kernels.jit import kernel
 from fireworld.kernels.learning import choose_and_learn, forget, take_reward, update
 from fireworld.kernels.observation import can_choose, find_target, observe
 from fireworld.kernels.outcome import assess
 from fireworld.kernels.sites import find_sites
+
+FIRST = np.int64(0)
+"""Entity number of the first civilian, for the draws; the brigades' follow."""
 
 
 @kernel
@@ -66,8 +69,13 @@ def run_episode(  # noqa: C901, PLR0912 - handing all arrays to a function of it
         outcome.water[0] += act(brigades, fire, streets, geometry, constants.brigades)
         outcome.draws[0] = draw_burn_rates(buildings, fire, constants.fire, seed, step)
         advance_fire(buildings, city.cover, city.links, fire, constants.fire)
-        outcome.draws[1] = harm_civilians(people, fire, health, seed, step)
-        outcome.draws[1] += harm_brigades(brigades, fire, health, seed, step, len(people.hp))
+        codes, everybody, protected = fire.fieryness, 1.0, health.brigade_share
+        outcome.draws[1] = harm(people.building, people.hp, people.damage, codes, health, everybody, seed, step, FIRST)
+        shelter(brigades)
+        first = len(people.hp)
+        outcome.draws[1] += harm(
+            brigades.inside, brigades.hp, brigades.damage, codes, health, protected, seed, step, first
+        )
         assess(fire, people, geometry, constants.reward_change, outcome)
         if learning:
             take_reward(outcome.reward[4], learner)

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from fireworld.draws import DAMAGE, DAMAGE_NOISE
-from fireworld.kernels.arrays import Array, BrigadeState, CivilianState, FireState, HealthConstants
-from fireworld.kernels.brigades import shelter
+from fireworld.kernels.arrays import Array, HealthConstants
 from fireworld.kernels.draws import normal, uniform
 from fireworld.kernels.jit import inner, kernel
 
@@ -27,7 +24,7 @@ def worsen(damage: float, noise: float, constants: HealthConstants) -> float:
     return damage + constants.growth * damage * damage + constants.constant + noise if damage > 0.0 else 0.0
 
 
-@inner
+@kernel
 def harm(
     building: Array,
     hp: Array,
@@ -70,22 +67,3 @@ def harm(
             total += noise
             hp[person] -= int(min(max(damage[person] + 0.5, 0.0), hp[person]))  # bounds first: damage may be immense
     return total
-
-
-@kernel
-def harm_civilians(
-    civilians: CivilianState, fire: FireState, constants: HealthConstants, seed: int, step: int
-) -> float:
-    """Hurt the civilians; entities 0 to c-1 of the draws."""
-    first = np.int64(0)
-    return harm(civilians.building, civilians.hp, civilians.damage, fire.fieryness, constants, 1.0, seed, step, first)
-
-
-@kernel
-def harm_brigades(
-    brigades: BrigadeState, fire: FireState, constants: HealthConstants, seed: int, step: int, first: int
-) -> float:
-    """Hurt the brigades that refill inside a burning refuge; entities from `first` on of the draws."""
-    shelter(brigades)
-    share = constants.brigade_share
-    return harm(brigades.inside, brigades.hp, brigades.damage, fire.fieryness, constants, share, seed, step, first)

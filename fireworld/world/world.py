@@ -8,9 +8,9 @@ import numpy as np
 
 from fireworld.city.city import City
 from fireworld.kernels.arrays import Array, CityTables, Constants, Learner, PolicyTables, WorldArrays
-from fireworld.kernels.brigades import act
+from fireworld.kernels.brigades import act, shelter
 from fireworld.kernels.fire import advance_fire, draw_burn_rates, ignite
-from fireworld.kernels.health import harm_brigades, harm_civilians
+from fireworld.kernels.health import harm
 from fireworld.kernels.observation import can_choose, find_target, observe
 from fireworld.kernels.outcome import assess
 from fireworld.kernels.sites import find_sites
@@ -223,8 +223,11 @@ class World:
 
     def _hurt(self) -> None:
         arrays, health, seed, step = self.arrays, self.constants.health, self.seed, self.step_number
-        draws = harm_civilians(arrays.civilians, arrays.fire, health, seed, step)
-        draws += harm_brigades(arrays.brigades, arrays.fire, health, seed, step, len(arrays.civilians.hp))
+        people, brigades, codes = arrays.civilians, arrays.brigades, arrays.fire.fieryness
+        draws = harm(people.building, people.hp, people.damage, codes, health, 1.0, seed, step, 0)
+        shelter(brigades)
+        share, first = health.brigade_share, len(people.hp)
+        draws += harm(brigades.inside, brigades.hp, brigades.damage, codes, health, share, seed, step, first)
         arrays.outcome.draws[1] = draws
 
     def _assess(self) -> None:
