@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 if TYPE_CHECKING:
     from recorder.diff import Difference
 
+DIGEST_SHOWN: Final = 12
 _TOTALS = {
     "n_steps": "steps",
     "time_to_complete": "fire out at step",
@@ -83,12 +84,12 @@ def write_json(difference: Difference, *, digests: Sequence[str]) -> None:
 
 def show(difference: Difference, *, names: tuple[str, str]) -> None:
     """Write a comparison for people: first difference, totals, and how many steps differ."""
-    for key, (a, b) in difference.header.items():
-        click.echo(f"{key}: {a} / {b}")
     if difference.first is None:
         click.echo(f"the same: {difference.n_steps_compared} steps")
     else:
         click.echo(difference.first.sentence)
+    for key, (a, b) in difference.header.items():
+        click.echo(f"{key.replace('_', ' ')}: {_shortened(key, b)}, was {_shortened(key, a)}")
     rows = [
         (label, _number(getattr(difference.totals[0], key)), _number(getattr(difference.totals[1], key)))
         for key, label in _TOTALS.items()
@@ -97,6 +98,11 @@ def show(difference: Difference, *, names: tuple[str, str]) -> None:
     if difference.n_steps_differing:
         counts = [(topic, str(n), "") for topic, n in difference.n_steps_differing.items()]
         _print_table(("topic", f"steps that differ, of {difference.n_steps_compared}", ""), counts)
+
+
+def _shortened(key: str, value: str | int) -> str:
+    """Show a value of a header; of a digest as much as tells it from others."""
+    return str(value)[:DIGEST_SHOWN] if key.endswith("digest") else str(value)
 
 
 def _number(value: Any) -> str:
