@@ -87,7 +87,7 @@ def test_diff_of_two_runs(run_cli, log_path, other_log):
     code, out, _ = run_cli("diff", log_path, other_log)
     assert code == 1
     assert "step 21, choose: brigade 1 chose nearest-to-me, was nearest-to-civilian; Q of nearest-to-me" in out
-    assert "policy: easiest / random" in out
+    assert "policy: random, was easiest" in out
     assert "burnt out" in out
     assert "/decisions" in out
     code, out, _ = run_cli("diff", log_path, other_log, "--json")
