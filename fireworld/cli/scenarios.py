@@ -94,12 +94,12 @@ def _print_table(scenarios: Sequence[Scenario]) -> None:
 
     table = Table(box=None, header_style="bold", pad_edge=False)
     table.add_column("name", no_wrap=True)
+    for heading in ("city", "brigades", "civilians"):
+        table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("description")
-    table.add_column("city", no_wrap=True)
-    for heading in ("brigades", "civilians", "steps"):
-        table.add_column(heading, justify="right")
     for scenario in scenarios:
         row = _summary(scenario)
-        cells = [row[key] for key in ("name", "description", "city", "n_brigades", "n_civilians", "steps")]
+        city = str(row["city"]).removesuffix(" lots")
+        cells = (row["name"], city, row["n_brigades"], row["n_civilians"], row["description"])
         table.add_row(*(Text(str(cell)) for cell in cells))
     Console(highlight=False).print(table)
