@@ -6,9 +6,7 @@ table: `python -m benchmarks.calibrate --scenarios test-1,test-2,test-3 --counts
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from statistics import fmean
 from typing import Final
 
@@ -16,46 +14,30 @@ import click
 from rich.console import Console
 from rich.table import Table
 
+from fireworld.evaluation.runs import evaluate
+from fireworld.evaluation.statistics import mean
 from fireworld.policy.names import BUILT_IN
 from fireworld.scenario import load_scenario, scenario_names
-from fireworld.world.stage import Stage, build_stage
+from fireworld.world.stage import build_stage
 
 POLICIES: Final = ("easiest", "nearest-to-civilian", "nearest-to-center", "nearest-to-me", "each-another", "random")
 FIRST_SEED: Final = 1000
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """Means over seeds of one policy on one fire."""
-
-    score: float  # share of the maximum
-    burnt_out: float  # buildings
-    steps: float
-
-
-def play(stage: Stage, policy: str, *, n_seeds: int) -> Outcome:
-    """Run a policy on several seeds."""
-    tables = BUILT_IN[policy]().for_brigades(len(stage.setup.brigade_refuge))
-    scores, burnt, steps = [], [], []
-    for seed in range(FIRST_SEED, FIRST_SEED + n_seeds):
-        world = stage.world(seed=seed)
-        steps.append(world.run(tables))
-        outcome = world.arrays.outcome
-        scores.append(float(outcome.score[0] / outcome.score[1]))
-        burnt.append(int(outcome.counts[2]))
-    return Outcome(fmean(scores), fmean(burnt), fmean(steps))
-
-
 def rows(scenarios: Iterable[str], counts: Iterable[int | None], *, n_seeds: int) -> Iterator[list[str]]:
     """Yield a row of the table for every scenario and number of burning buildings (None: as shipped)."""
+    seeds = range(FIRST_SEED, FIRST_SEED + n_seeds)
     for name in scenarios:
         for count in counts:
             settings = {} if count is None else {"fires.0.n_buildings": str(count)}
             stage = build_stage(load_scenario(name).with_settings(settings))
-            outcomes = [play(stage, policy, n_seeds=n_seeds) for policy in POLICIES]
-            cells = [f"{found.score:.2f} {found.burnt_out:3.0f} {found.steps:3.0f}" for found in outcomes]
-            mean = math.fsum(found.score for found in outcomes) / len(outcomes)
-            yield [name, str(len(stage.setup.ignited)), f"{mean:.2f}", *cells]
+            outcomes = [evaluate(stage, BUILT_IN[policy](), seeds) for policy in POLICIES]
+            cells = [
+                f"{mean(found.score_share):.2f} {mean(found.burnt_out):3.0f} {mean(found.steps):3.0f}"
+                for found in outcomes
+            ]
+            of_all = fmean(mean(found.score_share) for found in outcomes)
+            yield [name, str(len(stage.setup.ignited)), f"{of_all:.2f}", *cells]
 
 
 def parse_counts(text: str | None) -> list[int | None]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fireworld.policy.asking import begin
 from fireworld.policy.names import NamedPolicy
@@ -43,4 +43,5 @@ def prepare_run(stage: Stage, named: NamedPolicy, *, seed: int, n_steps_max: int
     """
     world = stage.world(seed=seed, n_steps_max=n_steps_max)
     header = stage.header(seed=seed, policy=named.name, policy_digest=named.digest, n_steps_max=world.n_steps_max)
+    header = replace(header, attachments={**header.attachments, **named.attachments})
     return Run(header=header, city=stage.city_record(), world=world, policy=named.policy)

@@ -13,6 +13,9 @@ INTERRUPTED: Final = 130
 
 COMMANDS: Final = {
     "run": "Run a scenario and record it.",
+    "train": "Train a team, or several.",
+    "policy": "Say what a trained team does, or how two differ.",
+    "reproduce": "Repeat the paper: its tables beside ours.",
     "scenarios": "List the scenarios, or draw one.",
     "info": "Say what a recording holds and how far it is good.",
     "diff": "Compare two recordings step by step.",

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-import signal
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
-from threading import Event
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
+from fireworld.cli.interrupt import gentle_interrupt
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 
 POLICIES_HELP: Final = (
     "easiest, nearest-to-civilian, nearest-to-center, nearest-to-me, each-another, random, chief, "
-    "or MODULE:CLASS of your own."
+    "planner (planner:horizon=30,interval=4,rollouts=1), a team file (TEAM.npz), or MODULE:CLASS of your own."
 )
 
 
@@ -50,7 +49,7 @@ def command(
     settings: tuple[str, ...],
     as_json: bool,
 ) -> None:
-    r"""Run SCENARIO (a shipped name or a YAML file; `default` if left out) and show how it ended.
+    """Run SCENARIO (a shipped name or a YAML file; `default` if left out) and show how it ended.
 
     \b
     fireworld run                                    the default scenario
@@ -59,17 +58,20 @@ def command(
     fireworld run --record out.mcap                  and every step recorded
 
     Exit code: 0 run, 2 could not run, 130 interrupted (the recording keeps every step done).
-    """
+    """  # noqa: D301 - click wants the character
     if force and output is None:
         raise click.UsageError("--force goes with --record.")
     announce_compilation()
-    from fireworld.policy.names import load_policy
+    from fireworld.policy.names import load_policy, note_on_team
     from fireworld.runs import prepare_run
     from fireworld.scenario import load_scenario, split_settings
     from fireworld.world.stage import build_stage
 
     named = load_policy(policy)
     chosen = load_scenario(scenario).with_settings(split_settings(settings))
+    note = note_on_team(named, chosen.brigades.n)
+    if note:
+        click.echo(note, err=True)
     run = prepare_run(build_stage(chosen), named, seed=seed, n_steps_max=steps)
     last, digest = _carry_out(run, output=output, force=force, quiet=as_json)
     outcome = _outcome(run, last, digest=digest, output=output)
@@ -95,7 +97,7 @@ def _carry_out(run: Run, *, output: Path | None, force: bool, quiet: bool) -> tu
     last: StepRecord | None = None
     try:
         with ExitStack() as stack:
-            interrupted = stack.enter_context(_gentle_interrupt())
+            interrupted = stack.enter_context(gentle_interrupt())
             if output is not None:
                 sink: LogWriter | Digest = stack.enter_context(LogWriter(output, run.header, run.city, force=force))
             else:
@@ -116,27 +118,6 @@ def _carry_out(run: Run, *, output: Path | None, force: bool, quiet: bool) -> tu
         raise SystemExit(INTERRUPTED) from error
     assert last is not None  # noqa: S101 - a run yields its start before anything else
     return last, sink.digest
-
-
-@contextmanager
-def _gentle_interrupt() -> Iterator[Event]:
-    """Let the first Ctrl-C but set an event, so that the step under way is done and recorded; a second one stops it."""
-    asked = Event()
-    previous = signal.getsignal(signal.SIGINT)
-    if previous is not signal.default_int_handler:  # ignored, as below nohup, or somebody else's concern
-        yield asked
-        return
-
-    def note(number: int, frame: object) -> None:
-        del number, frame
-        asked.set()
-        signal.signal(signal.SIGINT, previous)
-
-    signal.signal(signal.SIGINT, note)
-    try:
-        yield asked
-    finally:
-        signal.signal(signal.SIGINT, previous)
 
 
 def _with_progress(run: Run, *, quiet: bool) -> Iterator[StepRecord]:

@@ -6,8 +6,8 @@ import hashlib
 import importlib
 import inspect
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
@@ -18,6 +18,7 @@ from fireworld.policy.asking import describe
 from fireworld.policy.chief import chief
 from fireworld.policy.kernel import KernelPolicy, always, at_random, each_another
 from fireworld.policy.protocol import Policy
+from fireworld.policy.team import SUFFIX, parse_team, read_bytes
 from fireworld.records import ACTIONS
 
 BUILT_IN: Final[dict[str, Callable[[], KernelPolicy]]] = {
@@ -28,6 +29,12 @@ BUILT_IN: Final[dict[str, Callable[[], KernelPolicy]]] = {
 }
 """Policies by name."""
 
+WITH_OPTIONS: Final = {"planner": "fireworld.planning.planner:planner"}
+"""Policies that take options, `NAME` or `NAME:KEY=VALUE,...`: what makes each from the options' text. They use the
+world, which this layer does not know, so they are found as a user's own policy is."""
+TEAM_ATTACHMENT: Final = "policy.npz"
+"""What a recording calls the team file that its brigades followed."""
+
 
 @dataclass(frozen=True)
 class NamedPolicy:
@@ -36,26 +43,60 @@ class NamedPolicy:
     name: str
     digest: str
     policy: Policy
+    attachments: Mapping[str, bytes] = field(default_factory=dict)
+    """Files that go with a recording of it, by name."""
 
 
 def load_policy(name: str) -> NamedPolicy:
     """Return a policy by name.
 
     Args:
-        name: a built-in policy, or `module:Class` found from the current folder or the Python path.
+        name: a built-in policy, with its options where it takes any, or `module:Class` found from the current folder or
+            the Python path.
 
     Raises:
         PolicyError: no such policy, or it has no `decide` method, or making it fails.
+        TrainingError: a team file that cannot be read or makes no sense.
     """
+    if name.endswith(SUFFIX):
+        return _load_team(Path(name))
+    kind, _, options = name.partition(":")
+    if kind in WITH_OPTIONS and (name == kind or "=" in options):
+        module_name, _, maker = WITH_OPTIONS[kind].partition(":")
+        made = getattr(importlib.import_module(module_name), maker)(options)
+        return NamedPolicy(name, made.digest, made)
     if ":" in name:
         return _load_own(name)
     if name not in BUILT_IN:
         meant = name.lower()
-        near = [known for known in BUILT_IN if meant and meant in known] or get_close_matches(meant, BUILT_IN, n=1)
+        names = [*BUILT_IN, *WITH_OPTIONS]
+        near = [known for known in names if meant and meant in known] or get_close_matches(meant, names, n=1)
         hint = "try " + " or ".join(near) if near else "MODULE:CLASS names one of your own"
-        raise PolicyError(expected("--policy", "", "one of " + ", ".join(BUILT_IN), name, hint))
+        raise PolicyError(expected("--policy", "", "one of " + ", ".join(names), name, hint))
     policy = BUILT_IN[name]()
     return NamedPolicy(name, policy.digest, policy)
+
+
+def note_on_team(named: NamedPolicy, n_brigades: int) -> str:
+    """Say which brigade follows which table of a team file, if there is not one for each; else nothing."""
+    if TEAM_ATTACHMENT not in named.attachments or not isinstance(named.policy, KernelPolicy):
+        return ""
+    n_tables = len(named.policy.tables)
+    if n_tables in {1, n_brigades}:
+        return ""
+    if n_tables > n_brigades:
+        return (
+            f"{named.name}: {n_tables} tables for {n_brigades} brigades: the last {n_tables - n_brigades} are not used"
+        )
+    return f"{named.name}: {n_tables} tables for {n_brigades} brigades: brigade b follows table b modulo {n_tables}"
+
+
+def _load_team(path: Path) -> NamedPolicy:
+    """Return the policy of a team file; a recording names it without its folder and takes the file along."""
+    content = read_bytes(path)
+    team, _ = parse_team(content, source=str(path))
+    policy = team.policy()
+    return NamedPolicy(path.name, policy.digest, policy, {TEAM_ATTACHMENT: content})
 
 
 def _load_own(name: str) -> NamedPolicy:

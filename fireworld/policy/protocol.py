@@ -11,7 +11,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from fireworld.kernels.arrays import CityTables, WorldArrays
+from fireworld.kernels.arrays import CityTables, Constants, WorldArrays
 from fireworld.kernels.observation import find_target
 
 
@@ -59,6 +59,8 @@ class Observation:
     """The city's arrays; not to be changed."""
     world: WorldArrays
     """The world's arrays as they are before the step; not to be changed."""
+    constants: Constants
+    """The scalars of the world's model."""
 
     @cached_property
     def targets(self) -> tuple[int, int, int, int]:

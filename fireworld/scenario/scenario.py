@@ -156,8 +156,12 @@ def read_city_file(scenario: Scenario) -> bytes:
         raise ScenarioError(expected(scenario.source, "city.file", "a city file", got)) from None
 
 
-def split_settings(settings: Iterable[str]) -> dict[str, str]:
+def split_settings(settings: Iterable[str], *, example: str = "brigades.n=7") -> dict[str, str]:
     """Split the command line's KEY=VALUE into what `Scenario.with_settings` takes.
+
+    Args:
+        settings: what was given.
+        example: what the complaint suggests.
 
     Raises:
         ScenarioError: no "=", or a key said twice.
@@ -166,7 +170,7 @@ def split_settings(settings: Iterable[str]) -> dict[str, str]:
     for setting in settings:
         key, equals, text = setting.partition("=")
         if not (key and equals):
-            raise ScenarioError(expected("--set", "", "KEY=VALUE", setting, "try brigades.n=7"))
+            raise ScenarioError(expected("--set", "", "KEY=VALUE", setting, f"try {example}"))
         if key in values:
             raise ScenarioError(expected("--set", key, "each key once", f"{key} a second time"))
         values[key] = text

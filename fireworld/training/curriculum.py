@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -18,6 +20,7 @@ from fireworld.scenario.shipped import shipped_folder
 from fireworld.scenario.yaml_text import read_yaml
 
 SIZE_MAX_BYTES: Final = 1_000_000
+N_VARIATIONS_MAX: Final = 10_000
 
 
 class StageText(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -66,6 +69,30 @@ class Curriculum:
         """Scenarios of all stages."""
         return sum(len(stage.scenarios) for stage in self.stages)
 
+    def only(self, names: Sequence[str]) -> Curriculum:
+        """Return the curriculum with these of its stages, in its own order.
+
+        Raises:
+            TrainingError: no stage of that name.
+        """
+        known = [stage.name for stage in self.stages]
+        for name in names:
+            if name not in known:
+                raise TrainingError(expected("--stages", "", f"stages of {self.name}: {', '.join(known)}", name))
+        return replace(self, stages=tuple(stage for stage in self.stages if stage.name in names))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything there is to learn in as plain values, scenarios as YAML."""
+        stages = [
+            {
+                "name": stage.name,
+                "cooperation": stage.cooperation,
+                "scenarios": [scenario.to_yaml() for scenario in stage.scenarios],
+            }
+            for stage in self.stages
+        ]
+        return {"name": self.name, "digest": self.digest, "stages": stages}
+
 
 def curriculum_names() -> list[str]:
     """Name the curricula that come with fireworld."""
@@ -77,7 +104,7 @@ def load_curriculum(name_or_path: str | Path) -> Curriculum:
 
     Raises:
         TrainingError: no such curriculum, or one that makes no sense.
-        ScenarioError: a scenario in it that makes no sense.
+        ScenarioError: broken YAML.
     """
     path = Path(name_or_path)
     if str(name_or_path) in curriculum_names():
@@ -92,39 +119,55 @@ def load_curriculum(name_or_path: str | Path) -> Curriculum:
         raise TrainingError(expected(source, "", f"a curriculum file or one of {names}", reason)) from None
     if len(text) > SIZE_MAX_BYTES:
         raise TrainingError(expected(source, "", f"a curriculum of at most {SIZE_MAX_BYTES} bytes", "more of them"))
-    return _build(read_yaml(text, source=source), source=source, name=path.stem)
+    return _build(read_yaml(text, source=source), source=source, path=path)
 
 
-def _build(document: Any, *, source: str, name: str) -> Curriculum:
+def _build(document: Any, *, source: str, path: Path) -> Curriculum:
     try:
         read = msgspec.convert(document, CurriculumText)
     except msgspec.ValidationError as error:
-        raise TrainingError(f"{source}: {error}") from None
-    stages = tuple(_build_stage(stage, where=f"{source}: stages.{index}") for index, stage in enumerate(read.stages))
-    return Curriculum(name=name, stages=stages)
+        fault, _, where = str(error).partition(" - at `$")
+        parts = (source, where.strip(".`"), fault[:1].lower() + fault[1:])
+        raise TrainingError(": ".join(part for part in parts if part)) from None
+    stages: list[CurriculumStage] = []
+    for index, text in enumerate(read.stages):
+        where = f"{source}: stages.{index}"
+        if text.name in {stage.name for stage in stages}:
+            raise TrainingError(expected(where, "name", "another name for every stage", text.name))
+        if stages and stages[-1].cooperation and not text.cooperation:
+            wanted = "true, as in the stage before: what was learned with cooperation has no place without"
+            raise TrainingError(expected(where, "cooperation", wanted, "false"))
+        stages.append(_build_stage(text, where=where, folder=path.parent))
+    return Curriculum(name=path.stem, stages=tuple(stages))
 
 
-def _build_stage(stage: StageText, *, where: str) -> CurriculumStage:
+def _build_stage(stage: StageText, *, where: str, folder: Path) -> CurriculumStage:
     if bool(stage.scenarios) == (stage.base is not None):
-        raise TrainingError(expected(where, "", "either `scenarios` or `base`", "both" if stage.base else "neither"))
+        got = "both" if stage.scenarios else "neither"
+        raise TrainingError(expected(where, "", "either `scenarios` or `base`", got))
+    if stage.base is None and (stage.set or stage.vary):
+        raise TrainingError(expected(where, "", "`set` and `vary` with `base`", "them with `scenarios`"))
+    if math.prod(len(values) for values in stage.vary.values()) > N_VARIATIONS_MAX:
+        raise TrainingError(expected(where, "vary", f"at most {N_VARIATIONS_MAX} combinations", "more of them"))
     try:
         scenarios = (
-            tuple(load_scenario(name) for name in stage.scenarios)
+            tuple(_load(name, folder) for name in stage.scenarios)
             if stage.base is None
-            else tuple(_variations(load_scenario(stage.base), stage))
+            else tuple(_variations(_load(stage.base, folder), stage))
         )
     except FireworldError as error:
         raise TrainingError(f"{where}: {error}") from None
-    if stage.base is None and (stage.set or stage.vary):
-        raise TrainingError(expected(where, "", "`set` and `vary` with `base`", "them with `scenarios`"))
     return CurriculumStage(name=stage.name, cooperation=stage.cooperation, scenarios=scenarios)
 
 
-def _variations(base: Scenario, stage: StageText) -> list[Scenario]:
-    """Return every combination of the values that a stage varies; what is named first changes last."""
-    made = []
+def _load(name: str, folder: Path) -> Scenario:
+    """Load a shipped scenario, or one of a file, whose path is relative to the curriculum's."""
+    return load_scenario(folder / name if name.endswith((".yaml", ".yml")) else name)
+
+
+def _variations(base: Scenario, stage: StageText) -> Iterator[Scenario]:
+    """Yield every combination of the values that a stage varies; what is named first changes last."""
     for number, values in enumerate(itertools.product(*stage.vary.values()), 1):
         settings = {**stage.set, **dict(zip(stage.vary, values, strict=True))}
         varied = base.with_settings({key: json.dumps(value) for key, value in settings.items()})
-        made.append(msgspec.structs.replace(varied, name=f"{stage.name}-{number}"))
-    return made
+        yield msgspec.structs.replace(varied, name=f"{stage.name}-{number}")

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Final, Literal
 
 from fireworld.errors import TrainingError, expected
+from fireworld.policy.team import COMMIT_MAX
 
 Rule = Literal["sarsa", "expected-sarsa", "q-learning"]
 RULES: Final[tuple[Rule, ...]] = ("sarsa", "expected-sarsa", "q-learning")
+CHOSEN: Final[Mapping[str, tuple[str, ...]]] = {
+    "rule": RULES,
+    "reward": ("stock", "change"),
+    "choices": ("in-turn", "simultaneous"),
+}
+"""Figures that are one of a few words."""
+N_EPISODES_MAX: Final = 1_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,15 +57,36 @@ class Method:
                 raise TrainingError(expected("method", name, "a number from 0 to 1", value))
         if not (math.isfinite(self.alpha_decay) and self.alpha_decay >= 0.0):
             raise TrainingError(expected("method", "alpha_decay", "a number >= 0", self.alpha_decay))
-        for name in ("n_episodes_max", "n_episodes_unchanged", "commit"):
-            if getattr(self, name) < 1:
-                raise TrainingError(expected("method", name, "a whole number >= 1", getattr(self, name)))
-        if self.rule not in RULES:
-            raise TrainingError(expected("method", "rule", "one of " + ", ".join(RULES), self.rule))
+        for name, most in (
+            ("n_episodes_max", N_EPISODES_MAX),
+            ("n_episodes_unchanged", N_EPISODES_MAX),
+            ("commit", COMMIT_MAX),
+        ):
+            if not 1 <= getattr(self, name) <= most:
+                wanted = f"a whole number from 1 to {most}"
+                raise TrainingError(expected("method", name, wanted, getattr(self, name)))
+        for name, words in CHOSEN.items():
+            if getattr(self, name) not in words:
+                raise TrainingError(expected("method", name, "one of " + ", ".join(words), getattr(self, name)))
 
     def as_dict(self) -> dict[str, Any]:
         """Return all figures by name."""
         return asdict(self)
+
+    def with_settings(self, settings: Mapping[str, str]) -> Method:
+        """Return the method with other figures.
+
+        Args:
+            settings: figures as text by name, as in {"alpha": "0.1", "shared_table": "true"}.
+
+        Raises:
+            TrainingError: no such figure, or not a value it can have.
+        """
+        for key in settings:
+            if key not in method_keys():
+                raise TrainingError(expected("--set", key, "one of " + ", ".join(method_keys()), key))
+        figures: dict[str, Any] = {key: _read(key, text) for key, text in settings.items()}
+        return replace(self, **figures)
 
 
 PAPER: Final = Method()
@@ -67,3 +97,30 @@ METHODS: Final = {"paper": PAPER}
 def method_keys() -> list[str]:
     """Name the figures of a method."""
     return [item.name for item in fields(Method)]
+
+
+def find_method(name: str) -> Method:
+    """Return a method by name.
+
+    Raises:
+        TrainingError: no such method.
+    """
+    if name not in METHODS:
+        raise TrainingError(expected("--method", "", "one of " + ", ".join(METHODS), name))
+    return METHODS[name]
+
+
+def _read(key: str, text: str) -> object:
+    """Read a figure of the kind that its default is of."""
+    default = getattr(PAPER, key)
+    if isinstance(default, str):
+        return text
+    if isinstance(default, bool):
+        if text not in {"true", "false"}:
+            raise TrainingError(expected("--set", key, "true or false", text))
+        return text == "true"
+    try:
+        return type(default)(text)
+    except ValueError:
+        wanted = "a whole number" if isinstance(default, int) else "a number"
+        raise TrainingError(expected("--set", key, wanted, text)) from None

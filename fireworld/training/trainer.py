@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -12,10 +13,11 @@ from fireworld import __version__
 from fireworld.draws import EPISODE, TABLE, below, hash_key
 from fireworld.kernels.arrays import Array
 from fireworld.policy.kernel import from_tables
+from fireworld.policy.team import Team
+from fireworld.records import ACTIONS
 from fireworld.scenario import Scenario
 from fireworld.training.curriculum import Curriculum, CurriculumStage
 from fireworld.training.method import RULES, Method
-from fireworld.training.team import Team
 from fireworld.world.stage import Ground, Stage, build_stage
 from fireworld.world.state import fresh_learner
 
@@ -89,6 +91,16 @@ class Trainer:
         """Whether the curriculum is finished."""
         return self.progress.scenario_number >= len(self._plan)
 
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What decides the outcome of a training: equal identities, equal tables."""
+        return {
+            "curriculum": {"name": self.curriculum.name, "digest": self.curriculum.digest},
+            "method": self.method.as_dict(),
+            "seed": self.seed,
+            "fireworld": __version__,
+        }
+
     def __iter__(self) -> Iterator[EpisodeReport]:
         """Train, yielding after every episode."""
         while not self.done:
@@ -102,18 +114,20 @@ class Trainer:
         """Return the team as it is now."""
         progress = self.progress
         provenance = {
-            "curriculum": {"name": self.curriculum.name, "digest": self.curriculum.digest},
-            "method": self.method.as_dict(),
-            "seed": self.seed,
+            **self.identity,
+            "curriculum": self.curriculum.as_dict(),
             "scenarios_done": progress.scenario_number,
-            "fireworld": __version__,
         }
         return Team(tables=progress.tables.copy(), visits=progress.visits.copy(), provenance=provenance)
 
+    def shape(self, scenario_number: int) -> tuple[int, int, int]:
+        """Return the shape of the tables (tables, states, actions) that a scenario of the curriculum trains."""
+        stage, scenario = self._plan[scenario_number]
+        return self._n_tables(scenario), _n_states(stage), len(ACTIONS)
+
     def _begin(self) -> Progress:
         """Return untrained tables for the first stage."""
-        stage, scenario = self._plan[0]
-        shape = (self._n_tables(scenario), _n_states(stage), 4)
+        shape = self.shape(0)
         return Progress(tables=np.zeros(shape), visits=np.zeros(shape, dtype=np.int64))
 
     def _n_tables(self, scenario: Scenario) -> int:
@@ -173,13 +187,12 @@ class Trainer:
         progress.scenario_number, progress.episode, progress.n_unchanged = number + 1, 0, 0
         if self.done:
             return
-        stage, scenario = self._plan[progress.scenario_number]
+        n_tables, n_states, _ = self.shape(progress.scenario_number)
         drawn = below(self.seed, TABLE, number, 0, bound=len(progress.tables))
         table, visits = progress.tables[drawn], progress.visits[drawn]
-        if _n_states(stage) == N_STATES_TOGETHER and len(table) == N_STATES_ALONE:
+        if n_states > len(table):
             table = np.repeat(table, N_FLAG_VALUES, axis=0)  # the same for all values of the cooperation flags
             visits = np.zeros(table.shape, dtype=np.int64)
-        n_tables = self._n_tables(scenario)
         progress.tables = np.repeat(table[np.newaxis], n_tables, axis=0)
         progress.visits = np.repeat(visits[np.newaxis], n_tables, axis=0)
 

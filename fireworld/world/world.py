@@ -207,6 +207,7 @@ class World:
                 others=(bool(seen[4]), bool(seen[5]), bool(seen[6]), bool(seen[7])),
                 city=self.tables,
                 world=self.arrays,
+                constants=self.constants,
             ),
         )
 

@@ -49,7 +49,7 @@ def test_another_seed_differs_by_its_luck(here, fireworld):
     record(fireworld, "b.mcap", "--policy", "easiest", "--seed", 2)
     done = fireworld("diff", "a.mcap", "b.mcap")
     assert done.code == 1
-    assert "seed: 1 / 2" in done.out
+    assert "seed: 2, was 1" in done.out
     assert ", draw: " in done.out
 
 

@@ -25,7 +25,7 @@ def test_the_list_names_every_scenario():
     assert code == 0
     for name in scenario_names():
         assert f"\n{name} " in text
-    assert "24 x 26 lots" in text
+    assert "24 x 26 " in text
 
 
 def test_the_list_as_json():

@@ -1,0 +1,108 @@
+"""Recordings, maps and graphs of a reproduction, for `fireworld reproduce`."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fireworld.evaluation import paper
+from fireworld.evaluation.figures import draw_policy_changes, draw_returns
+from fireworld.evaluation.study import ALONE, TOGETHER, Study
+from fireworld.policy.names import NamedPolicy
+from fireworld.policy.team import Team
+from fireworld.records import CityRecord, StepRecord
+from fireworld.runs import prepare_run
+from fireworld.scenario import load_scenario
+from fireworld.world.stage import Ground, build_stage
+from recorder.writer import LogWriter
+from viewer.maps import draw_map
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A run that was recorded: what its maps need."""
+
+    scenario: str
+    team: str
+    city: CityRecord
+    first: StepRecord
+    last: StepRecord
+
+
+@dataclass(frozen=True, kw_only=True)
+class ToRecord:
+    """A run to be recorded."""
+
+    scenario: str
+    team: str
+    members: Team
+    seed: int
+    path: Path
+
+    def __call__(self, grounds: dict[str, Ground]) -> Recorded:
+        """Run and record.
+
+        Raises:
+            OutputError: the recording cannot be written.
+        """
+        policy = self.members.policy()
+        named = NamedPolicy(name=self.team, digest=policy.digest, policy=policy)
+        run = prepare_run(build_stage(load_scenario(self.scenario), grounds=grounds), named, seed=self.seed)
+        records: list[StepRecord] = []
+        with LogWriter(self.path, run.header, run.city, force=True) as log:
+            for record in run:
+                log.write(record)
+                records = [*records[:1], record]
+        return Recorded(self.scenario, self.team, run.city, records[0], records[-1])
+
+
+def runs_to_record(teams: Mapping[str, Team], *, seed: int, folder: Path) -> list[ToRecord]:
+    """List one run of each row: the cooperative team in Table 1, both teams in Tables 2 and 3."""
+    rows = [(row.scenario, TOGETHER) for row in paper.TABLE_1]
+    rows += [(row.scenario, team) for row in (*paper.TABLE_2, *paper.TABLE_3) for team in (ALONE, TOGETHER)]
+    return [
+        ToRecord(scenario=name, team=team, members=teams[team], seed=seed, path=folder / f"{name}-{team}.mcap")
+        for name, team in rows
+    ]
+
+
+def draw_all(study: Study, recorded: list[Recorded]) -> Iterator[tuple[str, bytes]]:
+    """Draw every image of the report: its name and its PNG file.
+
+    Raises:
+        ViewError: matplotlib is not installed.
+    """
+    yield "returns", _png(draw_returns(study))
+    yield "policy-changes", _png(draw_policy_changes(study))
+    tests = {row.scenario for row in (*paper.TABLE_2, *paper.TABLE_3)}
+    for run in recorded:
+        if run.scenario not in tests:
+            continue
+        if run.team == ALONE:
+            yield f"{run.scenario}-before", _map(run, run.first, "before")
+        yield f"{run.scenario}-{run.team}", _map(run, run.last, f"{run.team}, step {run.last.step}")
+
+
+def _map(run: Recorded, record: StepRecord, moment: str) -> bytes:
+    figure = draw_map(
+        run.city,
+        fieryness=record.buildings.fieryness,
+        brigades_xy=np.column_stack([record.brigades.x_m, record.brigades.y_m]),
+        civilian_hp=record.civilians.hp,
+        title=f"{run.scenario}: {moment}, score {record.score.score:.2f} of {record.score.score_max:.0f}",
+    )
+    return _png(figure)
+
+
+def _png(figure: Figure) -> bytes:
+    data = io.BytesIO()
+    figure.savefig(data, format="png", metadata={"Software": "fireworld"})
+    return data.getvalue()

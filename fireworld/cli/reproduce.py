@@ -1,0 +1,255 @@
+"""`fireworld reproduce`: train, test and judge the paper's method, and write its tables beside ours."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from fireworld.cli import INTERRUPTED
+from fireworld.cli.compiling import announce_compilation
+from fireworld.cli.interrupt import gentle_interrupt
+from fireworld.cli.report_folder import make_folder, write_file
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+    from rich.table import Table
+
+    from fireworld.cli.repetitions import Repetition
+    from fireworld.cli.workers import Workers
+    from fireworld.evaluation.study import Study
+    from fireworld.evaluation.tables import Tables
+    from fireworld.world.stage import Ground
+
+CURRICULUM: Final = "paper"
+FIRST_SEED: Final = 1000
+REPETITIONS: Final = 20
+SEEDS: Final = 20
+QUICK_REPETITIONS: Final = 2
+QUICK_SEEDS: Final = 5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Order:
+    """What was asked for."""
+
+    n_repetitions: int
+    n_seeds: int
+    folder: Path
+
+    @property
+    def seeds(self) -> range:
+        """Seeds of the test runs."""
+        return range(FIRST_SEED, FIRST_SEED + self.n_seeds)
+
+
+@click.command()
+@click.option(
+    "--repetitions", metavar="N", type=click.IntRange(1, 1000), help=f"Trainings.  [default: {REPETITIONS}; quick: 2]"
+)
+@click.option("--seeds", metavar="N", type=click.IntRange(1, 1000), help=f"Runs a test.  [default: {SEEDS}; quick: 5]")
+@click.option("--jobs", metavar="N", type=click.IntRange(1, 1000), help="Trainings at a time.  [default: cores]")
+@click.option(
+    "--out",
+    metavar="DIR",
+    default="report",
+    show_default=True,
+    type=click.Path(path_type=Path),
+    help="Folder to make.",
+)
+@click.option("--quick", is_flag=True, help="Few repetitions and seeds: to see how it looks, not to claim anything.")
+@click.option("--force", is_flag=True, help="Replace an earlier reproduction in DIR.")
+@click.pass_context
+def command(
+    context: click.Context,
+    *,
+    repetitions: int | None,
+    seeds: int | None,
+    jobs: int | None,
+    out: Path,
+    quick: bool,
+    force: bool,
+) -> None:
+    """Train the paper's teams, test them beside controls, and write its Tables 1 to 3 with our figures beside.
+
+    \b
+    fireworld reproduce                        20 trainings, 20 seeds: minutes
+    fireworld reproduce --quick --out quick    2 trainings, 5 seeds: a minute
+
+    DIR gets report.html (open it in a browser), the tables and every run as CSV, the trained teams, a recording of
+    one run of each row, and the figures. The same options give the same CSV, byte for byte.
+
+    Exit code: 0 done, whatever was found; 2 could not be done; 130 interrupted (DIR keeps the teams trained so far).
+    """  # noqa: D301 - click wants the character
+    order = Order(
+        n_repetitions=repetitions or (QUICK_REPETITIONS if quick else REPETITIONS),
+        n_seeds=seeds or (QUICK_SEEDS if quick else SEEDS),
+        folder=out,
+    )
+    _check_figures()
+    make_folder(out, force=force)
+    announce_compilation()
+    from fireworld.cli.workers import Workers
+
+    with gentle_interrupt() as interrupted, _progress() as progress:
+        found = _reproduce(order, Workers(jobs or os.cpu_count() or 1, interrupted), progress)
+    if found is None:
+        n_kept = len([*(out / "teams").glob("cooperative-*.npz")])
+        click.echo(f"interrupted; {n_kept} of {order.n_repetitions} trainings are kept in {out / 'teams'}", err=True)
+        context.exit(INTERRUPTED)
+    _show(*found)
+    click.echo(f"open {out / 'report.html'}")
+
+
+def _reproduce(order: Order, workers: Workers, progress: Progress) -> tuple[Study, Tables] | None:
+    """Train, test, judge, record, draw, write; None if interrupted."""
+    from fireworld.cli.pictures import draw_all, runs_to_record
+    from fireworld.cli.trials import all_trials, build_stages, collect
+    from fireworld.evaluation.report import report_page
+    from fireworld.evaluation.sheets import sheets
+    from fireworld.evaluation.study import Study
+    from fireworld.evaluation.tables import make_tables
+
+    grounds: dict[str, Ground] = {}
+    stages = build_stages(grounds)
+    repetitions = _train(order, workers, grounds, progress)
+    if repetitions is None:
+        return None
+    trials = all_trials(stages, repetitions, order.seeds, grounds)
+    bar = progress.add_task("testing", total=len(trials))
+    outcomes = workers.run(trials, lambda *_: progress.advance(bar))
+    if outcomes is None:
+        return None
+    study = Study(
+        n_repetitions=order.n_repetitions,
+        seeds=order.seeds,
+        lessons=[lesson for repetition in repetitions for lesson in repetition.lessons],
+        outcomes=collect(trials, outcomes),
+        agreement=[repetition.agreement for repetition in repetitions],
+    )
+    tables = make_tables(study)
+    for name, text in sheets(study, tables).items():
+        write_file(order.folder / name, text.encode())
+    to_record = runs_to_record(repetitions[0].teams, seed=FIRST_SEED, folder=order.folder / "recordings")
+    bar, recorded = progress.add_task("recording", total=len(to_record)), []
+    for run in to_record:
+        if workers.stop.is_set():
+            return None
+        recorded.append(run(grounds))
+        progress.advance(bar)
+    images = {}
+    for name, image in progress.track(draw_all(study, recorded), total=20, description="drawing"):
+        images[name] = image
+        write_file(order.folder / "figures" / f"{name}.png", image)
+    write_file(order.folder / "report.html", report_page(study, tables, images).encode())
+    return study, tables
+
+
+def _train(order: Order, workers: Workers, grounds: dict[str, Ground], progress: Progress) -> list[Repetition] | None:
+    """Train all repetitions, each written as soon as it is done; None if interrupted."""
+    from fireworld.cli.repetitions import Training, n_scenarios
+    from fireworld.policy.team import save_team
+    from fireworld.training.curriculum import load_curriculum
+    from fireworld.training.method import PAPER
+
+    curriculum = load_curriculum(CURRICULUM)
+    bar = progress.add_task("training", total=order.n_repetitions * n_scenarios(curriculum))
+
+    def keep(place: int, repetition: Repetition) -> None:
+        for name, team in repetition.teams.items():
+            save_team(team, order.folder / "teams" / f"{name}-{place + 1}.npz")
+
+    trainings = [
+        Training(
+            curriculum=curriculum,
+            method=PAPER,
+            number=number,
+            grounds=grounds,
+            stop=workers.stop,
+            on_scenario=lambda: progress.advance(bar),
+        )
+        for number in range(1, order.n_repetitions + 1)
+    ]
+    return workers.run(trainings, keep)
+
+
+def _check_figures() -> None:
+    """See that figures can be drawn, before minutes of training.
+
+    Raises:
+        ViewError: matplotlib is not installed.
+    """
+    from importlib.util import find_spec
+
+    from fireworld.errors import ViewError
+
+    if find_spec("matplotlib") is None:
+        raise ViewError("reproduce: matplotlib is not installed; try pip install 'fireworld[figures]'")
+
+
+@contextmanager
+def _progress() -> Iterator[Progress]:
+    """Show bars where people watch."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        yield progress
+
+
+def _show(study: Study, tables: Tables) -> None:
+    """Show the findings and the paper's tables in the terminal."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from fireworld.evaluation.findings import caveat, findings
+
+    console = Console(highlight=False)
+    console.print(_figures_table(tables))
+    answers = Table("question", "answer", title="findings")
+    for finding in findings(study, tables):
+        answers.add_row(finding.question, finding.verdict)
+    console.print(answers)
+    if (warning := caveat(study)) is not None:
+        click.echo(warning)
+
+
+def _figures_table(tables: Tables) -> Table:
+    """Return the paper's Tables 1 to 3 and ours side by side."""
+    from rich.box import SIMPLE_HEAD
+    from rich.markup import escape
+    from rich.table import Table
+
+    from fireworld.evaluation.findings import spread
+    from fireworld.evaluation.tables import APART, NEAR, WITHIN, Cell
+
+    marks = {WITHIN: "=", NEAR: "~", APART: "x"}
+    short = {"convergence episode": "episodes", "time to complete": "time"}
+
+    def compared(cell: Cell) -> str:
+        digits = 1 if cell.quantity == "score" else 0
+        return escape(f"{cell.paper:g}: {spread(cell.ours, digits=digits)} {marks[cell.verdict]}")
+
+    table = Table(
+        title="paper: ours [95 % interval]",
+        caption="= the paper's figure is in it, ~ our mean is within 25 % of it, x neither",
+        box=SIMPLE_HEAD,
+    )
+    table.add_column("scenario", no_wrap=True)
+    table.add_column("figure", no_wrap=True)
+    table.add_column("without cooperation", justify="right", no_wrap=True)
+    table.add_column("with", justify="right", no_wrap=True)
+    for cell in tables.lessons:
+        table.add_row(cell.scenario, short.get(cell.quantity, cell.quantity), "", compared(cell))
+    for pair in (*tables.tests, *tables.more_brigades):
+        scenario, quantity = pair.without.scenario.replace("-brigades-", ", "), pair.without.quantity
+        figures = compared(pair.without), compared(pair.together)
+        table.add_row(scenario, short.get(quantity, quantity), *figures)
+    return table

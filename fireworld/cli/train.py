@@ -1,0 +1,209 @@
+"""`fireworld train`: train teams through a curriculum."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Lock
+from typing import TYPE_CHECKING, Protocol
+
+import click
+
+from fireworld.cli import INTERRUPTED
+from fireworld.cli.compiling import announce_compilation
+from fireworld.cli.interrupt import gentle_interrupt
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fireworld.training.teams import Training
+    from fireworld.training.trainer import EpisodeReport
+
+SEED_MAX = 2**32 - 1
+
+
+class Report(Protocol):
+    """What is called after every episode, by any thread."""
+
+    def __call__(self, training: Training, episode: EpisodeReport, /) -> None:
+        """Show an episode."""
+        ...
+
+
+@click.command()
+@click.argument("curriculum", default="paper")
+@click.option(
+    "-o", "--output", required=True, metavar="TEAM.npz", type=click.Path(path_type=Path), help="Team file to write."
+)
+@click.option("--method", default="paper", show_default=True, help="How to learn: a method by its name.")
+@click.option("--set", "settings", metavar="KEY=VALUE", multiple=True, help="Set a figure of the method; repeatable.")
+@click.option("--stages", metavar="NAME,...", help="Train in these stages of the curriculum only.")
+@click.option("--seed", default=1, show_default=True, type=click.IntRange(0, SEED_MAX), help="Seed of all luck.")
+@click.option(
+    "--repetitions",
+    default=1,
+    show_default=True,
+    type=click.IntRange(1, 10_000),
+    metavar="N",
+    help="Train N teams, TEAM-1.npz and so on, with the seeds that follow --seed.",
+)
+@click.option("--jobs", type=click.IntRange(1, 1000), metavar="N", help="Teams to train at a time.  [default: cores]")
+@click.option("--log", metavar="F.csv", type=click.Path(path_type=Path), help="Write a line for every episode.")
+@click.option("--resume", is_flag=True, help="Go on from the checkpoint of an interrupted training.")
+@click.option("--force", is_flag=True, help="Replace existing files, checkpoints too.")
+@click.pass_context
+def command(
+    context: click.Context,
+    *,
+    curriculum: str,
+    output: Path,
+    method: str,
+    settings: tuple[str, ...],
+    stages: str | None,
+    seed: int,
+    repetitions: int,
+    jobs: int | None,
+    log: Path | None,
+    resume: bool,
+    force: bool,
+) -> None:
+    """Train a team in CURRICULUM (a shipped name or a YAML file; `paper` if left out) and write its team file.
+
+    \b
+    fireworld train -o team.npz                          the paper's method, both stages
+    fireworld train -o alone.npz --stages alone          without cooperation: 270 states
+    fireworld train -o team.npz --set alpha=0.1 --seed 7
+    fireworld run test-2 --policy team.npz               let it fight a fire
+
+    The same seed gives the same tables. Ctrl-C keeps a checkpoint, TEAM.npz.checkpoint, from which --resume goes on bit
+    for bit.
+
+    Exit code: 0 trained, 2 could not train, 130 interrupted.
+    """  # noqa: D301 - click wants the character
+    if force and resume:
+        raise click.UsageError("--force and --resume exclude each other.")
+    if output.suffix != ".npz":
+        raise click.UsageError(f"-o: expected a name that ends in .npz, got {str(output)!r}.")
+    if log == output:
+        raise click.UsageError("-o and --log name the same file.")
+    if seed + repetitions - 1 > SEED_MAX:
+        raise click.UsageError(f"--repetitions: expected seeds up to {SEED_MAX}, got up to {seed + repetitions - 1}.")
+    announce_compilation()
+    from fireworld.scenario import split_settings
+    from fireworld.training.curriculum import load_curriculum
+    from fireworld.training.method import find_method
+    from fireworld.training.teams import Training, numbered, train_all
+    from fireworld.training.trainer import Trainer
+    from fireworld.world.stage import Ground
+
+    learned = find_method(method).with_settings(split_settings(settings, example="alpha=0.1"))
+    chosen = load_curriculum(curriculum)
+    chosen = chosen if stages is None else chosen.only([name.strip() for name in stages.split(",")])
+    grounds: dict[str, Ground] = {}
+    trainings = [
+        Training(
+            trainer=Trainer(chosen, learned, seed=seed + number - 1, grounds=grounds),
+            path=numbered(output, number, n_all=repetitions),
+            log_path=numbered(log, number, n_all=repetitions) if log is not None else None,
+            force=force,
+        )
+        for number in range(1, repetitions + 1)
+    ]
+    _begin(trainings, resume=resume)
+    n_jobs = min(jobs or os.cpu_count() or 1, repetitions)
+    with gentle_interrupt() as interrupted, _progress(trainings) as report:
+        train_all(trainings, n_jobs=n_jobs, stop=interrupted, report=report)
+    for training in trainings:
+        _show(training)
+    context.exit(0 if all(training.team is not None for training in trainings) else INTERRUPTED)
+
+
+def _begin(trainings: list[Training], *, resume: bool) -> None:
+    """See that nothing is in the way, or find what there is to go on from."""
+    from fireworld.errors import TrainingError, expected
+
+    if not resume:
+        for training in trainings:
+            training.begin()
+        return
+    found = [training.resume() for training in trainings]  # all of them, each to be looked at
+    if not any(found):
+        got = f"no {trainings[0].checkpoint}"
+        raise TrainingError(expected("--resume", "", "a checkpoint to go on from", got, "leave out --resume"))
+
+
+def _show(training: Training) -> None:
+    """Say what came of a training."""
+    progress, team = training.trainer.progress, training.team
+    if team is not None:
+        n, states, _ = team.tables.shape
+        what = f"{n} table{'s' if n > 1 else ''} of {states} states"
+        click.echo(f"{training.path}: seed {training.trainer.seed}, {what}, digest {team.digest}")
+    elif training.checkpoint.exists():
+        where = f"scenario {progress.scenario_number + 1}, after {progress.episode} episodes"
+        click.echo(f"interrupted in {where}; {training.checkpoint} is kept: go on with --resume", err=True)
+
+
+@contextmanager
+def _progress(trainings: list[Training]) -> Iterator[Report]:
+    """Show progress: bars where people watch, else a line for every scenario that is done."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if console.is_terminal:
+        with _bars(trainings, console) as report:
+            yield report
+    else:
+        yield _lines()
+
+
+def _lines() -> Report:
+    lock = Lock()
+
+    def report(training: Training, episode: EpisodeReport, /) -> None:
+        if training.trainer.progress.episode:  # it starts at 0 again with every scenario
+            return
+        ended = "settled" if episode.converged else "not settled"
+        with lock:
+            click.echo(
+                f"seed {training.trainer.seed}: {episode.scenario}: {episode.episode + 1} episodes, {ended}, "
+                f"score {episode.score:.2f} of {episode.score_max:.0f}, return {episode.total_reward:,.0f}",
+                err=True,
+            )
+
+    return report
+
+
+@contextmanager
+def _bars(trainings: list[Training], console: Console) -> Iterator[Report]:
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.fields[state]}"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console, transient=True) as progress:
+        tasks = {
+            training.trainer.seed: progress.add_task(
+                f"seed {training.trainer.seed}", total=training.trainer.curriculum.n_scenarios, state="", start=False
+            )
+            for training in trainings
+        }
+
+        def report(training: Training, episode: EpisodeReport, /) -> None:
+            trainer = training.trainer
+            task = tasks[trainer.seed]
+            progress.start_task(task)
+            done = trainer.progress.scenario_number
+            part = trainer.progress.episode / trainer.method.n_episodes_max
+            state = (
+                f"{episode.scenario}, episode {episode.episode + 1}, epsilon {episode.epsilon:.3f}, "
+                f"return {episode.total_reward:,.0f}, {episode.n_changed} changes"
+            )
+            progress.update(task, completed=done + part, state=state)
+
+        yield report

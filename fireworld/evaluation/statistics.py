@@ -1,0 +1,110 @@
+"""Means and 95 % intervals over repetitions of a training and seeds of a test: the same numbers on every machine.
+
+A team that learned differs from repetition to repetition, and a run from seed to seed. Both are drawn anew in every
+resample of the bootstrap, repetitions and seeds apart from each other, because all repetitions meet the same seeds.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from fireworld.draws import below
+from fireworld.kernels.arrays import Array
+
+N_RESAMPLES: Final = 2000
+_TAIL: Final = N_RESAMPLES // 40  # 2.5 % of the resamples lie below the interval, and as many above
+_RESAMPLE: Final = 1000
+"""Purpose of the draws of this module; a run's own are numbered in fireworld.draws."""
+_REPETITIONS: Final = 0
+_SEEDS: Final = 1
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A mean over repetitions and seeds, and how sure it is."""
+
+    mean: float
+    low: float
+    """Lower end of the 95 % interval."""
+    high: float
+    """Upper end of the 95 % interval."""
+    interquartile_mean: float
+    """Mean of the middle half of all values: what a typical run comes to."""
+    n_repetitions: int
+    n_seeds: int
+
+    @property
+    def above_zero(self) -> bool:
+        """Whether the whole interval lies above zero."""
+        return self.low > 0.0
+
+    @property
+    def below_zero(self) -> bool:
+        """Whether the whole interval lies below zero."""
+        return self.high < 0.0
+
+
+def estimate(values: Array) -> Estimate:
+    """Estimate a mean and its 95 % interval by a two-level bootstrap.
+
+    Args:
+        values: (repetitions, seeds); column k holds the runs of one seed. (1, seeds) for what does not learn.
+    """
+    table = np.asarray(values, dtype=np.float64)
+    n_repetitions, n_seeds = table.shape
+    rows, columns = _resampled(n_repetitions, _REPETITIONS), _resampled(n_seeds, _SEEDS)
+    total = np.zeros(N_RESAMPLES)
+    for row in rows:  # one after another, so that every machine adds in the same order
+        for column in columns:
+            total += table[row, column]
+    means, middle = np.sort(total / table.size), mean(table)
+    return Estimate(
+        mean=middle,
+        low=min(float(means[_TAIL]), middle),  # equal values have an interval of no width: rounding must not shift it
+        high=max(float(means[-1 - _TAIL]), middle),
+        interquartile_mean=interquartile_mean(table),
+        n_repetitions=n_repetitions,
+        n_seeds=n_seeds,
+    )
+
+
+def mean(values: Array) -> float:
+    """Return the mean of all values, rounded once."""
+    return math.fsum(values.ravel().tolist()) / values.size
+
+
+def interquartile_mean(values: Array) -> float:
+    """Return the mean of all values but the lowest and the highest quarter (rounded down)."""
+    ordered = np.sort(values, axis=None)
+    cut = len(ordered) // 4
+    return mean(ordered[cut : len(ordered) - cut])
+
+
+def paired_difference(values: Array, others: Array) -> Estimate:
+    """Estimate the mean of values - others, run by run on the same repetition and seed.
+
+    Args:
+        values: (repetitions, seeds).
+        others: (repetitions, seeds) of the same seeds, or (1, seeds).
+    """
+    return estimate(np.asarray(values, dtype=np.float64) - np.asarray(others, dtype=np.float64))
+
+
+def probability_of_improvement(values: Array, others: Array) -> Estimate:
+    """Estimate how probable it is that a run is better than its pair; a tie counts as half. Shapes as above."""
+    better, equal = np.greater(values, others), np.equal(values, others)
+    return estimate(np.where(better, 1.0, np.where(equal, 0.5, 0.0)))
+
+
+@lru_cache(maxsize=64)
+def _resampled(n: int, level: int) -> Array:
+    """Draw n of n with replacement for every resample: (n, N_RESAMPLES)."""
+    drawn = [
+        [below(n, _RESAMPLE, level, place * N_RESAMPLES + k, bound=n) for k in range(N_RESAMPLES)] for place in range(n)
+    ]
+    return np.array(drawn, dtype=np.intp)

@@ -1,0 +1,98 @@
+"""Study: everything that a reproduction of the paper has measured, before any of it is judged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from fireworld.evaluation.runs import Outcomes
+from fireworld.kernels.arrays import Array
+
+ALONE: Final = "non-cooperative"
+TOGETHER: Final = "cooperative"
+TOGETHER_WITHOUT_FLAGS: Final = "270-states-in-team"
+RANDOM_TABLES: Final = "random-tables"
+NO_WATER: Final = "no-water"
+FIXED: Final = ("easiest", "nearest-to-civilian", "nearest-to-center", "nearest-to-me", "each-another", "chief")
+"""Policies that are rules, not learned and not drawn."""
+
+TEAMS: Final[Mapping[str, str]] = {
+    TOGETHER: "the paper's cooperative team: 4320 states, trained alone, then together",
+    ALONE: "the paper's non-cooperative team: 270 states, trained alone",
+    TOGETHER_WITHOUT_FLAGS: "control: 270 states, trained alone, then together",
+    RANDOM_TABLES: "control: 4320 states, every entry drawn at random",
+    "random": "control: a random action in every step",
+    **dict.fromkeys(FIXED[:4], "control: always this action"),
+    "each-another": "control: every brigade another action",
+    "chief": "control: a rule written by hand",
+    NO_WATER: "control: the fire left to itself",
+}
+"""What is tested, by name."""
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """What one team went through in one scenario of its training."""
+
+    repetition: int
+    team: str
+    """TOGETHER or TOGETHER_WITHOUT_FLAGS; both begin with the same stage alone, told once, as ALONE."""
+    scenario: str
+    scenario_number: int
+    """Counted through the curriculum, from 0."""
+    converged: bool
+    score: float
+    """Of the last episode."""
+    score_max: float
+    total_reward: Array  # (episodes,) return of each episode
+    n_changed: Array  # (episodes,) states whose greedy action changed
+
+    @property
+    def n_episodes(self) -> int:
+        """Episodes until the policy had settled, or until the method gave up."""
+        return len(self.total_reward)
+
+
+@dataclass(frozen=True)
+class Study:
+    """All that was measured.
+
+    Attributes:
+        n_repetitions: trainings.
+        seeds: of the test runs.
+        lessons: of all repetitions.
+        outcomes: by scenario and team: one Outcomes a repetition, one in all for what does not differ between them.
+        agreement: (repetitions,) share of the states in which all brigades of the cooperative team, at the end of their
+            training, prefer the same action, among states that one of them has met.
+    """
+
+    n_repetitions: int
+    seeds: Sequence[int]
+    lessons: Sequence[Lesson]
+    outcomes: Mapping[str, Mapping[str, Sequence[Outcomes]]]
+    agreement: Sequence[float]
+
+    def values(self, scenario: str, team: str, quantity: str) -> Array:
+        """Return one quantity of all runs: (repetitions or 1, seeds) float64.
+
+        Args:
+            scenario: a test.
+            team: one of TEAMS.
+            quantity: an attribute of Outcomes.
+        """
+        rows = [getattr(outcomes, quantity) for outcomes in self.outcomes[scenario][team]]
+        return np.array(rows, dtype=np.float64)
+
+    def mean_share(self, scenarios: Sequence[str], team: str) -> Array:
+        """Return the share of the greatest score, mean over scenarios, run by run: (repetitions or 1, seeds)."""
+        total = self.values(scenarios[0], team, "score_share")
+        for scenario in scenarios[1:]:
+            total = total + self.values(scenario, team, "score_share")
+        return total / len(scenarios)
+
+    def lessons_of(self, team: str, scenario: str) -> list[Lesson]:
+        """Return what the repetitions of a team went through in one scenario."""
+        return [lesson for lesson in self.lessons if (lesson.team, lesson.scenario) == (team, scenario)]

@@ -1,0 +1,70 @@
+"""Forecast: what comes of a joint assignment of actions, tried out on a copy of the world."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from fireworld.kernels.arrays import WorldArrays
+from fireworld.policy.kernel import always
+from fireworld.policy.protocol import Observation
+from fireworld.world.state import NO_LEARNER, copy_into, copy_world
+
+Assignment = tuple[int, ...]
+"""(b,) the action of each brigade."""
+
+FIRST_SEED: Final = 1 << 32
+"""Seeds of runs lie below, those of rollouts at and above: no plan is made on the luck that the run will meet."""
+BURNING_COST: Final = 0.005
+"""What a building that still burns at the end of a rollout costs: a share of the maximal score."""
+
+
+class Forecast:
+    """Values of assignments at one moment; each is computed once.
+
+    All assignments meet the same luck, so that their values differ by what the brigades do, not by chance.
+
+    Args:
+        observation: the moment.
+        copy: arrays of the same shapes as the world's, overwritten by every rollout.
+        horizon: steps of a rollout.
+        rollouts: rollouts of each assignment, each with luck of its own.
+    """
+
+    def __init__(self, observation: Observation, copy: WorldArrays, *, horizon: int, rollouts: int) -> None:
+        self._observation = observation
+        self._copy = copy
+        self._horizon = horizon
+        self._rollouts = rollouts
+        self._policy = always(0).for_brigades(len(observation.world.brigades.action))
+        self._values: dict[Assignment, float] = {}
+
+    def value(self, assignment: Assignment) -> float:
+        """Return what an assignment is worth that all brigades keep to until the horizon: a mean over the rollouts.
+
+        score / maximal score - 0.005 * burning buildings, at the end of the rollout. The second term stands for what
+        the fire that is left will still cost.
+        """
+        held = self._values.get(assignment)
+        if held is None:
+            self._policy.action[:] = assignment
+            total = 0.0
+            for rollout in range(self._rollouts):
+                total += self._roll_out(rollout)
+            held = self._values[assignment] = total / self._rollouts
+        return held
+
+    def _roll_out(self, rollout: int) -> float:
+        from fireworld.kernels.episode import run_episode  # the largest kernel: compiled only where it is used
+
+        moment, copy = self._observation, self._copy
+        copy_into(copy, moment.world)
+        seed = FIRST_SEED + moment.step * self._rollouts + rollout
+        last_step = moment.step + self._horizon - 1
+        run_episode(moment.city, copy, moment.constants, self._policy, NO_LEARNER, seed, moment.step, last_step)
+        outcome = copy.outcome
+        return float(outcome.score[0] / outcome.score[1] - BURNING_COST * outcome.counts[0])
+
+
+def room_for(world: WorldArrays) -> WorldArrays:
+    """Return arrays in which rollouts from a world can take place."""
+    return copy_world(world)

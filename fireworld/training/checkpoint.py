@@ -1,0 +1,82 @@
+"""Checkpoint: a training that was stopped between two episodes, to go on from bit for bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from fireworld.errors import TrainingError, expected
+from fireworld.kernels.arrays import Array
+from fireworld.policy.team import Team, read_team, save_team
+from fireworld.training.trainer import Progress, Trainer
+
+SUFFIX: Final = ".checkpoint"
+HINT: Final = "name what it was begun with, or begin again with --force"
+
+
+def checkpoint_path(path: Path) -> Path:
+    """Name the checkpoint of the team file that a training is to make."""
+    return path.with_name(path.name + SUFFIX)
+
+
+def save_checkpoint(trainer: Trainer, path: Path, *, log: bytes = b"") -> None:
+    """Write where a training stands: a team file with a place in the curriculum and the log so far.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    progress = trainer.progress
+    place = np.array([progress.scenario_number, progress.episode, progress.n_unchanged], dtype=np.int64)
+    extra: dict[str, Array] = {"place": place, "log": np.frombuffer(log, dtype=np.uint8)}
+    save_team(trainer.team(), path, force=True, extra=extra)
+
+
+def restore_checkpoint(trainer: Trainer, path: Path) -> bytes:
+    """Let a trainer go on where a checkpoint stands; return the log so far.
+
+    Raises:
+        TrainingError: not a checkpoint, or one of another curriculum, method, seed or version.
+    """
+    team, extra = read_team(path)
+    check_identity(team, trainer, path)
+    place, log = extra.get("place"), extra.get("log")
+    if place is None or log is None or place.shape != (3,) or place.dtype != np.int64 or log.dtype != np.uint8:
+        raise TrainingError(expected(str(path), "", "a checkpoint", "a team file without a place in its training"))
+    trainer.progress = _progress(trainer, team, place, path)
+    return log.tobytes()
+
+
+def check_identity(team: Team, trainer: Trainer, path: Path) -> None:
+    """Refuse a team that another training made than the one that is asked for.
+
+    Raises:
+        TrainingError: it differs in curriculum, method, seed or version.
+    """
+    provenance = dict(team.provenance)
+    found = provenance.get("curriculum")
+    if isinstance(found, dict):
+        provenance["curriculum"] = {key: found.get(key) for key in ("name", "digest")}
+    for key, wanted in trainer.identity.items():
+        got = provenance.get(key)
+        if got == wanted:
+            continue
+        if isinstance(got, dict) and isinstance(wanted, dict):
+            part = next(name for name in [*wanted, *got] if got.get(name) != wanted.get(name))
+            key, wanted, got = f"{key}.{part}", wanted.get(part), got.get(part)  # noqa: PLW2901 - the part at fault
+        raise TrainingError(expected(str(path), key, str(wanted), got, HINT))
+
+
+def _progress(trainer: Trainer, team: Team, place: Array, path: Path) -> Progress:
+    """Return the progress that a checkpoint tells of."""
+    number, episode, n_unchanged = (int(value) for value in place)
+    in_curriculum = 0 <= number < trainer.curriculum.n_scenarios
+    if not (in_curriculum and 0 <= n_unchanged <= episode < trainer.method.n_episodes_max):
+        wanted = "[scenario, episode, episodes without a change] within the curriculum"
+        raise TrainingError(expected(str(path), "place", wanted, str(place.tolist())))
+    if team.tables.shape != trainer.shape(number):
+        raise TrainingError(expected(str(path), "tables", f"shape {trainer.shape(number)}", str(team.tables.shape)))
+    return Progress(
+        scenario_number=number, episode=episode, n_unchanged=n_unchanged, tables=team.tables, visits=team.visits
+    )

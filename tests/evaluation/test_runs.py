@@ -1,0 +1,43 @@
+"""Outcomes of many seeds: those of the runs one by one, whatever the number of threads."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fireworld.evaluation.runs import QUANTITIES, evaluate
+from fireworld.policy.names import BUILT_IN, load_policy
+from fireworld.runs import prepare_run
+from fireworld.scenario import load_scenario
+from fireworld.world.stage import build_stage
+
+SEEDS = [3, 1, 4]
+
+
+@pytest.fixture(scope="module")
+def stage():
+    return build_stage(load_scenario("quick").with_settings({"steps": "60"}))
+
+
+def test_outcomes_are_those_of_recorded_runs(stage):
+    found = evaluate(stage, BUILT_IN["nearest-to-me"](), SEEDS)
+    for place, seed in enumerate(SEEDS):
+        last = [*prepare_run(stage, load_policy("nearest-to-me"), seed=seed)][-1]
+        assert found.seed[place] == seed
+        assert found.score[place] == last.score.score
+        assert found.score_max[place] == last.score.score_max == 5
+        assert found.burnt_out[place] == last.score.n_burnt_out
+        assert found.steps[place] == last.step
+        assert found.completed[place] == last.terminated
+        assert found.civilians_alive[place] == last.score.n_civilians_alive
+        assert found.total_reward[place] == last.rewards.sum_so_far
+        assert found.water_litres[place] == last.score.water_used_litres
+    assert found.score_share.tolist() == [score / 5 for score in found.score.tolist()]
+
+
+def test_threads_change_nothing(stage):
+    one = evaluate(stage, BUILT_IN["random"](), range(8))
+    many = evaluate(stage, BUILT_IN["random"](), range(8), n_threads=3)
+    assert len(set(one.total_reward.tolist())) > 4
+    for quantity in ("seed", *QUANTITIES):
+        np.testing.assert_array_equal(getattr(one, quantity), getattr(many, quantity))

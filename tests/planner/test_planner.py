@@ -1,0 +1,145 @@
+"""The planner as a policy: when it plans, what it tells, that it can be recorded and replayed, and that it is good."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from fireworld.errors import PolicyError
+from fireworld.planning.planner import Planner, PlannerOptions, planner
+from fireworld.policy.asking import begin
+from fireworld.policy.kernel import always
+from fireworld.policy.names import load_policy
+from fireworld.records import MemoryRecording
+from fireworld.replay import Replay
+from fireworld.runs import prepare_run
+from fireworld.scenario import load_scenario
+from fireworld.testing import PolicyConformance
+from fireworld.world.stage import build_stage
+from recorder.diff import compare
+from tests.world.town import town_world
+
+SHORT = PlannerOptions(horizon=6, interval=3)
+
+
+class TestConformance(PolicyConformance):
+    def make_policy(self):
+        return Planner(SHORT)
+
+
+@pytest.fixture(scope="module")
+def stage():
+    return build_stage(load_scenario("quick"))
+
+
+def decisions_of(world, policy, *, n_steps):
+    begin(policy, world.tables, n_brigades=world.n_brigades, seed=world.seed)
+    return [world.step(policy).decisions for _ in range(n_steps)]
+
+
+@pytest.mark.parametrize("interval", [1, 3, 4])
+def test_it_plans_once_a_period_and_keeps_to_the_plan(stage, interval):
+    made = decisions_of(stage.world(seed=3), Planner(PlannerOptions(horizon=5, interval=interval)), n_steps=12)
+    asked = [step for step, decisions in enumerate(made, start=1) if any(each.action >= 0 for each in decisions)]
+    planned = [step for step, decisions in enumerate(made, start=1) if any(each.q_values for each in decisions)]
+    assert planned == [
+        min(step for step in asked if step // interval == k) for k in sorted({s // interval for s in asked})
+    ]
+    for before, after, step in zip(made, made[1:], range(2, 13), strict=False):
+        if step not in planned:
+            assert all(
+                old.action == new.action
+                for old, new in zip(before, after, strict=True)
+                if min(old.action, new.action) >= 0
+            )
+
+
+def test_its_q_values_say_why(stage):
+    made = decisions_of(stage.world(seed=3), Planner(PlannerOptions(horizon=10, interval=1)), n_steps=6)
+    explained = [each for decisions in made for each in decisions if each.q_values is not None]
+    assert len({each.q_values for each in explained}) > 1
+    assert all(each.q_values[each.action] == max(each.q_values) for each in explained)
+
+
+def test_a_brigade_that_comes_back_in_between_follows_the_plan():
+    world, policy = town_world(seed=3, n_fires=12, n_brigades=2), Planner(PlannerOptions(horizon=5, interval=1000))
+    begin(policy, world.tables, n_brigades=2, seed=world.seed)
+    world.arrays.brigades.refilling[0] = 1
+    assert world.step(policy).decisions[0].action == -1
+    world.arrays.brigades.refilling[0] = 0
+    returned = world.step(policy).decisions[0]
+    assert 0 <= returned.action < 4
+    assert returned.q_values is None
+
+
+@pytest.mark.parametrize("n_brigades", [1, 8])
+def test_teams_of_any_size(n_brigades):
+    made = decisions_of(town_world(seed=3, n_fires=12, n_brigades=n_brigades), Planner(SHORT), n_steps=4)
+    assert all(len(decisions) == n_brigades for decisions in made)
+
+
+def test_a_recorded_run_of_it_replays(stage):
+    run = prepare_run(stage, load_policy("planner:horizon=8"), seed=4, n_steps_max=20)
+    recording = MemoryRecording(run.header, run.city, list(run))
+    difference = compare(recording, Replay(recording))
+    assert difference.same
+    again = MemoryRecording(
+        run.header, run.city, list(prepare_run(stage, load_policy("planner:horizon=8"), seed=4, n_steps_max=20))
+    )
+    assert compare(recording, again).same
+
+
+def test_it_does_better_than_every_fixed_action(stage):
+    def score(play):
+        world = stage.world(seed=4)
+        play(world)
+        return float(world.arrays.outcome.score[0])
+
+    def plan(world):
+        policy = Planner()
+        while not (world.terminated or world.truncated):
+            world.step(policy)
+
+    fixed = [score(lambda world, a=action: world.run(always(a).for_brigades(world.n_brigades))) for action in range(4)]
+    assert score(plan) >= max(fixed)
+
+
+def test_names():
+    assert load_policy("planner").policy.options == PlannerOptions()
+    named = load_policy("planner:rollouts=2,horizon=50")
+    assert named.name == "planner:rollouts=2,horizon=50"
+    assert named.policy.options == PlannerOptions(horizon=50, rollouts=2)
+    digests = {planner(text).digest for text in ("", "horizon=31", "interval=5", "rollouts=2")}
+    assert len(digests) == 4
+    assert planner("horizon=31").digest == planner("horizon=31").digest
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("horizn=3", "--policy: planner: expected options horizon, interval, rollouts, got 'horizn'; try horizon"),
+        ("horizon=", "--policy: planner:horizon: expected a whole number from 1 to 1000, got ''"),
+        ("horizon=0", "from 1 to 1000, got 0"),
+        ("interval=-1", "planner:interval: expected a whole number from 1 to 1000, got '-1'"),
+        ("rollouts=1.5", "got '1.5'"),
+        ("rollouts=\u0663", "expected a whole number"),
+        ("horizon=99999999999999999999", "from 1 to 1000"),
+        ("horizon=3,horizon=4", "expected every option once, got 'horizon' twice|got horizon twice"),
+        ("horizon=3,", "expected options horizon, interval, rollouts, got ''"),
+    ],
+)
+def test_what_is_wrong_with_options(text, message):
+    with pytest.raises(PolicyError, match=message) as caught:
+        load_policy(f"planner:{text}")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_module_of_that_name_is_still_ones_own(tmp_path, monkeypatch):
+    source = "class Mine:\n    def decide(self, observation):\n        return None\n"
+    (tmp_path / "planner.py").write_text(source)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", sys.path.copy())
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    assert type(load_policy("planner:Mine").policy).__name__ == "Mine"
+    del sys.modules["planner"]

@@ -1,0 +1,135 @@
+"""`fireworld train` and `fireworld policy`: as a user calls them, with every way to go wrong."""
+
+from __future__ import annotations
+
+import json
+import signal
+import time
+
+import pytest
+
+from fireworld.policy.team import load_team
+from fireworld.training.trainer import Trainer
+from recorder.reader import open_log
+from tests.training.conftest import SHORT_WORDS
+
+TRAIN = ("train", "tiny.yaml", *SHORT_WORDS, "-o")
+
+
+@pytest.fixture
+def files(here):
+    """The files in the current folder, by name."""
+    return lambda: sorted(path.name for path in here.iterdir() if path.suffix != ".yaml")
+
+
+def test_train_twice_and_follow(here, fireworld, files):
+    done = fireworld(*TRAIN, "a.npz", "--log", "a.csv")
+    assert done.code == 0
+    digest = load_team(here / "a.npz").digest
+    assert done.out == f"a.npz: seed 1, 3 tables of 4320 states, digest {digest}\n"
+    assert "seed 1: alone-1: " in done.err
+    assert fireworld(*TRAIN, "b.npz").code == 0
+    same = fireworld("policy", "diff", "a.npz", "b.npz")
+    assert (same.code, same.out) == (0, "the same: 4320 states\n")
+    run = fireworld("run", "quick", "--policy", "a.npz", "--steps", 9, "--record", "a.mcap", "--json")
+    assert run.code == 0
+    assert run.err == "a.npz: 3 tables for 2 brigades: the last 1 are not used\n"
+    assert json.loads(run.out)["policy"] == "a.npz"
+    assert open_log(here / "a.mcap").header.attachments["policy.npz"] == (here / "a.npz").read_bytes()
+    assert fireworld("verify", "a.mcap").code == 0
+    assert files() == ["a.csv", "a.mcap", "a.npz", "b.npz"]
+
+
+def test_repetitions_and_stages(here, fireworld, files):
+    done = fireworld(*TRAIN, "t.npz", "--stages", "alone", "--repetitions", 2, "--seed", 4, "--log", "l.csv")
+    assert done.code == 0
+    assert files() == ["l-1.csv", "l-2.csv", "t-1.npz", "t-2.npz"]
+    assert [line.split(",")[0] for line in done.out.splitlines()] == ["t-1.npz: seed 4", "t-2.npz: seed 5"]
+    assert load_team(here / "t-2.npz").tables.shape == (1, 270, 4)
+
+
+def test_ctrl_c_and_resume(here, fireworld, files, monkeypatch):
+    whole, run_episode, n_left = fireworld(*TRAIN, "whole.npz"), Trainer._run_episode, [5]
+
+    def interrupted(*arguments):
+        n_left[0] -= 1
+        if n_left[0] == 0:
+            signal.raise_signal(signal.SIGINT)
+            time.sleep(0.5)
+        return run_episode(*arguments)
+
+    monkeypatch.setattr(signal, "getsignal", lambda _: signal.default_int_handler)
+    monkeypatch.setattr(Trainer, "_run_episode", interrupted)
+    done = fireworld(*TRAIN, "t.npz")
+    assert done.code == 130
+    assert done.out == ""
+    assert "t.npz.checkpoint is kept: go on with --resume" in done.err
+    assert files() == ["t.npz.checkpoint", "whole.npz"]
+    again = fireworld(*TRAIN, "t.npz")
+    assert again.code == 2
+    assert again.err.count("\n") == 1
+    other = fireworld(*TRAIN, "t.npz", "--resume", "--seed", 9)
+    assert other.code == 2
+    assert other.err.startswith("fireworld: t.npz.checkpoint: seed: expected 9, got 1")
+    resumed = fireworld(*TRAIN, "t.npz", "--resume")
+    assert resumed.code == 0
+    assert resumed.out == whole.out.replace("whole", "t")
+    assert files() == ["t.npz", "whole.npz"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("train", "absent", "-o", "t.npz"), "fireworld: absent: expected a curriculum file or one of paper, got "),
+        ((*TRAIN, "t.npz", "--method", "magic"), "fireworld: --method: expected one of paper, got 'magic'"),
+        ((*TRAIN, "t.npz", "--set", "alpha"), "fireworld: --set: expected KEY=VALUE, got 'alpha'; try alpha=0.1"),
+        ((*TRAIN, "t.npz", "--set", "alpha=7"), "fireworld: method: alpha: expected a number from 0 to 1, got 7.0"),
+        (
+            (*TRAIN, "t.npz", "--stages", "al"),
+            "fireworld: --stages: expected stages of tiny: alone, together, got 'al'",
+        ),
+        ((*TRAIN, "t.npz", "--resume"), "fireworld: --resume: expected a checkpoint to go on from"),
+        ((*TRAIN, "no/t.npz"), "fireworld: no/t.npz: expected a file in an existing folder"),
+        ((*TRAIN, "t.npz", "--log", "no/l.csv"), "fireworld: no/l.csv: expected a file in an existing folder"),
+        ((*TRAIN, "t.npy"), "Error: -o: expected a name that ends in .npz, got 't.npy'."),
+        ((*TRAIN, "t.npz", "--log", "t.npz"), "Error: -o and --log name the same file."),
+        ((*TRAIN, "t.npz", "--force", "--resume"), "Error: --force and --resume exclude each other."),
+        ((*TRAIN, "t.npz", "--seed", 2**32 - 1, "--repetitions", 2), "Error: --repetitions: expected seeds up to"),
+        (("policy", "show", "absent.npz"), "fireworld: absent.npz: expected a team file, got No such file"),
+        (("run", "quick", "--policy", "absent.npz"), "fireworld: absent.npz: expected a team file, got No such file"),
+        (("run", "quick", "--policy", "bad.npz"), "fireworld: bad.npz: expected a team file (.npz), got BadZipFile"),
+    ],
+)
+def test_what_cannot_be_done(here, fireworld, files, words, message):
+    (here / "bad.npz").write_bytes(b"no archive")
+    done = fireworld(*words)
+    assert (done.code, done.out) == (2, "")
+    assert message in done.err
+    assert files() == ["bad.npz"], "nothing is made"
+
+
+def test_policy_show_and_diff(here, fireworld):
+    for name, seed in (("a.npz", 1), ("b.npz", 2)):
+        assert fireworld(*TRAIN, name, "--seed", seed).code == 0
+    shown = fireworld("policy", "show", "a.npz", "0", "volume=very-low", "--limit", 3).out
+    assert "a.npz: 3 tables of 4320 states, with what the others do" in shown
+    assert "trained in tiny, 4 scenarios, seed 1" in shown
+    assert "state 0: free to spread over 0 sides" in shown
+    assert "brigade 0, 1, 2: never visited in training" in shown
+    assert "volume=very-low: 720 states, " in shown
+    content = json.loads(fireworld("policy", "show", "a.npz", "1193", "--json").out)
+    assert [state["brigade"] for state in content["states"]] == [0, 1, 2]
+    assert content["provenance"]["curriculum"]["name"] == "tiny"
+    differing = fireworld("policy", "diff", "a.npz", "b.npz", "--limit", 2)
+    assert differing.code == 1
+    assert "another action in " in differing.out
+    assert "more; --limit shows more of them" in differing.out
+    content = json.loads(fireworld("policy", "diff", "a.npz", "b.npz", "--json").out)
+    assert not content["same"]
+    assert content["n_changed"] > 0
+    assert len(content["changed"]) <= 20
+    assert fireworld(*TRAIN, "c.npz", "--stages", "alone").code == 0
+    refused = fireworld("policy", "diff", "a.npz", "c.npz")
+    assert refused.code == 2
+    assert refused.err == "fireworld: B: tables: expected 3 of 4320 states, as in A, got 1 of 270 states\n"
+    assert fireworld("policy", "show", "a.npz", "5000").code == 2

@@ -1,0 +1,89 @@
+"""Curricula: the paper's, one's own, and every mistake in one line."""
+
+from __future__ import annotations
+
+import pytest
+
+from fireworld.errors import FireworldError, TrainingError
+from fireworld.training.curriculum import curriculum_names, load_curriculum
+
+
+def test_the_papers_curriculum():
+    paper = load_curriculum("paper")
+    assert [(stage.name, stage.cooperation, len(stage.scenarios)) for stage in paper.stages] == [
+        ("alone", False, 24),
+        ("together", True, 8),
+    ]
+    assert paper.n_scenarios == 32
+    alone, together = paper.stages
+    assert {scenario.brigades.n for scenario in alone.scenarios} == {1}
+    assert [scenario.name for scenario in together.scenarios] == [f"train-{k}" for k in range(1, 9)]
+    assert len({scenario.digest for scenario in alone.scenarios}) == 24
+    sizes = [scenario.fires[0].n_buildings for scenario in alone.scenarios]
+    assert sizes == [1] * 8 + [3] * 8 + [6] * 8, "from easy to hard: what is named first changes last"
+    assert curriculum_names() == ["paper"]
+
+
+def test_some_of_its_stages():
+    paper = load_curriculum("paper")
+    assert [stage.name for stage in paper.only(["alone"]).stages] == ["alone"]
+    assert paper.only(["together", "alone"]) == paper, "in the order of the curriculum"
+    assert paper.only(["alone"]).digest != paper.digest
+    with pytest.raises(TrainingError, match=r"^--stages: expected stages of paper: alone, together, got 'toghether'$"):
+        paper.only(["alone", "toghether"])
+
+
+def test_the_digest_is_of_what_is_learned(here, curriculum):
+    text = (here / "tiny.yaml").read_text()
+    (here / "named.yaml").write_text(text.replace("name: alone", "name: lonely"))
+    (here / "other.yaml").write_text(text.replace("steps: 12", "steps: 13"))
+    assert load_curriculum("named.yaml").digest == curriculum.digest != load_curriculum("other.yaml").digest
+
+
+def test_scenario_files_are_found_beside_the_curriculum(here, monkeypatch):
+    folder = here / "mine"
+    folder.mkdir()
+    (folder / "fire.yaml").write_text("city: {generated: {columns: 4, rows: 4, seed: 1}}\nfires: [{at: [0.5, 0.5]}]\n")
+    (folder / "all.yaml").write_text("stages: [{name: a, cooperation: true, scenarios: [fire.yaml, quick]}]")
+    (stage,) = load_curriculum("mine/all.yaml").stages
+    assert [scenario.name for scenario in stage.scenarios] == ["fire", "quick"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (None, "^bad.yaml: expected a curriculum file or one of paper, got "),
+        ("", "bad.yaml: expected `object`, got `null`"),
+        ("stages: [", "^bad.yaml: "),
+        ("stages: []", r"bad.yaml: stages: expected `array` of length >= 1"),
+        ("stages: [{name: a}]", r"^bad.yaml: stages\[0\]: object missing required field `cooperation`$"),
+        ("stages: [{name: a, cooperation: true, scenaros: []}]", "contains unknown field `scenaros`"),
+        ("stages: [{name: a, cooperation: true}]", "stages.0: expected either `scenarios` or `base`, got 'neither'"),
+        ("stages: [{name: a, cooperation: true, base: quick, scenarios: [quick]}]", "got 'both'"),
+        ("stages: [{name: a, cooperation: true, scenarios: [qick]}]", "stages.0: scenario: .*got 'qick'; try quick"),
+        ("stages: [{name: a, cooperation: true, scenarios: [qick.yaml]}]", "stages.0: qick.yaml: expected a scenario"),
+        ("stages: [{name: a, cooperation: true, scenarios: [quick], set: {steps: 3}}]", "`set` and `vary` with `base`"),
+        ("stages: [{name: a, cooperation: true, base: quick, set: {stepps: 3}}]", "stepps"),
+        ("stages: [{name: a, cooperation: true, base: quick, vary: {steps: []}}]", "length >= 1"),
+        ("stages: [{name: a, cooperation: true, base: quick, vary: {steps: [0]}}]", "steps: expected a whole number"),
+        (
+            f"stages: [{{name: a, cooperation: true, base: quick, vary: {{steps: {[1] * 200}, seed: {[1] * 200}}}}}]",
+            "vary: expected at most 10000 combinations",
+        ),
+        (
+            "stages: [{name: a, cooperation: true, scenarios: [quick]}, {name: a, cooperation: true, base: quick}]",
+            "stages.1: name: expected another name for every stage, got 'a'",
+        ),
+        (
+            "stages: [{name: a, cooperation: true, scenarios: [quick]}, {name: b, cooperation: false, base: quick}]",
+            "stages.1: cooperation: expected true, as in the stage before",
+        ),
+        ("#" * 1_000_001, "a curriculum of at most 1000000 bytes"),
+    ],
+)
+def test_what_is_wrong_with_a_curriculum(here, text, message):
+    if text is not None:
+        (here / "bad.yaml").write_text(text)
+    with pytest.raises(FireworldError, match=message) as caught:
+        load_curriculum("bad.yaml")
+    assert "\n" not in str(caught.value)

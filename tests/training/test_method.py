@@ -1,0 +1,49 @@
+"""Methods: the paper's figures, other ones, and every mistake in one line."""
+
+from __future__ import annotations
+
+import pytest
+
+from fireworld.errors import TrainingError
+from fireworld.training.method import PAPER, Method, find_method, method_keys
+
+
+def test_the_paper():
+    assert find_method("paper") == PAPER
+    assert (PAPER.rule, PAPER.alpha, PAPER.gamma, PAPER.epsilon_decay) == ("sarsa", 0.7, 0.5, 0.9)
+    assert (PAPER.n_episodes_max, PAPER.n_episodes_unchanged) == (130, 20)
+    assert list(PAPER.as_dict()) == method_keys()
+
+
+def test_other_figures():
+    changed = PAPER.with_settings({"alpha": "1e-1", "commit": "4", "shared_table": "true", "reward": "change"})
+    assert changed == Method(alpha=0.1, commit=4, shared_table=True, reward="change")
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "message"),
+    [
+        ("speed", "3", r"^--set: speed: expected one of rule, alpha, .*, got 'speed'$"),
+        ("alpha", "fast", r"^--set: alpha: expected a number, got 'fast'$"),
+        ("alpha", "1.5", r"^method: alpha: expected a number from 0 to 1, got 1.5$"),
+        ("gamma", "nan", r"^method: gamma: expected a number from 0 to 1, got nan$"),
+        ("epsilon_decay", "-0.1", "from 0 to 1"),
+        ("alpha_decay", "inf", "a number >= 0, got inf"),
+        ("commit", "0", "a whole number from 1 to 1000000, got 0"),
+        ("commit", "2.5", "a whole number, got '2.5'"),
+        ("commit", "1" + "0" * 30, "a whole number from 1 to 1000000"),
+        ("n_episodes_max", "0", "a whole number from 1"),
+        ("shared_table", "yes", "true or false, got 'yes'"),
+        ("rule", "dqn", "one of sarsa, expected-sarsa, q-learning, got 'dqn'"),
+        ("reward", "flow", "one of stock, change, got 'flow'"),
+        ("choices", "", "one of in-turn, simultaneous, got ''"),
+    ],
+)
+def test_a_figure_that_cannot_be(key, text, message):
+    with pytest.raises(TrainingError, match=message):
+        PAPER.with_settings({key: text})
+
+
+def test_an_unknown_method():
+    with pytest.raises(TrainingError, match=r"^--method: expected one of paper, got 'best-ever'$"):
+        find_method("best-ever")

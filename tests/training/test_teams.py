@@ -1,0 +1,190 @@
+"""Trainings that stop and go on: bit for bit the same team, and nothing of another training is taken up or lost."""
+
+from __future__ import annotations
+
+from threading import Event
+
+import numpy as np
+import pytest
+
+from fireworld.errors import OutputError, TrainingError
+from fireworld.policy.team import load_team, read_team, save_team
+from fireworld.training.teams import Training, log_heading, numbered, train_all
+
+
+def quiet(training, episode):
+    """Report nothing."""
+
+
+def stop_after(n_episodes, stop):
+    """Return a report that asks to stop after so many episodes."""
+    left = [n_episodes]
+
+    def report(training, episode):
+        left[0] -= 1
+        if left[0] == 0:
+            stop.set()
+
+    return report
+
+
+@pytest.fixture
+def make_training(make_trainer, here):
+    def make(name="team.npz", seed=1, *, force=False, **changes):
+        log_path = (here / name).with_suffix(".csv")
+        return Training(make_trainer(seed, **changes), here / name, log_path=log_path, force=force)
+
+    return make
+
+
+@pytest.fixture
+def whole(make_training):
+    """A training without an interruption."""
+    training = make_training("whole.npz")
+    training.run(Event(), quiet)
+    return training
+
+
+@pytest.mark.parametrize("stops", [(1,), (4, 1, 9), (7, 8)])
+def test_resumed_bit_for_bit(make_training, whole, here, stops):
+    n_done = 0
+    for n_episodes in stops:
+        training, stop = make_training(), Event()
+        assert training.resume() == (n_done > 0)
+        training.run(stop, stop_after(n_episodes, stop))
+        n_done += n_episodes
+        assert sorted(path.name for path in here.glob("team*")) == ["team.npz.checkpoint"]
+        assert len(training.log.splitlines()) == n_done
+    training = make_training()
+    assert training.resume()
+    training.run(Event(), quiet)
+    assert training.team.digest == whole.team.digest
+    for suffix in (".npz", ".csv"):
+        assert (here / f"team{suffix}").read_bytes() == (here / f"whole{suffix}").read_bytes()
+    assert not training.checkpoint.exists()
+
+
+def test_the_log_has_a_line_for_every_episode(whole, make_trainer):
+    lines = whole.log_path.read_text().splitlines()
+    assert lines[0] == log_heading().strip()
+    assert len(lines) == 1 + len(list(make_trainer()))
+    row = dict(zip(lines[0].split(","), lines[1].split(","), strict=True))
+    assert (row["scenario"], row["episode"], row["epsilon"], row["converged"]) == ("alone-1", "0", "1.0", "False")
+
+
+def test_several_at_a_time_are_those_one_by_one(make_training, whole, here):
+    trainings = [make_training(numbered(here / "t.npz", k, n_all=3).name, seed=k) for k in (1, 2, 3)]
+    train_all(trainings, n_jobs=2, stop=Event(), report=quiet)
+    assert sorted(path.name for path in here.glob("t-*.npz")) == ["t-1.npz", "t-2.npz", "t-3.npz"]
+    assert (here / "t-1.npz").read_bytes() == (here / "whole.npz").read_bytes()
+    assert len({training.team.digest for training in trainings}) == 3
+
+
+def test_one_that_fails_stops_the_others_gently(make_training, here):
+    trainings = [
+        make_training(f"t-{k}.npz", seed=k, n_episodes_unchanged="1000", n_episodes_max="2000") for k in (1, 2)
+    ]
+
+    def report(training, episode):
+        if training is trainings[0] and episode.episode == 3:
+            raise OutputError("disk full")
+
+    with pytest.raises(OutputError, match="disk full"):
+        train_all(trainings, n_jobs=2, stop=Event(), report=report)
+    assert trainings[1].checkpoint.exists()
+    assert trainings[1].team is None
+
+
+def stopped(training):
+    stop = Event()
+    training.run(stop, stop_after(8, stop))
+    return training.checkpoint
+
+
+@pytest.mark.parametrize(
+    ("seed", "changes", "message"),
+    [
+        (2, {}, r"team.npz.checkpoint: seed: expected 2, got 1; name what it was begun with"),
+        (1, {"gamma": "0.9"}, r"method.gamma: expected 0.9, got 0.5"),
+        (1, {"n_episodes_max": "7"}, r"method.n_episodes_max: expected 7, got 6"),
+    ],
+)
+def test_a_checkpoint_of_another_training(make_training, seed, changes, message):
+    checkpoint = stopped(make_training())
+    content = checkpoint.read_bytes()
+    with pytest.raises(TrainingError, match=message):
+        make_training(seed=seed, **changes).resume()
+    assert checkpoint.read_bytes() == content
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("curriculum", {"name": "tiny", "digest": "0" * 64}, "curriculum.digest: expected "),
+        ("fireworld", "0.0.9", "fireworld: expected .*, got '0.0.9'"),
+        ("method", 3, "method.commit"),
+    ],
+)
+def test_a_checkpoint_of_another_curriculum_or_version(make_training, key, value, message):
+    checkpoint = stopped(make_training())
+    team, extra = read_team(checkpoint)
+    team.provenance[key] = value
+    save_team(team, checkpoint, force=True, extra=extra)
+    with pytest.raises(TrainingError, match=message):
+        make_training().resume()
+
+
+@pytest.mark.parametrize(
+    ("extra", "message"),
+    [
+        ({}, "expected a checkpoint"),
+        ({"place": np.array([1.0, 2.0, 0.0])}, "expected a checkpoint"),
+        ({"place": np.array([9, 0, 0])}, r"place: expected .* within the curriculum, got '?\[9, 0, 0\]"),
+        ({"place": np.array([-1, 0, 0])}, "within the curriculum"),
+        ({"place": np.array([1, 6, 0])}, "within the curriculum"),
+        ({"place": np.array([1, 2, 3])}, "within the curriculum"),
+        ({"place": np.array([3, 0, 0])}, r"tables: expected shape \(3, 4320, 4\), got '?\(1, 270, 4\)"),
+        ({"place": np.array([1, 2, 0]), "log": np.array([255], dtype=np.uint8)}, "log: expected text"),
+    ],
+)
+def test_a_checkpoint_that_makes_no_sense(make_training, extra, message):
+    checkpoint = stopped(make_training())
+    team, _ = read_team(checkpoint)
+    log = {"log": np.zeros(0, dtype=np.uint8)} if extra else {}
+    save_team(team, checkpoint, force=True, extra={**log, **extra})
+    with pytest.raises(TrainingError, match=message):
+        make_training().resume()
+
+
+def test_a_cut_off_checkpoint(make_training):
+    checkpoint = stopped(make_training())
+    checkpoint.write_bytes(checkpoint.read_bytes()[:-40])
+    with pytest.raises(TrainingError, match=r"expected a team file \(.npz\), got BadZipFile"):
+        make_training().resume()
+
+
+def test_a_finished_team_is_left_as_it_is(make_training, whole):
+    again = make_training("whole.npz")
+    assert again.resume()
+    again.run(Event(), quiet)
+    assert again.team.digest == whole.team.digest
+    with pytest.raises(TrainingError, match="seed"):
+        make_training("whole.npz", seed=2).resume()
+
+
+def test_what_is_in_the_way(make_training, whole, here):
+    with pytest.raises(OutputError, match=r"whole.npz: expected a name that is free.*--force"):
+        make_training("whole.npz").begin()
+    make_training("whole.npz", force=True).begin()
+    checkpoint = stopped(make_training())
+    with pytest.raises(OutputError, match=r"expected no checkpoint.*--resume.*--force"):
+        make_training().begin()
+    forced = make_training(force=True)
+    forced.begin()
+    forced.run(Event(), quiet)
+    assert not checkpoint.exists()
+    with pytest.raises(OutputError, match=r"a file in an existing folder, got no such folder$"):
+        Training(whole.trainer, here / "absent" / "a.npz").begin()
+    with pytest.raises(OutputError, match=r"got a folder$"):
+        Training(whole.trainer, here, force=True).begin()
+    assert load_team(here / "team.npz").digest == whole.team.digest
