@@ -235,12 +235,13 @@ def _figures_table(tables: Tables) -> Table:
 
     def compared(cell: Cell) -> str:
         digits = 1 if cell.quantity == "score" else 0
-        return escape(f"{cell.paper:g}: {spread(cell.ours, digits=digits)} {marks[cell.verdict]}")
+        return escape(f"{marks[cell.verdict]} {cell.paper:.3g}: {spread(cell.ours, digits=digits)}")
 
     table = Table(
         title="paper: ours [95 % interval]",
         caption="= the paper's figure is in it, ~ our mean is within 25 % of it, x neither",
         box=SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
     )
     table.add_column("scenario", no_wrap=True)
     table.add_column("figure", no_wrap=True)

@@ -7,7 +7,7 @@ from typing import Final
 from fireworld.kernels.arrays import WorldArrays
 from fireworld.policy.kernel import always
 from fireworld.policy.protocol import Observation
-from fireworld.world.state import NO_LEARNER, copy_into, copy_world
+from fireworld.world.state import NO_LEARNER, copy_into
 
 Assignment = tuple[int, ...]
 """(b,) the action of each brigade."""
@@ -63,8 +63,3 @@ class Forecast:
         run_episode(moment.city, copy, moment.constants, self._policy, NO_LEARNER, seed, moment.step, last_step)
         outcome = copy.outcome
         return float(outcome.score[0] / outcome.score[1] - BURNING_COST * outcome.counts[0])
-
-
-def room_for(world: WorldArrays) -> WorldArrays:
-    """Return arrays in which rollouts from a world can take place."""
-    return copy_world(world)

@@ -9,10 +9,11 @@ from typing import Final, NoReturn
 
 from fireworld.errors import PolicyError, expected
 from fireworld.kernels.arrays import CityTables, WorldArrays
-from fireworld.planning.forecast import BURNING_COST, Assignment, Forecast, room_for
+from fireworld.planning.forecast import BURNING_COST, Assignment, Forecast
 from fireworld.planning.search import action_values, climb
 from fireworld.policy.protocol import Decision, Observation
 from fireworld.records import ACTIONS
+from fireworld.world.state import copy_world
 
 OPTION_MAX: Final = 1000
 
@@ -78,7 +79,7 @@ class Planner:
 
     def _make_plan(self, observation: Observation) -> None:
         if self._room is None:
-            self._room = room_for(observation.world)
+            self._room = copy_world(observation.world)
         self._planned_at = observation.step
         options, n_brigades = self.options, len(observation.world.brigades.action)
         forecast = Forecast(observation, self._room, horizon=options.horizon, rollouts=options.rollouts)
