@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import signal
 import subprocess
 import sys
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from fireworld.cli import main
+from tests import command_line
+from tests.command_line import Done
 
 POLICIES = '''
 """Policies of the tests: some of them go wrong in step 5."""
@@ -62,15 +61,6 @@ class Killed(Near):
 '''
 
 
-@dataclass(frozen=True)
-class Done:
-    """What a command did."""
-
-    code: int
-    out: str
-    err: str
-
-
 @pytest.fixture
 def here(tmp_path, monkeypatch):
     """The current folder, empty but for policies.py; what is imported from it is forgotten again."""
@@ -88,19 +78,7 @@ def fireworld(monkeypatch):
     """Call the command line in this process."""
     monkeypatch.setenv("COLUMNS", "120")
 
-    def call(*words: object) -> Done:
-        monkeypatch.setattr(sys, "argv", ["fireworld", *map(str, words)])
-        out, err = io.StringIO(), io.StringIO()
-        code = 0
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            try:
-                main()
-            except SystemExit as stop:
-                code = stop.code or 0
-        assert "Traceback" not in err.getvalue()
-        return Done(code, out.getvalue(), err.getvalue())
-
-    return call
+    return partial(command_line.call, monkeypatch)
 
 
 @pytest.fixture

@@ -1,14 +1,11 @@
 """A small trace with its city, and the command line, for all tests of conformance."""
 
-import contextlib
-import io
 import json
-import sys
 
 import numpy as np
 import pytest
 
-from fireworld.cli import main
+from tests import command_line
 from tests.reference.traces import CITIES, TRACES
 
 
@@ -55,15 +52,7 @@ def run_cli(monkeypatch):
     """Call `fireworld conformance`; return exit code, output and error output."""
 
     def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["fireworld", "conformance", *map(str, arguments)])
-        out, err = io.StringIO(), io.StringIO()
-        code = 0
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            try:
-                main()
-            except SystemExit as stop:
-                code = stop.code or 0
-        assert "Traceback" not in err.getvalue()
-        return code, out.getvalue(), err.getvalue()
+        done = command_line.call(monkeypatch, "conformance", *arguments)
+        return done.code, done.out, done.err
 
     return call

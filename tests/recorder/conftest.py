@@ -1,13 +1,9 @@
 """A synthetic run and its log, shared by the tests of the recorder."""
 
-import contextlib
-import io
-import sys
-
 import pytest
 
-from fireworld.cli import main
 from recorder.writer import LogWriter
+from tests import command_line
 from tests.recorder import synthetic
 
 
@@ -46,16 +42,8 @@ def run_cli(monkeypatch):
     """Call the command line; return exit code, output and error output."""
 
     def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["fireworld", *map(str, arguments)])
         monkeypatch.setenv("COLUMNS", "120")
-        out, err = io.StringIO(), io.StringIO()
-        code = 0
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            try:
-                main()
-            except SystemExit as stop:
-                code = stop.code or 0
-        assert "Traceback" not in err.getvalue()
-        return code, out.getvalue(), err.getvalue()
+        done = command_line.call(monkeypatch, *arguments)
+        return done.code, done.out, done.err
 
     return call
