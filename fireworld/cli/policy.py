@@ -238,7 +238,9 @@ def _difference_as_json(difference: TeamDifference, *, limit: int) -> dict[str, 
 
 def _rows_of(states: Sequence[int], n_states: int) -> list[int]:
     """Return the states, those that a table of 270 states does not tell apart only once."""
-    step = 4320 // n_states
+    from fireworld.policy.words import N_STATES
+
+    step = N_STATES // n_states
     return list(dict.fromkeys(state // step * step for state in states))
 
 

@@ -13,12 +13,11 @@ from fireworld.draws import TABLE, below
 from fireworld.evaluation.study import ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS, Lesson
 from fireworld.kernels.arrays import Array
 from fireworld.policy.team import Team
+from fireworld.policy.words import N_FLAG_VALUES, N_STATES
 from fireworld.records import ACTIONS
 from fireworld.training.curriculum import Curriculum
 from fireworld.training.method import Method
 from fireworld.training.trainer import (
-    N_FLAG_VALUES,
-    N_STATES_TOGETHER,
     EpisodeReport,
     Progress,
     Trainer,
@@ -123,7 +122,7 @@ def random_tables(number: int, *, n_brigades: int) -> Array:
     seed = -1 - number  # no training has it
     choice = np.array(
         [
-            [below(seed, TABLE, brigade, state, bound=len(ACTIONS)) for state in range(N_STATES_TOGETHER)]
+            [below(seed, TABLE, brigade, state, bound=len(ACTIONS)) for state in range(N_STATES)]
             for brigade in range(n_brigades)
         ]
     )

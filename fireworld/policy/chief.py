@@ -9,9 +9,8 @@ import numpy as np
 from fireworld.kernels.arrays import Array
 from fireworld.policy.kernel import KernelPolicy, from_tables
 from fireworld.policy.protocol import Action
+from fireworld.policy.words import N_STATES, features_of
 
-RADIX: Final = (5, 3, 3, 6, 2, 2, 2, 2)
-"""Values of the eight features, the most significant first."""
 HIGH: Final = 2
 
 
@@ -24,10 +23,11 @@ def rule(distance_from_civilian: int, *, others_protect: bool) -> Action:
 
 def chief_table() -> Array:
     """Return the rule as a table of action values, (4320, 4): 1 for the action it names, 0 for the others."""
-    table = np.zeros((*RADIX, len(Action)))
-    for features in np.ndindex(*RADIX):
-        table[features][rule(features[2], others_protect=bool(features[5]))] = 1.0
-    return table.reshape(-1, len(Action))
+    table = np.zeros((N_STATES, len(Action)))
+    for state in range(N_STATES):
+        features = features_of(state)
+        table[state, rule(features[2], others_protect=bool(features[5]))] = 1.0
+    return table
 
 
 def chief() -> KernelPolicy:

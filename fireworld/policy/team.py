@@ -16,10 +16,10 @@ import numpy as np
 from fireworld.errors import OutputError, TrainingError, expected
 from fireworld.kernels.arrays import Array
 from fireworld.policy.kernel import KernelPolicy, from_tables
+from fireworld.policy.words import N_STATES, N_STATES_ALONE
 
 FORMAT: Final = "fireworld-team/1"
 SUFFIX: Final = ".npz"
-N_STATES: Final = (4320, 270)
 COMMIT_MAX: Final = 1_000_000
 FIXED_TIME: Final = (1980, 1, 1, 0, 0, 0)
 SIZE_MAX_BYTES: Final = 1 << 30
@@ -140,7 +140,12 @@ def parse_team(content: bytes, *, source: str) -> tuple[Team, dict[str, Array]]:
     arrays = _read_arrays(content, source)
     header = _read_header(source, arrays.pop("header"))
     tables, visits = arrays.pop("tables"), arrays.pop("visits")
-    fits = tables.ndim == 3 and tables.shape[0] >= 1 and tables.shape[1] in N_STATES and tables.shape[2] == 4
+    fits = (
+        tables.ndim == 3
+        and tables.shape[0] >= 1
+        and tables.shape[1] in (N_STATES, N_STATES_ALONE)
+        and tables.shape[2] == 4
+    )
     if not fits or tables.dtype != np.float64:
         wanted = "float64 tables of shape (brigades, 4320 or 270, 4)"
         raise TrainingError(expected(source, "tables", wanted, f"{tables.dtype} {tables.shape}"))

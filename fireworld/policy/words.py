@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
@@ -26,8 +27,12 @@ FEATURES: Final = (
 """The features, the most significant first; their names are those of the recorded /observations."""
 N_OWN: Final = 4
 """Features of the fire; those after them tell what the other brigades do."""
-N_STATES: Final = 4320
-N_FLAG_VALUES: Final = 16
+RADIX: Final = tuple(len(feature.values) for feature in FEATURES)
+N_STATES_ALONE: Final = math.prod(RADIX[:N_OWN])
+"""270, without the cooperation flags."""
+N_FLAG_VALUES: Final = math.prod(RADIX[N_OWN:])
+N_STATES: Final = N_STATES_ALONE * N_FLAG_VALUES
+"""4320."""
 
 
 def features_of(state: int) -> tuple[int, ...]:

@@ -14,14 +14,13 @@ from fireworld.draws import EPISODE, TABLE, below, hash_key
 from fireworld.kernels.arrays import Array
 from fireworld.policy.kernel import from_tables
 from fireworld.policy.team import Team
+from fireworld.policy.words import N_FLAG_VALUES, N_STATES, N_STATES_ALONE
 from fireworld.records import ACTIONS
 from fireworld.scenario import Scenario
 from fireworld.training.curriculum import Curriculum, CurriculumStage
 from fireworld.training.method import RULES, Method
 from fireworld.world.stage import Ground, Stage, build_stage
 from fireworld.world.state import fresh_learner
-
-N_STATES_ALONE, N_STATES_TOGETHER, N_FLAG_VALUES = 270, 4320, 16
 
 
 @dataclass(frozen=True)
@@ -198,7 +197,7 @@ class Trainer:
 
 
 def _n_states(stage: CurriculumStage) -> int:
-    return N_STATES_TOGETHER if stage.cooperation else N_STATES_ALONE
+    return N_STATES if stage.cooperation else N_STATES_ALONE
 
 
 def _power(base: float, exponent: int) -> float:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fireworld.kernels.observation import can_choose, find_target, level, observe, state_index, volume_class
-from fireworld.policy.chief import RADIX
 from fireworld.policy.protocol import Decision
+from fireworld.policy.words import RADIX
 from fireworld.world.tables import observation_constants
 from tests.kernels.small import METRE, burn, make_city, make_world, square
 

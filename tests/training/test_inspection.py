@@ -9,10 +9,9 @@ import pytest
 
 from fireworld.errors import PolicyError, TrainingError
 from fireworld.kernels.observation import state_index
-from fireworld.policy.chief import RADIX
 from fireworld.policy.inspection import agreement, choice, compare, summarize
 from fireworld.policy.team import Team
-from fireworld.policy.words import FEATURES, describe_state, features_of, find_states, short_state, state_of
+from fireworld.policy.words import FEATURES, RADIX, describe_state, features_of, find_states, short_state, state_of
 
 
 def make_team(values=(), visits=(), *, n_tables=1, n_states=4320, commit=1):
