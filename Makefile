@@ -1,12 +1,13 @@
 # fireworld: `make demo` shows it, `make test` checks all of it. Needs Python 3.11 or newer, and pip.
 PYTHON ?= python3
 WORKERS ?= 2
+FUZZ_SECONDS ?= 60
 BIN := .venv/bin
 DEMO := recordings/demo
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help install demo test check-format check-lint check-types check-imports check-tests format docs bench clean
+.PHONY: help install demo test check-format check-lint check-types check-imports check-tests format docs fuzz bench check-teams clean
 
 help:  ## List these targets.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -55,8 +56,14 @@ docs: install  ## Renew what is made from the code in docs/, and the transcripts
 	$(BIN)/python -m fireworld.cli.reference
 	$(BIN)/python -m tests.docs.transcripts
 
+fuzz: install  ## Try odd and altered files on all readers for FUZZ_SECONDS (60).
+	$(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS)
+
 bench: install  ## Measure speed; prints ratios taken within the run.
 	$(BIN)/python -m benchmarks.bench
+
+check-teams: install  ## Train the teams that come with fireworld again; they must be the same.
+	$(BIN)/python -m benchmarks.shipped
 
 clean:  ## Remove what the other targets made, .venv too.
 	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist build

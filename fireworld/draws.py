@@ -30,7 +30,11 @@ STEP: Final = 9
 TABLE: Final = 10
 """Purpose: which brigade's table is taken over between scenarios. Entity: scenario."""
 EPISODE: Final = 11
-"""Purpose: the seed of an episode of training. Entity: scenario; step: episode."""
+"""Purpose: the seed of an episode of training. Entity: scenario; step: episode or generation."""
+FIRE: Final = 12
+"""Purpose: which fires a generation of a search meets. Entity: scenario; step: generation."""
+WEIGHT: Final = 13
+"""Purpose: the noise of a candidate's weights. Entity: candidate and weight; step: generation."""
 
 MASK: Final = (1 << 64) - 1
 INCREMENT: Final = 0x9E3779B97F4A7C15

@@ -22,7 +22,9 @@ STEP_SECONDS: Final = 60
 SNAPSHOT_EVERY_STEPS: Final = 50
 
 ACTIONS: Final = ("easiest", "nearest-to-civilian", "nearest-to-center", "nearest-to-me")
-"""The paper's four actions; an action is recorded as its index here, -1 is no action."""
+"""The paper's four actions."""
+ACTION_NAMES: Final = (*ACTIONS, "own-target")
+"""All actions: the paper's four, and a target that the policy names itself. Recorded as the index here, -1 is none."""
 
 ACTIVITIES: Final = ("idle", "driving", "spraying", "driving-to-refuge", "refilling", "dead")
 """What a brigade did in a step."""
@@ -68,14 +70,22 @@ DTYPES: Final[Mapping[str, str]] = {
 """numpy type of an array field, by wire type ("uint8" travels as packed uint32 varints below 128)."""
 
 
-def column(number: int, wire: Wire, doc: str) -> Any:
-    """Declare a packed repeated field: a one-dimensional array."""
-    return field(metadata={"number": number, "wire": wire, "repeated": True, "doc": doc})
+def column(number: int, wire: Wire, doc: str, *, unit: str = "", added: bool = False) -> Any:
+    """Declare a packed repeated field: a one-dimensional array. Its unit is said where its name does not end in it.
+
+    A field that was added later is empty in recordings made before, and so by default.
+    """
+    metadata = {"number": number, "wire": wire, "repeated": True, "doc": doc, "unit": unit}
+    return field(metadata=metadata, default_factory=_empty) if added else field(metadata=metadata)
 
 
-def value(number: int, wire: Wire, doc: str) -> Any:
-    """Declare a single value."""
-    return field(metadata={"number": number, "wire": wire, "repeated": False, "doc": doc})
+def _empty() -> Array:
+    return np.zeros(0)
+
+
+def value(number: int, wire: Wire, doc: str, *, unit: str = "") -> Any:
+    """Declare a single value; its unit is said where its name does not end in it."""
+    return field(metadata={"number": number, "wire": wire, "repeated": False, "doc": doc, "unit": unit})
 
 
 @dataclass(frozen=True)
@@ -112,13 +122,13 @@ class CityRecord:
     inflammable: Array = column(10, "uint8", "(n,) 1 if it can burn")
     ground_area_m2: Array = column(11, "float", "(n,)")
     volume_m3: Array = column(12, "float", "(n,)")
-    initial_fuel: Array = column(13, "float", "(n,) energy units")
-    heat_capacity: Array = column(14, "float", "(n,) energy units per degree")
-    ignition_point: Array = column(15, "float", "(n,) degrees above ambient")
+    initial_fuel: Array = column(13, "float", "(n,) energy units", unit="energy units")
+    heat_capacity: Array = column(14, "float", "(n,) energy units per degree", unit="energy units per degree")
+    ignition_point: Array = column(15, "float", "(n,) degrees above ambient", unit="degrees above ambient")
     wall_area_m2: Array = column(16, "double", "(n,) radiating wall")
     link_ptr: Array = column(17, "sfixed32", "(n+1,) start of each building's radiation links")
     link_building: Array = column(18, "sfixed32", "index of the building a link leads to")
-    link_share: Array = column(19, "float", "share of the emitted radiation that reaches it")
+    link_share: Array = column(19, "float", "share of the emitted radiation that reaches it", unit="share")
     node_x_m: Array = column(20, "double", "street nodes, x")
     node_y_m: Array = column(21, "double", "street nodes, y")
     street_from: Array = column(22, "sfixed32", "first node of each street")
@@ -129,7 +139,7 @@ class CityRecord:
     civilian_x_m: Array = column(27, "double", "(n_civilians,) position, x")
     civilian_y_m: Array = column(28, "double", "(n_civilians,) position, y")
     civilian_building: Array = column(29, "sfixed32", "(n_civilians,) building a civilian is in, -1 outdoors")
-    civilian_hp: Array = column(30, "sfixed32", "(n_civilians,) health points at the start")
+    civilian_hp: Array = column(30, "sfixed32", "(n_civilians,) health points at the start", unit="health points")
     brigade_tank_litres: Array = column(31, "sfixed32", "(n_brigades,) size of the tank")
     brigade_power_litres: Array = column(32, "sfixed32", "(n_brigades,) most litres sprayed in a step")
     brigade_range_m: Array = column(33, "double", "(n_brigades,) reach of the water jet")
@@ -183,11 +193,14 @@ class Decisions:
 
     topic: ClassVar[str] = "/decisions"
     action: Array = column(1, "sfixed32", "(n_brigades,) index of the action, -1 none (refilling, dead, nothing burns)")
-    target: Array = column(2, "sfixed32", "(n_brigades,) index of the building the action names, -1 none")
+    target: Array = column(2, "sfixed32", "(n_brigades,) index of the building it goes for, -1 none")
     explored: Array = column(3, "uint8", "(n_brigades,) 1 if the action was an exploring draw")
     q_values: Array = column(4, "double", "(n_brigades * 4,) values of the four actions, brigade by brigade; or empty")
-    epsilon: float = value(5, "double", "probability of exploring")
+    epsilon: float = value(5, "double", "probability of exploring", unit="probability")
     td_error: Array = column(6, "double", "(n_brigades,) SARSA's error of the last update; or empty")
+    target_value: Array = column(
+        7, "double", "(n_brigades,) value of the target, where targets are ranked; or empty", added=True
+    )
 
 
 @dataclass(frozen=True)
@@ -203,8 +216,8 @@ class Brigades:
     tank_litres: Array = column(4, "sfixed32", "(n_brigades,) water in the tank")
     sprayed_litres: Array = column(5, "sfixed32", "(n_brigades,) water sprayed in this step")
     driven_m: Array = column(6, "double", "(n_brigades,) way driven in this step")
-    hp: Array = column(7, "sfixed32", "(n_brigades,) health points")
-    damage: Array = column(8, "double", "(n_brigades,) health points lost per step")
+    hp: Array = column(7, "sfixed32", "(n_brigades,) health points", unit="health points")
+    damage: Array = column(8, "double", "(n_brigades,) health points lost per step", unit="health points per step")
 
 
 @dataclass(frozen=True)
@@ -213,10 +226,15 @@ class Buildings:
 
     topic: ClassVar[str] = "/buildings"
     temperature: Array = column(
-        1, "float", "(n,) degrees above ambient, to the nearest 1/64; exact is energy / heat_capacity"
+        1,
+        "float",
+        "(n,) degrees above ambient, to the nearest 1/64; exact is energy / heat_capacity",
+        unit="degrees above ambient",
     )
-    energy: Array = column(2, "double", "(n,) heat, energy units, exact")
-    fuel_share: Array = column(3, "float", "(n,) share of the initial fuel that is left, single precision")
+    energy: Array = column(2, "double", "(n,) heat, energy units, exact", unit="energy units")
+    fuel_share: Array = column(
+        3, "float", "(n,) share of the initial fuel that is left, single precision", unit="share"
+    )
     water_litres: Array = column(4, "sfixed32", "(n,) water lying on the building")
     fieryness: Array = column(5, "uint8", "(n,) official code 0..8")
 
@@ -226,8 +244,8 @@ class Civilians:
     """The civilians' health after the step."""
 
     topic: ClassVar[str] = "/civilians"
-    hp: Array = column(1, "sfixed32", "(n_civilians,) health points, 0 dead")
-    damage: Array = column(2, "double", "(n_civilians,) health points lost per step")
+    hp: Array = column(1, "sfixed32", "(n_civilians,) health points, 0 dead", unit="health points")
+    damage: Array = column(2, "double", "(n_civilians,) health points lost per step", unit="health points per step")
 
 
 @dataclass(frozen=True)

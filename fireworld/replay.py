@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 
 from fireworld.errors import LogError, expected
 from fireworld.placement import CITY_ATTACHMENT, SCENARIO_ATTACHMENT
-from fireworld.policy.protocol import Decision, Observation
-from fireworld.records import Array, CityRecord, Recording, RunHeader, StepRecord
+from fireworld.policy.protocol import Action, Decision, Observation
+from fireworld.records import Array, CityRecord, Decisions, Recording, RunHeader, StepRecord
 from fireworld.scenario import parse_scenario
 from fireworld.world.observer import Observer
 from fireworld.world.stage import Stage, build_stage
@@ -21,25 +21,31 @@ class RecordedPolicy:
         self._record = next(self._records, None)
 
     def decide(self, observation: Observation) -> Decision:
-        """Return the decision recorded for this brigade and step.
-
-        Raises:
-            LogError: the recording has none, where the replay asks for one.
-        """
+        """Return the decision recorded for this brigade and step."""
         while self._record is not None and self._record.step < observation.step:
             self._record = next(self._records, None)
         made = self._record.decisions if self._record is not None else None
-        brigade = observation.brigade
-        if made is None or brigade >= len(made.action) or not 0 <= made.action[brigade] < 4:
+        decision = recorded_decision(made, observation.brigade) if made is not None else None
+        if decision is None or (decision.target is not None and decision.target not in observation.burning):
             # The replay has left the recorded path; an arbitrary action lets the comparison go on and name the step.
             return Decision(0)
-        values = tuple(made.q_values[4 * brigade : 4 * brigade + 4].tolist()) or None
-        return Decision(
-            int(made.action[brigade]),
-            q_values=values,
-            explored=bool(made.explored[brigade]),
-            epsilon=made.epsilon,
-        )
+        return decision
+
+
+def recorded_decision(made: Decisions, brigade: int) -> Decision | None:
+    """Return the decision recorded for a brigade in a step, None if it made none."""
+    if brigade >= len(made.action) or not 0 <= made.action[brigade] < len(Action):
+        return None
+    action = int(made.action[brigade])
+    values = tuple(made.q_values[4 * brigade : 4 * brigade + 4].tolist()) or None
+    return Decision(
+        action,
+        target=int(made.target[brigade]) if action == Action.OWN_TARGET else None,
+        q_values=values,
+        value=float(made.target_value[brigade]) if len(made.target_value) else None,
+        explored=bool(made.explored[brigade]),
+        epsilon=made.epsilon,
+    )
 
 
 def recorded_stage(header: RunHeader) -> Stage:

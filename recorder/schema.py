@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import inspect
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +24,8 @@ PACKAGE: Final = "fireworld.log.v1"
 DESCRIPTORS: Final = Path(__file__).with_name("fireworld_log.binpb")
 PROTO: Final = Path(__file__).with_name("fireworld_log.proto")
 DOCS: Final = Path(__file__).parent.parent / "docs" / "log-format.md"
+UNITS: Final = ("m", "m2", "m3", "litres")
+"""Units that a name can end in."""
 DOCS_BEGIN: Final = "<!-- generated from fireworld/records.py by `python -m recorder.schema --write` -->\n"
 DOCS_END: Final = "<!-- end of the generated part -->\n"
 
@@ -57,6 +60,21 @@ class Field:
     wire: Wire
     repeated: bool
     doc: str
+    unit: str
+    """What it is measured in; empty for counts, indices and codes."""
+
+    @property
+    def shape(self) -> str:
+        """What an array has an entry for, as in "n_brigades"; "any" if it does not say, empty for a single value."""
+        if not self.repeated:
+            return ""
+        found = re.match(r"\(([^,]*),\)", self.doc)
+        return found[1] if found else "any"
+
+    @property
+    def meaning(self) -> str:
+        """The documentation without the shape that it may begin with."""
+        return self.doc.removeprefix(f"({self.shape},)").strip()
 
     @property
     def proto_type(self) -> str:
@@ -78,7 +96,9 @@ class Message:
 def message_of(record_type: type[Any]) -> Message:
     """Derive the message of a record type from its dataclass fields."""
     fields = tuple(
-        Field(name=item.name, **item.metadata) for item in dataclasses.fields(record_type) if "number" in item.metadata
+        Field(**{**item.metadata, "name": item.name, "unit": item.metadata["unit"] or _unit_of(item.name)})
+        for item in dataclasses.fields(record_type)
+        if "number" in item.metadata
     )
     return Message(
         name=record_type.__name__.removesuffix("Record"),
@@ -86,6 +106,12 @@ def message_of(record_type: type[Any]) -> Message:
         doc=" ".join((inspect.getdoc(record_type) or "").split()),
         fields=fields,
     )
+
+
+def _unit_of(name: str) -> str:
+    """Return the unit that a name ends in, if it does."""
+    _, _, last = name.rpartition("_")
+    return last if last in UNITS and last != name else ""
 
 
 TOPICS: Final[tuple[type[Any], ...]] = (CityRecord, *STEP_TOPICS, Snapshot, Commit)

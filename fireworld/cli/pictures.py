@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fireworld.cli.repetitions import Repetition
 from fireworld.evaluation import paper
 from fireworld.evaluation.figures import draw_policy_changes, draw_returns
 from fireworld.evaluation.study import ALONE, TOGETHER, Study
@@ -64,13 +65,21 @@ class ToRecord:
         return Recorded(self.scenario, self.team, run.city, records[0], records[-1])
 
 
-def runs_to_record(teams: Mapping[str, Team], *, seed: int, folder: Path) -> list[ToRecord]:
-    """List one run of each row: the cooperative team in Table 1, both teams in Tables 2 and 3."""
-    rows = [(row.scenario, TOGETHER) for row in paper.TABLE_1]
-    rows += [(row.scenario, team) for row in (*paper.TABLE_2, *paper.TABLE_3) for team in (ALONE, TOGETHER)]
+def runs_to_record(repetition: Repetition, *, seed: int, folder: Path) -> list[ToRecord]:
+    """List one run of each row.
+
+    In Table 1 it is the cooperative team as it was at the end of the row's scenario; in Tables 2 and 3 it is both teams
+    as they are after all of their training.
+    """
+    rows = [(row.scenario, TOGETHER, repetition.graduates[row.scenario]) for row in paper.TABLE_1]
+    rows += [
+        (row.scenario, team, repetition.teams[team])
+        for row in (*paper.TABLE_2, *paper.TABLE_3)
+        for team in (ALONE, TOGETHER)
+    ]
     return [
-        ToRecord(scenario=name, team=team, members=teams[team], seed=seed, path=folder / f"{name}-{team}.mcap")
-        for name, team in rows
+        ToRecord(scenario=name, team=team, members=members, seed=seed, path=folder / f"{name}-{team}.mcap")
+        for name, team, members in rows
     ]
 
 

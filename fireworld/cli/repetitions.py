@@ -30,6 +30,8 @@ class Repetition:
     """The teams of one repetition, by name, and how they came to be."""
 
     teams: Mapping[str, Team]
+    graduates: Mapping[str, Team]
+    """The cooperative team as it was at the end of each of the scenarios together, by scenario; may be left out."""
     lessons: tuple[Lesson, ...]
 
     @property
@@ -60,6 +62,8 @@ class Training:
     stop: Event
     on_scenario: Callable[[], object]
     """Called after every scenario."""
+    with_graduates: bool = False
+    """Return the team as it was after every scenario, too."""
 
     def __call__(self) -> Repetition:
         """Train.
@@ -77,16 +81,19 @@ class Training:
         progress = Progress(n_alone, tables=flagged, visits=np.zeros(flagged.shape, dtype=np.int64))
         team_alone = replace(control.team(), tables=begun[:1].copy(), visits=control.progress.visits[:1].copy())
         together = self._trainer(self.curriculum, progress)
-        lessons += self._follow(together, TOGETHER, until=self.curriculum.n_scenarios)
+        graduates: dict[str, Team] = {}
+        lessons += self._follow(together, TOGETHER, until=self.curriculum.n_scenarios, graduates=graduates)
         lessons += self._follow(control, TOGETHER_WITHOUT_FLAGS, until=self.curriculum.n_scenarios)
         teams = {ALONE: team_alone, TOGETHER: together.team(), TOGETHER_WITHOUT_FLAGS: control.team()}
-        return Repetition(teams=teams, lessons=tuple(lessons))
+        return Repetition(teams=teams, graduates=graduates if self.with_graduates else {}, lessons=tuple(lessons))
 
     def _trainer(self, curriculum: Curriculum, progress: Progress | None = None) -> Trainer:
         return Trainer(curriculum, self.method, seed=self.number, progress=progress, grounds=self.grounds)
 
-    def _follow(self, trainer: Trainer, team: str, *, until: int) -> list[Lesson]:
-        """Train up to a scenario."""
+    def _follow(
+        self, trainer: Trainer, team: str, *, until: int, graduates: dict[str, Team] | None = None
+    ) -> list[Lesson]:
+        """Train up to a scenario; note the team at the end of each in `graduates`."""
         lessons = []
         while trainer.progress.scenario_number < until:
             number, reports = trainer.progress.scenario_number, []
@@ -97,6 +104,8 @@ class Training:
                 if trainer.progress.scenario_number != number:
                     break
             lessons.append(_lesson(reports, repetition=self.number, team=team))
+            if graduates is not None and trainer.graduate is not None:
+                graduates[reports[-1].scenario] = trainer.graduate
             self.on_scenario()
         return lessons
 

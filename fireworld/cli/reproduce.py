@@ -14,12 +14,13 @@ import click
 from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.interrupt import gentle_interrupt
-from fireworld.cli.report_folder import make_folder, write_file
+from fireworld.cli.report_folder import find_folder, make_folder, write_file
 
 if TYPE_CHECKING:
     from rich.progress import Progress
     from rich.table import Table
 
+    from fireworld.cli.pieces import Workshop
     from fireworld.cli.repetitions import Repetition
     from fireworld.cli.workers import Workers
     from fireworld.evaluation.study import Study
@@ -41,6 +42,7 @@ class Order:
     n_repetitions: int
     n_seeds: int
     folder: Path
+    resume: bool
 
     @property
     def seeds(self) -> range:
@@ -63,6 +65,7 @@ class Order:
     help="Folder to make.",
 )
 @click.option("--quick", is_flag=True, help="Few repetitions and seeds: to see how it looks, not to claim anything.")
+@click.option("--resume", is_flag=True, help="Go on with what an interrupted call has kept in DIR.")
 @click.option("--force", is_flag=True, help="Replace an earlier reproduction in DIR.")
 @click.pass_context
 def command(
@@ -73,6 +76,7 @@ def command(
     jobs: int | None,
     out: Path,
     quick: bool,
+    resume: bool,
     force: bool,
 ) -> None:
     """Train the paper's teams, test them beside controls, and write its Tables 1 to 3 with our figures beside.
@@ -82,25 +86,36 @@ def command(
     fireworld reproduce --quick --out quick    2 trainings, 5 seeds: a minute
 
     DIR gets report.html (open it in a browser), the tables and every run as CSV, the trained teams, a recording of
-    one run of each row, and the figures. The same options give the same CSV, byte for byte.
+    one run of each row, and the figures. The same options give the same CSV, byte for byte. After Ctrl-C, or a kill,
+    the same options with --resume go on: what was trained and tested by then is kept in DIR.
 
-    Exit code: 0 done, whatever was found; 2 could not be done; 130 interrupted (DIR keeps the teams trained so far).
+    Exit code: 0 done, whatever was found; 2 could not be done; 130 interrupted.
     """  # noqa: D301 - click wants the character
+    if force and resume:
+        raise click.UsageError("--force and --resume exclude each other.")
     order = Order(
         n_repetitions=repetitions or (QUICK_REPETITIONS if quick else REPETITIONS),
         n_seeds=seeds or (QUICK_SEEDS if quick else SEEDS),
         folder=out,
+        resume=resume,
     )
     _check_figures()
-    make_folder(out, force=force)
+    if resume:
+        find_folder(out)
+    else:
+        make_folder(out, force=force)
     announce_compilation()
     from fireworld.cli.workers import Workers
 
     with gentle_interrupt() as interrupted, _progress() as progress:
         found = _reproduce(order, Workers(jobs or os.cpu_count() or 1, interrupted), progress)
     if found is None:
-        n_kept = len([*(out / "teams").glob("cooperative-*.npz")])
-        click.echo(f"interrupted; {n_kept} of {order.n_repetitions} trainings are kept in {out / 'teams'}", err=True)
+        from fireworld.cli.kept import Kept
+
+        n_kept = Kept(out).n_trained(order.n_repetitions)
+        click.echo(
+            f"interrupted; {n_kept} of {order.n_repetitions} trainings are kept in {out}: go on with --resume", err=True
+        )
         context.exit(INTERRUPTED)
     _show(*found)
     click.echo(f"open {out / 'report.html'}")
@@ -109,33 +124,19 @@ def command(
 def _reproduce(order: Order, workers: Workers, progress: Progress) -> tuple[Study, Tables] | None:
     """Train, test, judge, record, draw, write; None if interrupted."""
     from fireworld.cli.pictures import draw_all, runs_to_record
-    from fireworld.cli.trials import all_trials, build_stages, collect
     from fireworld.evaluation.report import report_page
     from fireworld.evaluation.sheets import sheets
-    from fireworld.evaluation.study import Study
     from fireworld.evaluation.tables import make_tables
 
     grounds: dict[str, Ground] = {}
-    stages = build_stages(grounds)
-    repetitions = _train(order, workers, grounds, progress)
-    if repetitions is None:
+    measured = _measure(order, _workshop(order, workers, grounds, progress), workers)
+    if measured is None:
         return None
-    trials = all_trials(stages, repetitions, order.seeds, grounds)
-    bar = progress.add_task("testing", total=len(trials))
-    outcomes = workers.run(trials, lambda *_: progress.advance(bar))
-    if outcomes is None:
-        return None
-    study = Study(
-        n_repetitions=order.n_repetitions,
-        seeds=order.seeds,
-        lessons=[lesson for repetition in repetitions for lesson in repetition.lessons],
-        outcomes=collect(trials, outcomes),
-        agreement=[repetition.agreement for repetition in repetitions],
-    )
+    study, first = measured
     tables = make_tables(study)
     for name, text in sheets(study, tables).items():
         write_file(order.folder / name, text.encode())
-    to_record = runs_to_record(repetitions[0].teams, seed=FIRST_SEED, folder=order.folder / "recordings")
+    to_record = runs_to_record(first, seed=FIRST_SEED, folder=order.folder / "recordings")
     bar, recorded = progress.add_task("recording", total=len(to_record)), []
     for run in to_record:
         if workers.stop.is_set():
@@ -150,32 +151,57 @@ def _reproduce(order: Order, workers: Workers, progress: Progress) -> tuple[Stud
     return study, tables
 
 
-def _train(order: Order, workers: Workers, grounds: dict[str, Ground], progress: Progress) -> list[Repetition] | None:
-    """Train all repetitions, each written as soon as it is done; None if interrupted."""
-    from fireworld.cli.repetitions import Training, n_scenarios
-    from fireworld.policy.team import save_team
+def _workshop(order: Order, workers: Workers, grounds: dict[str, Ground], progress: Progress) -> Workshop:
+    """Get the work ready.
+
+    Raises:
+        TrainingError: what is to go on was begun with other settings.
+    """
+    from fireworld.cli.kept import Kept
+    from fireworld.cli.pieces import Workshop
+    from fireworld.cli.trials import build_tests
     from fireworld.training.curriculum import load_curriculum
     from fireworld.training.method import PAPER
 
-    curriculum = load_curriculum(CURRICULUM)
-    bar = progress.add_task("training", total=order.n_repetitions * n_scenarios(curriculum))
+    training, testing = (progress.add_task(name, total=None) for name in ("training", "testing"))
+    workshop = Workshop(
+        kept=Kept(order.folder),
+        curriculum=load_curriculum(CURRICULUM),
+        method=PAPER,
+        n_repetitions=order.n_repetitions,
+        tests=build_tests(order.seeds, grounds),
+        grounds=grounds,
+        stop=workers.stop,
+        on_scenario=lambda n: progress.advance(training, n),
+        on_trial=lambda n: progress.advance(testing, n),
+    )
+    progress.update(training, total=workshop.n_scenarios)
+    progress.update(testing, total=workshop.n_trials)
+    if order.resume:
+        workshop.kept.check_settings(workshop.identity)
+    else:
+        workshop.kept.keep_settings(workshop.identity)
+    return workshop
 
-    def keep(place: int, repetition: Repetition) -> None:
-        for name, team in repetition.teams.items():
-            save_team(team, order.folder / "teams" / f"{name}-{place + 1}.npz")
 
-    trainings = [
-        Training(
-            curriculum=curriculum,
-            method=PAPER,
-            number=number,
-            grounds=grounds,
-            stop=workers.stop,
-            on_scenario=lambda: progress.advance(bar),
-        )
-        for number in range(1, order.n_repetitions + 1)
-    ]
-    return workers.run(trainings, keep)
+def _measure(order: Order, workshop: Workshop, workers: Workers) -> tuple[Study, Repetition] | None:
+    """Train and test all repetitions; return what was measured, and the first repetition. None if interrupted."""
+    from fireworld.cli.trials import collect
+    from fireworld.evaluation.study import Study
+
+    done = workers.run(workshop.pieces())
+    if done is None:
+        return None
+    repetitions = [repetition for repetition, _ in done if repetition is not None]
+    *of_repetitions, of_rules = (tested for _, tested in done)
+    study = Study(
+        n_repetitions=order.n_repetitions,
+        seeds=order.seeds,
+        lessons=[lesson for repetition in repetitions for lesson in repetition.lessons],
+        outcomes=collect(of_repetitions, of_rules),
+        agreement=[repetition.agreement for repetition in repetitions],
+    )
+    return study, repetitions[0]
 
 
 def _check_figures() -> None:

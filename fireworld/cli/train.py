@@ -33,11 +33,17 @@ class Report(Protocol):
 
 
 @click.command()
-@click.argument("curriculum", default="paper")
+@click.argument("curriculum", required=False)
 @click.option(
     "-o", "--output", required=True, metavar="TEAM.npz", type=click.Path(path_type=Path), help="Team file to write."
 )
-@click.option("--method", default="paper", show_default=True, help="How to learn: a method by its name.")
+@click.option(
+    "--method",
+    default="paper",
+    show_default=True,
+    metavar="NAME",
+    help="How to learn: paper (SARSA in tables), or search (weights of a ranking, by the cross-entropy method).",
+)
 @click.option("--set", "settings", metavar="KEY=VALUE", multiple=True, help="Set a figure of the method; repeatable.")
 @click.option("--stages", metavar="NAME,...", help="Train in these stages of the curriculum only.")
 @click.option("--seed", default=1, show_default=True, type=click.IntRange(0, SEED_MAX), help="Seed of all luck.")
@@ -49,7 +55,12 @@ class Report(Protocol):
     metavar="N",
     help="Train N teams, TEAM-1.npz and so on, with the seeds that follow --seed.",
 )
-@click.option("--jobs", type=click.IntRange(1, 1000), metavar="N", help="Teams to train at a time.  [default: cores]")
+@click.option(
+    "--jobs",
+    type=click.IntRange(1, 1000),
+    metavar="N",
+    help="Teams to train, or fights to search with, at a time.  [default: cores]",
+)
 @click.option("--log", metavar="F.csv", type=click.Path(path_type=Path), help="Write a line for every episode.")
 @click.option("--resume", is_flag=True, help="Go on from the checkpoint of an interrupted training.")
 @click.option("--force", is_flag=True, help="Replace existing files, checkpoints too.")
@@ -57,7 +68,7 @@ class Report(Protocol):
 def command(
     context: click.Context,
     *,
-    curriculum: str,
+    curriculum: str | None,
     output: Path,
     method: str,
     settings: tuple[str, ...],
@@ -69,15 +80,18 @@ def command(
     resume: bool,
     force: bool,
 ) -> None:
-    """Train a team in CURRICULUM (a shipped name or a YAML file; `paper` if left out) and write its team file.
+    """Train a team in CURRICULUM (a shipped name or a YAML file) and write its team file.
+
+    The method `paper` trains in the curriculum `paper` if none is named, the method `search` in `contested`.
 
     \b
     fireworld train -o team.npz                          the paper's method, both stages
     fireworld train -o alone.npz --stages alone          without cooperation: 270 states
     fireworld train -o team.npz --set alpha=0.1 --seed 7
+    fireworld train -o best.npz --method search          a ranking of targets
     fireworld run test-2 --policy team.npz               let it fight a fire
 
-    The same seed gives the same tables. Ctrl-C keeps a checkpoint, TEAM.npz.checkpoint, from which --resume goes on bit
+    The same seed gives the same team. Ctrl-C keeps a checkpoint, TEAM.npz.checkpoint, from which --resume goes on bit
     for bit.
 
     Exit code: 0 trained, 2 could not train, 130 interrupted.
@@ -93,14 +107,31 @@ def command(
     announce_compilation()
     from fireworld.scenario import split_settings
     from fireworld.training.curriculum import load_curriculum
-    from fireworld.training.method import find_method
+    from fireworld.training.method import SEARCH, find_method
     from fireworld.training.teams import Training, numbered, train_all
     from fireworld.training.trainer import Trainer
     from fireworld.world.stage import Ground
 
-    learned = find_method(method).with_settings(split_settings(settings, example="alpha=0.1"))
-    chosen = load_curriculum(curriculum)
+    figures = split_settings(settings, example="n_fires=20" if method == SEARCH else "alpha=0.1")
+    chosen = load_curriculum(curriculum or ("contested" if method == SEARCH else "paper"))
     chosen = chosen if stages is None else chosen.only([name.strip() for name in stages.split(",")])
+    if method == SEARCH:
+        from fireworld.cli.searching import train_by_search
+
+        if log is not None:
+            raise click.UsageError("--log: a search has no episodes to write; its generations are shown.")
+        done = train_by_search(
+            chosen,
+            figures,
+            output=output,
+            seed=seed,
+            repetitions=repetitions,
+            jobs=jobs,
+            resume=resume,
+            force=force,
+        )
+        context.exit(0 if done else INTERRUPTED)
+    learned = find_method(method).with_settings(figures)
     grounds: dict[str, Ground] = {}
     trainings = [
         Training(

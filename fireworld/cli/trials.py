@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from fireworld.cli.repetitions import Repetition, random_tables
 from fireworld.evaluation import paper
@@ -14,70 +15,68 @@ from fireworld.policy.names import BUILT_IN
 from fireworld.scenario import load_scenario
 from fireworld.world.stage import Ground, Stage, build_stage
 
+RULES: Final = ("random", *FIXED, NO_WATER)
+"""What does not differ between repetitions."""
+Tested = dict[str, dict[str, Outcomes]]
+"""Outcomes by scenario and team."""
+
 
 @dataclass(frozen=True)
-class Trial:
-    """One team on one test: a policy and the seeds it meets."""
+class Tests:
+    """The tests of Tables 2 and 3, built, and the seeds of their runs."""
 
-    scenario: str
-    team: str
-    stage: Stage
-    policy: KernelPolicy
+    stages: Mapping[str, Stage]
+    dry: Mapping[str, Stage]
+    """The same without water."""
     seeds: Sequence[int]
 
-    def __call__(self) -> Outcomes:
-        """Run all seeds."""
-        return evaluate(self.stage, self.policy, self.seeds)
+    def run(self, policies: Mapping[str, KernelPolicy], on_trial: Callable[[], object]) -> Tested:
+        """Let every policy run every test under all seeds.
+
+        Args:
+            policies: by team.
+            on_trial: called after every test of a policy; an exception of it ends the work.
+        """
+        tested: Tested = {}
+        for name in self.stages:
+            for team, policy in policies.items():
+                stage = (self.dry if team == NO_WATER else self.stages)[name]
+                tested.setdefault(name, {})[team] = evaluate(stage, policy, self.seeds)
+                on_trial()
+        return tested
+
+    def policies_of(self, repetition: Repetition, number: int) -> dict[str, KernelPolicy]:
+        """Return what differs between repetitions: the trained teams, and tables drawn at random."""
+        n_brigades = max(len(stage.setup.brigade_refuge) for stage in self.stages.values())
+        trained = {name: team.policy() for name, team in repetition.teams.items()}
+        return {**trained, RANDOM_TABLES: from_tables(random_tables(number, n_brigades=n_brigades))}
 
 
-def test_scenarios() -> list[str]:
-    """Name the tests of Tables 2 and 3."""
-    return [row.scenario for row in (*paper.TABLE_2, *paper.TABLE_3)]
-
-
-def build_stages(grounds: dict[str, Ground]) -> dict[str, Stage]:
-    """Build the tests."""
-    return {name: build_stage(load_scenario(name), grounds=grounds) for name in test_scenarios()}
-
-
-def all_trials(
-    stages: Mapping[str, Stage], repetitions: Sequence[Repetition], seeds: Sequence[int], grounds: dict[str, Ground]
-) -> list[Trial]:
-    """List all trials: a learned or drawn team comes once a repetition, a rule once.
+def build_tests(seeds: Sequence[int], grounds: dict[str, Ground]) -> Tests:
+    """Build the tests.
 
     Args:
-        stages: the tests, by name.
-        repetitions: the trained teams.
         seeds: of the runs' luck.
-        grounds: cities built before.
+        grounds: cities built before; added to.
     """
-    policies: dict[str, list[KernelPolicy]] = {
-        name: [repetition.teams[name].policy() for repetition in repetitions] for name in repetitions[0].teams
+    names = [row.scenario for row in (*paper.TABLE_2, *paper.TABLE_3)]
+    stages = {name: build_stage(load_scenario(name), grounds=grounds) for name in names}
+    return Tests(stages, {name: _without_water(stage, grounds) for name, stage in stages.items()}, seeds)
+
+
+def rules() -> dict[str, KernelPolicy]:
+    """Return the policies that do not differ between repetitions, by team."""
+    return {name: at_random() if name in {"random", NO_WATER} else BUILT_IN[name]() for name in RULES}
+
+
+def collect(of_repetitions: Sequence[Tested], of_rules: Tested) -> dict[str, dict[str, list[Outcomes]]]:
+    """Sort outcomes by scenario and team, repetition after repetition; scenarios and teams in their usual order."""
+    return {
+        name: {
+            team: [tested[name][team] for tested in ([of_rules] if team in RULES else of_repetitions)] for team in TEAMS
+        }
+        for name in of_rules
     }
-    n_brigades_max = max(len(stage.setup.brigade_refuge) for stage in stages.values())
-    policies[RANDOM_TABLES] = [
-        from_tables(random_tables(number, n_brigades=n_brigades_max)) for number in range(1, len(repetitions) + 1)
-    ]
-    policies |= {name: [make()] for name, make in _rules().items()}
-    dry = {name: _without_water(stage, grounds) for name, stage in stages.items()}
-    return [
-        Trial(name, team, dry[name] if team == NO_WATER else stage, policy, seeds)
-        for name, stage in stages.items()
-        for team in TEAMS
-        for policy in policies[team]
-    ]
-
-
-def collect(trials: Sequence[Trial], outcomes: Sequence[Outcomes]) -> dict[str, dict[str, list[Outcomes]]]:
-    """Sort outcomes by scenario and team, repetition after repetition."""
-    found: dict[str, dict[str, list[Outcomes]]] = {}
-    for trial, outcome in zip(trials, outcomes, strict=True):
-        found.setdefault(trial.scenario, {}).setdefault(trial.team, []).append(outcome)
-    return found
-
-
-def _rules() -> dict[str, Callable[[], KernelPolicy]]:
-    return {"random": at_random, NO_WATER: at_random, **{name: BUILT_IN[name] for name in FIXED}}
 
 
 def _without_water(stage: Stage, grounds: dict[str, Ground]) -> Stage:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import base64
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Final
 
@@ -12,22 +11,8 @@ from fireworld.evaluation.findings import caveat, findings, spread, tally
 from fireworld.evaluation.statistics import Estimate
 from fireworld.evaluation.study import ALONE, TEAMS, TOGETHER, Study
 from fireworld.evaluation.tables import APART, NEAR, WITHIN, Cell, Pair, Standing, Tables
+from fireworld.html_page import html_figure, html_mark, html_page, html_table, text_cell
 
-_STYLE: Final = """
-body { font: 15px/1.5 system-ui, sans-serif; color: #222; background: #fbfaf8; max-width: 74rem; margin: 2rem auto;
-  padding: 0 1.5rem; }
-h1 { margin-bottom: .2rem; } h2 { margin-top: 2.6rem; border-bottom: 1px solid #d8d4cc; } h3 { margin-bottom: .4rem; }
-table { border-collapse: collapse; margin: .8rem 0; font-size: 14px; }
-th, td { padding: .3rem .7rem; text-align: right; border-bottom: 1px solid #e5e1d9; white-space: nowrap; }
-th { background: #f0ede6; font-weight: 600; } td.text, th.text { text-align: left; white-space: normal; }
-.interval { color: #777; font-size: 12.5px; }
-.mark { border-radius: 3px; padding: .05rem .45rem; font-size: 12.5px; white-space: nowrap; }
-.good { background: #d8efd9; color: #17561d; } .fair { background: #fbeec3; color: #6a4d00; }
-.bad { background: #f8d9d5; color: #86201a; } .open { background: #e6e6ea; color: #444; }
-.caveat { background: #fbeec3; padding: .6rem 1rem; border-radius: 4px; }
-.maps { display: grid; grid-template-columns: repeat(3, 1fr); gap: .6rem; } img { max-width: 100%; }
-figure { margin: 0; } figcaption { font-size: 13px; color: #555; }
-"""
 _MARKS: Final = {
     WITHIN: "good", NEAR: "fair", APART: "bad",
     "reproduced": "good", "partly": "fair", "not reproduced": "bad", "open": "open", "yes": "good", "no": "bad",
@@ -66,8 +51,7 @@ def report_page(study: Study, tables: Tables, images: Mapping[str, bytes]) -> st
         "<h2>How it was measured</h2>",
         _method(),
     ]
-    head = f'<meta charset="utf-8"><title>fireworld: reproduction</title><style>{_STYLE}</style>'
-    return f'<!doctype html>\n<html lang="en"><head>{head}</head><body>\n' + "\n".join(body) + "\n</body></html>\n"
+    return html_page("fireworld: reproduction", body)
 
 
 def _introduction(study: Study) -> str:
@@ -82,10 +66,14 @@ def _introduction(study: Study) -> str:
 
 def _findings(study: Study, tables: Tables) -> str:
     rows = [
-        [_text(finding.question), _text(_mark(finding.verdict, _MARKS[finding.verdict])), _text(escape(finding.text))]
+        [
+            text_cell(finding.question),
+            text_cell(html_mark(finding.verdict, _MARKS[finding.verdict])),
+            text_cell(escape(finding.text)),
+        ]
         for finding in findings(study, tables)
     ]
-    return _table(["question", "answer", "numbers"], rows, n_text=3)
+    return html_table(["question", "answer", "numbers"], rows, n_text=3)
 
 
 def _lessons(tables: Tables) -> str:
@@ -93,12 +81,12 @@ def _lessons(tables: Tables) -> str:
     for place, converged in enumerate(tables.converged):
         episode, score = tables.lessons[2 * place : 2 * place + 2]
         rows.append([
-            _text(episode.scenario), *_compared(episode, digits=0), f"{100 * converged.mean:.0f} %",
+            text_cell(episode.scenario), *_compared(episode, digits=0), f"{100 * converged.mean:.0f} %",
             *_compared(score, digits=2), _maximum(score),
         ])  # fmt: skip
     heads = ["scenario", "convergence episode: paper", "ours", "", "settled", "score: paper", "ours", "", "of"]
     note = f"{tally(tables.lessons)}. The score is that of the last episode; the episode is 130 where nothing settled."
-    return _table(heads, rows) + f"<p>{escape(note[0].upper() + note[1:])}</p>"
+    return html_table(heads, rows) + f"<p>{escape(note[0].upper() + note[1:])}</p>"
 
 
 def _pairs(pairs: Sequence[Pair]) -> str:
@@ -107,30 +95,30 @@ def _pairs(pairs: Sequence[Pair]) -> str:
         digits = 2 if pair.without.quantity == "score" else 0
         claim, mark = _CLAIMS[pair.claim_holds]
         rows.append([
-            _text(pair.without.scenario), _text(pair.without.quantity), *_compared(pair.without, digits=digits),
+            text_cell(pair.without.scenario), text_cell(pair.without.quantity), *_compared(pair.without, digits=digits),
             *_compared(pair.together, digits=digits), _spread(pair.difference, digits=digits, sign=True),
-            _mark(claim, mark), _maximum(pair.without),
+            html_mark(claim, mark), _maximum(pair.without),
         ])  # fmt: skip
     heads = [
         "scenario", "", "without: paper", "ours", "", "with: paper", "ours", "", "with less without", "", "of",
     ]  # fmt: skip
     cells = [cell for pair in pairs for cell in (pair.without, pair.together)]
     counted = tally(cells)
-    return _table(heads, rows, n_text=2) + f"<p>{escape(counted[0].upper() + counted[1:])}.</p>"
+    return html_table(heads, rows, n_text=2) + f"<p>{escape(counted[0].upper() + counted[1:])}.</p>"
 
 
 def _controls(tables: Tables) -> str:
     parts = ["<p>Share of the greatest score.</p>"]
     for table, standings in ((paper.TABLE_2, tables.standings), (paper.TABLE_3, tables.standings_more_brigades)):
         heads = ["team", "", *(row.scenario for row in table), "mean", "typical run"]
-        parts.append(_table(heads, [_standing(row) for row in standings], n_text=2))
+        parts.append(html_table(heads, [_standing(row) for row in standings], n_text=2))
     return "\n".join([*parts, "<p>A typical run is the mean of the middle half of all runs.</p>"])
 
 
 def _standing(row: Standing) -> list[str]:
     name = f"<b>{row.team}</b>" if row.team in {ALONE, TOGETHER} else row.team
     shares = [_spread(found, digits=2) for found in (*row.by_scenario, row.mean)]
-    return [_text(name), _text(escape(TEAMS[row.team])), *shares, f"{row.mean.interquartile_mean:.2f}"]
+    return [text_cell(name), text_cell(escape(TEAMS[row.team])), *shares, f"{row.mean.interquartile_mean:.2f}"]
 
 
 def _maps(images: Mapping[str, bytes], scenario: str) -> str:
@@ -156,7 +144,7 @@ def _method() -> str:
 
 def _compared(cell: Cell, *, digits: int) -> list[str]:
     """Three cells: the paper's figure, ours, the verdict."""
-    return [f"{cell.paper:g}", _spread(cell.ours, digits=digits), _mark(cell.verdict, _MARKS[cell.verdict])]
+    return [f"{cell.paper:g}", _spread(cell.ours, digits=digits), html_mark(cell.verdict, _MARKS[cell.verdict])]
 
 
 def _spread(found: Estimate, *, digits: int, sign: bool = False) -> str:
@@ -168,29 +156,5 @@ def _maximum(cell: Cell) -> str:
     return "" if cell.ours_max is None else f"{cell.ours_max:.0f}"
 
 
-def _mark(text: str, kind: str) -> str:
-    return f'<span class="mark {kind}">{escape(text)}</span>'
-
-
-def _text(html: str) -> str:
-    """Mark a cell as words, for `_table`."""
-    return f"\0{html}"
-
-
-def _table(heads: Sequence[str], rows: Iterable[Sequence[str]], *, n_text: int = 1) -> str:
-    """Write a table; cells are HTML. The first `n_text` headings are words."""
-    head = "".join(f"<th{' class=text' if k < n_text else ''}>{name}</th>" for k, name in enumerate(heads))
-    body = "\n".join("<tr>" + "".join(_cell(cell) for cell in row) + "</tr>" for row in rows)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table>"
-
-
-def _cell(html: str) -> str:
-    return f'<td class="text">{html[1:]}</td>' if html.startswith("\0") else f"<td>{html}</td>"
-
-
 def _image(images: Mapping[str, bytes], name: str, caption: str) -> str:
-    if name not in images:
-        return ""
-    data = base64.b64encode(images[name]).decode()
-    picture = f'<img alt="{escape(caption)}" src="data:image/png;base64,{data}">'
-    return f"<figure>{picture}<figcaption>{escape(caption)}</figcaption></figure>"
+    return html_figure(images[name], caption) if name in images else ""

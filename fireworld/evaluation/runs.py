@@ -1,4 +1,4 @@
-"""Runs of one policy on one scenario under many seeds, in compiled code: the one way in which teams are measured."""
+"""Runs of one policy on one scenario under many seeds: the one way in which teams are measured."""
 
 from __future__ import annotations
 
@@ -9,8 +9,11 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from fireworld.kernels.arrays import Array
+from fireworld.policy.asking import begin
 from fireworld.policy.kernel import KernelPolicy
+from fireworld.policy.protocol import Policy
 from fireworld.world.stage import Stage
+from fireworld.world.world import World
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,10 @@ QUANTITIES = tuple(item.name for item in fields(Outcomes) if item.name != "seed"
 """What is measured of a run."""
 
 
+Row = tuple[float, ...]
+"""How one run ended: QUANTITIES in their order."""
+
+
 def evaluate(stage: Stage, policy: KernelPolicy, seeds: Sequence[int], *, n_threads: int = 1) -> Outcomes:
     """Run a policy once under every seed; policies measured on the same seeds meet the same luck.
 
@@ -48,19 +55,39 @@ def evaluate(stage: Stage, policy: KernelPolicy, seeds: Sequence[int], *, n_thre
         n_threads: runs at a time; the outcome does not depend on it.
     """
 
-    def run(seed: int) -> tuple[float, ...]:
-        world = stage.world(seed=seed)
-        steps = world.run(policy.for_brigades(world.n_brigades))
-        outcome = world.arrays.outcome
-        score, score_max = outcome.score[:2]
-        _, _, burnt_out, alive = outcome.counts
-        return score, score_max, burnt_out, steps, world.terminated, alive, outcome.reward[5], outcome.water[0]
+    def run(seed: int) -> Row:
+        return run_compiled(stage, policy, seed=seed)
 
     if n_threads == 1:
         rows = [run(seed) for seed in seeds]
     else:
         with ThreadPoolExecutor(n_threads) as pool:
             rows = list(pool.map(run, seeds))
+    return outcomes(seeds, rows)
+
+
+def run_compiled(stage: Stage, policy: KernelPolicy, *, seed: int) -> Row:
+    """Run a policy that the kernels follow by themselves, as one compiled episode."""
+    world = stage.world(seed=seed)
+    world.run(policy.for_brigades(world.n_brigades))
+    return _ending(world)
+
+
+def run_step_by_step(stage: Stage, policy: Policy, *, seed: int) -> Row:
+    """Run any policy: it is asked in every step.
+
+    Raises:
+        PolicyError: the policy failed.
+    """
+    world = stage.world(seed=seed)
+    begin(policy, world.tables, n_brigades=world.n_brigades, seed=seed)
+    while not (world.terminated or world.truncated):
+        world.step(policy)
+    return _ending(world)
+
+
+def outcomes(seeds: Sequence[int], rows: Sequence[Row]) -> Outcomes:
+    """Put runs together, one for each seed."""
     score, score_max, burnt_out, steps, completed, alive, total_reward, water = zip(*rows, strict=True)
     return Outcomes(
         seed=np.array(seeds, dtype=np.int64),
@@ -73,3 +100,11 @@ def evaluate(stage: Stage, policy: KernelPolicy, seeds: Sequence[int], *, n_thre
         total_reward=np.array(total_reward, dtype=np.float64),
         water_litres=np.array(water, dtype=np.float64),
     )
+
+
+def _ending(world: World) -> Row:
+    outcome = world.arrays.outcome
+    score, score_max = outcome.score[:2].tolist()
+    _, _, burnt_out, alive = outcome.counts.tolist()
+    steps, total_reward, water = world.step_number, float(outcome.reward[5]), float(outcome.water[0])
+    return score, score_max, burnt_out, steps, world.terminated, alive, total_reward, water

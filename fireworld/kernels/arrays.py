@@ -248,10 +248,11 @@ class WorldArrays(NamedTuple):
 class PolicyTables(NamedTuple):
     """A policy that the kernels can follow by themselves, per brigade."""
 
-    kind: Array  # (b,) int32: 0 always one action, 1 random, 2 greedy in a table
+    kind: Array  # (b,) int32: 0 always one action, 1 random, 2 greedy in a table, 3 and 4 by a ranking of targets
     action: Array  # (b,) int32, the action of kind 0
-    table_of: Array  # (b,) int32, the table of kind 2
+    table_of: Array  # (b,) int32, the table of kind 2, the ranking of kinds 3 and 4
     tables: Array  # (tables, states, 4) float64
+    rankings: Array  # (rankings, 17) float64, weights
     epsilon: Array  # (1,) float64, probability of a random action instead of the greedy one
     commit: Array  # (1,) int64, steps that a choice is kept for; 1: a new choice every step
 

@@ -1,4 +1,4 @@
-"""How the kernels choose by themselves: a fixed action, a random one, or epsilon-greedy in a table."""
+"""How the kernels choose in a state: a fixed action, a random one, or epsilon-greedy in a table."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from fireworld.kernels.draws import below, uniform
 from fireworld.kernels.jit import inner, kernel
 from fireworld.kernels.observation import N_ACTIONS
 
-FIXED, RANDOM, TABLE = 0, 1, 2
+FIXED, RANDOM, TABLE, RANK_NAMED, RANK_ALL = 0, 1, 2, 3, 4
+"""Kinds of policies. The last two do not choose in a state but among targets: `fireworld.kernels.ranking`."""
 
 
 @inner

@@ -12,7 +12,8 @@ from typing import Final
 import numpy as np
 
 from fireworld import draws
-from fireworld.kernels.jit import inner
+from fireworld.kernels.arrays import Array
+from fireworld.kernels.jit import inner, kernel
 
 _INCREMENT: Final = np.uint64(draws.INCREMENT)
 _MULTIPLIER_1: Final = np.uint64(draws.MULTIPLIER_1)
@@ -89,3 +90,19 @@ def normal(seed: int, purpose: int, entity: int, step: int) -> float:
 def below(seed: int, purpose: int, entity: int, step: int, bound: int) -> np.int64:
     """Draw a whole number in [0, bound) from the top 32 bits of the key; 1 <= bound <= 2**31."""
     return np.int64(((hash_key(seed, purpose, entity, step) >> _32) * np.uint64(bound)) >> _32)
+
+
+@kernel
+def fill_normals(seed: int, purpose: int, step: int, out: Array) -> None:
+    """Fill a matrix with deviates of N(0, 1); the entity of each is its place, row after row.
+
+    Args:
+        seed: seed of the run.
+        purpose: one of the constants of `fireworld.draws`.
+        step: second index of the draws.
+        out: (rows, columns) float64, written.
+    """
+    rows, columns = out.shape
+    for row in range(rows):
+        for column in range(columns):
+            out[row, column] = normal(seed, purpose, row * columns + column, step)

@@ -6,13 +6,14 @@ import numpy as np
 
 from fireworld.kernels.arrays import CityTables, Constants, Learner, PolicyTables, WorldArrays
 from fireworld.kernels.brigades import act, shelter
-from fireworld.kernels.choice import choose, keeps_choice, table_state
+from fireworld.kernels.choice import RANK_ALL, RANK_NAMED, choose, keeps_choice, table_state
 from fireworld.kernels.fire import advance_fire, draw_burn_rates
 from fireworld.kernels.health import harm
 from fireworld.kernels.jit import kernel
-from fireworld.kernels.learning import choose_and_learn, forget, take_reward, update
+from fireworld.kernels.learning import choose_and_learn, forget, go_on_and_learn, take_reward, update
 from fireworld.kernels.observation import can_choose, find_target, observe
 from fireworld.kernels.outcome import assess
+from fireworld.kernels.ranking import N_OF_BUILDING, rank
 from fireworld.kernels.sites import find_sites
 
 FIRST = np.int64(0)
@@ -40,6 +41,9 @@ def run_episode(  # noqa: C901, PLR0912 - handing all arrays to a function of it
     health, buildings, geometry, streets = constants.health, city.buildings, city.geometry, city.streets
     n_brigades = len(brigades.action)
     features, before = np.zeros(8, dtype=np.int64), np.zeros(n_brigades, dtype=np.int32)
+    known_before, values = np.full(n_brigades, -1, dtype=np.int32), np.zeros(5)
+    n_described = len(fire.energy) if policy.kind.max() >= RANK_NAMED else 0
+    described, described_at = np.zeros((n_described, N_OF_BUILDING)), np.full(n_described, -1)
     learning = learner.learning[0] != 0
     if learning:
         forget(learner)
@@ -49,19 +53,46 @@ def run_episode(  # noqa: C901, PLR0912 - handing all arrays to a function of it
         find_sites(buildings, city.links, city.near, geometry, fire, people, brigades, sites)
         for brigade in range(n_brigades):
             before[brigade] = brigades.action[brigade]
-        shown = brigades.action if constants.observation.in_turn else before
+            known_before[brigade] = brigades.target[brigade]
+        in_turn = constants.observation.in_turn
+        shown, known = (brigades.action, brigades.target) if in_turn else (before, known_before)
         for brigade in range(n_brigades):
             action, target = -1, -1
             if can_choose(brigade, brigades, sites):
                 if keeps_choice(brigade, before[brigade], policy.commit[0], step):
                     action = before[brigade]
+                    if learning and step > last_step:
+                        state = observe(brigade, shown, brigades, sites, constants.observation, features)
+                        row = table_state(state, policy.tables.shape[1])
+                        go_on_and_learn(brigade, policy.table_of[brigade], row, action, learner)
+                elif policy.kind[brigade] >= RANK_NAMED:
+                    own, weights = policy.kind[brigade] == RANK_ALL, policy.rankings[policy.table_of[brigade]]
+                    action, target = rank(
+                        brigade,
+                        own,
+                        step,
+                        known,
+                        weights,
+                        described,
+                        described_at,
+                        brigades,
+                        buildings,
+                        city.links,
+                        geometry,
+                        fire,
+                        sites,
+                        constants.fire,
+                        constants.brigades,
+                        values,
+                    )
                 else:
                     state = observe(brigade, shown, brigades, sites, constants.observation, features)
                     action = choose(brigade, state, policy, seed, step)
                     if learning:
                         row = table_state(state, policy.tables.shape[1])
                         choose_and_learn(brigade, policy.table_of[brigade], row, action, policy.epsilon[0], learner)
-                target = find_target(brigade, action, brigades, buildings, fire, geometry, sites)
+                if target < 0:
+                    target = find_target(brigade, action, brigades, buildings, fire, geometry, sites)
             brigades.action[brigade] = action
             brigades.target[brigade] = target
         if step > last_step:

@@ -50,7 +50,7 @@ def state_index(features: Array) -> int:
     return index
 
 
-@inner
+@kernel
 def site_place(brigade: int, brigades: BrigadeState, sites: SiteState) -> int:
     """Return the position of a brigade's site in the site arrays, -1 if it has none."""
     for site in range(sites.counts[0]):
@@ -75,7 +75,7 @@ def observe(
 
     Args:
         brigade: who looks.
-        actions: (b,) what the brigades do, -1 nothing.
+        actions: (b,) what the brigades do, -1 nothing; a target of one's own has no flag.
         brigades: the team.
         sites: fire sites of the moment.
         constants: thresholds.
@@ -92,7 +92,7 @@ def observe(
     features[2] = level(sites.civilian_square[site], constants.civilian_low_square, constants.civilian_medium_square)
     features[3] = volume_class(sites.volume[site], constants.unit_volume)
     for other in range(len(actions)):
-        if other != brigade and actions[other] >= 0:
+        if other != brigade and 0 <= actions[other] < N_ACTIONS:
             features[4 + actions[other]] = 1
     return state_index(features)
 

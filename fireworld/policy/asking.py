@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from fireworld.errors import FireworldError, PolicyError, expected
 from fireworld.kernels.arrays import CityTables
-from fireworld.policy.protocol import Decision, Observation, Policy
+from fireworld.policy.protocol import Action, Decision, Observation, Policy
 from fireworld.records import ACTIONS
 
 LIBRARIES: Final = (
@@ -76,15 +76,16 @@ def _moment(observation: Observation) -> str:
 
 def _checked(answer: object, policy: Policy, observation: Observation) -> Decision:
     """Return a decision with nothing but plain values in it."""
-    wanted = f"a Decision with an action from 0 to {len(ACTIONS) - 1}"
+    wanted = f"a Decision with an action from 0 to {len(Action) - 1}"
     if not isinstance(answer, Decision):
         raise _refusal(policy, observation, wanted, answer)
     try:
         action = operator.index(answer.action)
     except TypeError:
         raise _refusal(policy, observation, wanted, f"action {answer.action!r}") from None
-    if not 0 <= action < len(ACTIONS):
+    if not 0 <= action < len(Action):
         raise _refusal(policy, observation, wanted, f"action {action}")
+    target = _own_target(answer, policy, observation) if action == Action.OWN_TARGET else None
     try:
         values = _plain_values(answer.q_values)
     except (TypeError, ValueError):
@@ -94,7 +95,24 @@ def _checked(answer: object, policy: Policy, observation: Observation) -> Decisi
         epsilon = _number(answer.epsilon)
     except (TypeError, ValueError):
         raise _refusal(policy, observation, "epsilon as a number", f"epsilon {answer.epsilon!r}") from None
-    return Decision(action, q_values=values, explored=bool(answer.explored), epsilon=epsilon)
+    try:
+        value = None if answer.value is None else _number(answer.value)
+    except (TypeError, ValueError):
+        raise _refusal(policy, observation, "value as a number, or None", f"value {answer.value!r}") from None
+    explored = bool(answer.explored)
+    return Decision(action, target=target, q_values=values, value=value, explored=explored, epsilon=epsilon)
+
+
+def _own_target(answer: Decision, policy: Policy, observation: Observation) -> int:
+    """Return the target of a brigade that names it itself."""
+    wanted = "with OWN_TARGET a target that is one of observation.burning"
+    try:
+        target = operator.index(answer.target)  # type: ignore[arg-type]  # whatever a user's policy answers
+    except TypeError:
+        raise _refusal(policy, observation, wanted, f"target {answer.target!r}") from None
+    if target not in observation.burning:
+        raise _refusal(policy, observation, wanted, f"target {target}")
+    return target
 
 
 def _plain_values(values: Sequence[float] | None) -> tuple[float, ...] | None:

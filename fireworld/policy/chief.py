@@ -10,6 +10,7 @@ from fireworld.kernels.arrays import Array
 from fireworld.policy.kernel import KernelPolicy, from_tables
 from fireworld.policy.protocol import Action
 from fireworld.policy.words import N_STATES, features_of
+from fireworld.records import ACTIONS
 
 HIGH: Final = 2
 
@@ -23,7 +24,7 @@ def rule(distance_from_civilian: int, *, others_protect: bool) -> Action:
 
 def chief_table() -> Array:
     """Return the rule as a table of action values, (4320, 4): 1 for the action it names, 0 for the others."""
-    table = np.zeros((N_STATES, len(Action)))
+    table = np.zeros((N_STATES, len(ACTIONS)))
     for state in range(N_STATES):
         features = features_of(state)
         table[state, rule(features[2], others_protect=bool(features[5]))] = 1.0

@@ -1,4 +1,4 @@
-"""Policies that the compiled episode can follow by itself: fixed actions, random, and tables."""
+"""Policies that the compiled episode can follow by itself: fixed actions, random, tables, and rankings of targets."""
 
 from __future__ import annotations
 
@@ -9,11 +9,23 @@ from typing import Final
 import numpy as np
 
 from fireworld.kernels.arrays import Array, CityTables, PolicyTables
-from fireworld.kernels.choice import FIXED, RANDOM, TABLE, choose, explores, keeps_choice, table_state
+from fireworld.kernels.choice import (
+    FIXED,
+    RANDOM,
+    RANK_ALL,
+    RANK_NAMED,
+    TABLE,
+    choose,
+    explores,
+    keeps_choice,
+    table_state,
+)
+from fireworld.kernels.ranking import N_OF_BUILDING, N_WEIGHTS, rank
 from fireworld.policy.protocol import Decision, Observation
 from fireworld.records import ACTIONS
 
 NO_TABLES: Final = np.zeros((1, 1, 4))
+NO_RANKINGS: Final = np.zeros((1, N_WEIGHTS))
 
 
 @dataclass
@@ -31,6 +43,8 @@ class KernelPolicy:
     epsilon: float = 0.0
     commit: int = 1
     """Steps that a choice is kept for."""
+    rankings: Array = field(default_factory=NO_RANKINGS.copy)
+    """(rankings, 17) float64, weights."""
     _ready: PolicyTables | None = field(default=None, init=False, repr=False, compare=False)
 
     def for_brigades(self, n_brigades: int) -> PolicyTables:
@@ -41,6 +55,7 @@ class KernelPolicy:
             action=np.array(self.actions, dtype=np.int32)[turn],
             table_of=np.array(self.table_of, dtype=np.int32)[turn],
             tables=np.ascontiguousarray(self.tables, dtype=np.float64),
+            rankings=np.ascontiguousarray(self.rankings, dtype=np.float64),
             epsilon=np.array([self.epsilon]),
             commit=np.array([self.commit], dtype=np.int64),
         )
@@ -55,6 +70,8 @@ class KernelPolicy:
         ready = self._ready
         assert ready is not None, "begin() comes before decide()"  # noqa: S101 - a mistake of ours, not of a user
         brigade, seed, step = observation.brigade, observation.seed, observation.step
+        if ready.kind[brigade] in (RANK_NAMED, RANK_ALL):
+            return _by_rank(observation, ready)
         action = int(choose(brigade, observation.state_index, ready, seed, step))
         if ready.kind[brigade] != TABLE:
             return Decision(action)
@@ -76,7 +93,41 @@ class KernelPolicy:
         """SHA-256 of what the policy does."""
         content = hashlib.sha256(repr((self.kinds, self.actions, self.table_of, self.epsilon, self.commit)).encode())
         content.update(repr(self.tables.shape).encode() + np.ascontiguousarray(self.tables, dtype="<f8").tobytes())
+        if {RANK_NAMED, RANK_ALL} & set(self.kinds):
+            content.update(np.ascontiguousarray(self.rankings, dtype="<f8").tobytes())
         return content.hexdigest()
+
+
+def _by_rank(observation: Observation, ready: PolicyTables) -> Decision:
+    """Choose the target that a brigade's ranking puts first."""
+    brigade, city, world, constants = observation.brigade, observation.city, observation.world, observation.constants
+    n = len(world.fire.energy)
+    values = np.zeros(len(ACTIONS) + 1)
+    own = bool(ready.kind[brigade] == RANK_ALL)
+    action, target = rank(
+        brigade,
+        own,
+        observation.step,
+        observation.known_targets,
+        ready.rankings[ready.table_of[brigade]],
+        np.zeros((n, N_OF_BUILDING)),
+        np.full(n, -1),
+        world.brigades,
+        city.buildings,
+        city.links,
+        city.geometry,
+        world.fire,
+        world.sites,
+        constants.fire,
+        constants.brigades,
+        values,
+    )
+    return Decision(
+        int(action),
+        target=int(target) if own else None,
+        q_values=tuple(values[: len(ACTIONS)].tolist()),
+        value=float(values[len(ACTIONS)]),
+    )
 
 
 def always(action: int) -> KernelPolicy:
@@ -105,3 +156,15 @@ def from_tables(tables: Array, *, epsilon: float = 0.0, commit: int = 1) -> Kern
     """
     n = len(tables)
     return KernelPolicy((TABLE,) * n, (0,) * n, tuple(range(n)), tables, epsilon, commit)
+
+
+def from_rankings(rankings: Array, *, own_targets: bool) -> KernelPolicy:
+    """Return the policy that follows one ranking of targets per brigade, or one for all.
+
+    Args:
+        rankings: (rankings, 17) weights.
+        own_targets: brigades go for any burning building of their site, not only for the four that actions name.
+    """
+    n = len(rankings)
+    kind = RANK_ALL if own_targets else RANK_NAMED
+    return KernelPolicy((kind,) * n, (0,) * n, tuple(range(n)), NO_TABLES, rankings=rankings)

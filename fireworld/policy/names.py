@@ -1,4 +1,4 @@
-"""Find a policy by the name a user gives: a built-in one, or MODULE:CLASS of the user's own."""
+"""Find a policy by the name a user gives: a built-in one, a team, or MODULE:CLASS of the user's own."""
 
 from __future__ import annotations
 
@@ -16,9 +16,11 @@ from typing import Final
 from fireworld.errors import PolicyError, expected
 from fireworld.policy.asking import describe
 from fireworld.policy.chief import chief
+from fireworld.policy.files import parse_team_file
 from fireworld.policy.kernel import KernelPolicy, always, at_random, each_another
+from fireworld.policy.npz import SUFFIX, read_bytes
 from fireworld.policy.protocol import Policy
-from fireworld.policy.team import SUFFIX, parse_team, read_bytes
+from fireworld.policy.shipped import team_names, team_path
 from fireworld.records import ACTIONS
 
 BUILT_IN: Final[dict[str, Callable[[], KernelPolicy]]] = {
@@ -45,21 +47,23 @@ class NamedPolicy:
     policy: Policy
     attachments: Mapping[str, bytes] = field(default_factory=dict)
     """Files that go with a recording of it, by name."""
+    trained_choices: str = ""
+    """Of a team: the scenario's `choices` that it was trained with, where its file tells."""
 
 
 def load_policy(name: str) -> NamedPolicy:
     """Return a policy by name.
 
     Args:
-        name: a built-in policy, with its options where it takes any, or `module:Class` found from the current folder or
-            the Python path.
+        name: a built-in policy, with its options where it takes any; a team that comes with fireworld, or a team file;
+            or `module:Class` found from the current folder or the Python path.
 
     Raises:
         PolicyError: no such policy, or it has no `decide` method, or making it fails.
         TrainingError: a team file that cannot be read or makes no sense.
     """
     if name.endswith(SUFFIX):
-        return _load_team(Path(name))
+        return _load_team(Path(name), name=Path(name).name)
     kind, _, options = name.partition(":")
     if kind in WITH_OPTIONS and (name == kind or "=" in options):
         module_name, _, maker = WITH_OPTIONS[kind].partition(":")
@@ -67,9 +71,11 @@ def load_policy(name: str) -> NamedPolicy:
         return NamedPolicy(name, made.digest, made)
     if ":" in name:
         return _load_own(name)
+    if name in team_names():
+        return _load_team(team_path(name), name=name)
     if name not in BUILT_IN:
         meant = name.lower()
-        names = [*BUILT_IN, *WITH_OPTIONS]
+        names = [*BUILT_IN, *WITH_OPTIONS, *team_names()]
         near = [known for known in names if meant and meant in known] or get_close_matches(meant, names, n=1)
         hint = "try " + " or ".join(near) if near else "MODULE:CLASS names one of your own"
         raise PolicyError(expected("--policy", "", "one of " + ", ".join(names), name, hint))
@@ -77,26 +83,42 @@ def load_policy(name: str) -> NamedPolicy:
     return NamedPolicy(name, policy.digest, policy)
 
 
-def note_on_team(named: NamedPolicy, n_brigades: int) -> str:
-    """Say which brigade follows which table of a team file, if there is not one for each; else nothing."""
+def note_on_team(named: NamedPolicy, n_brigades: int, *, choices: str = "") -> str:
+    """Say how a team will be used otherwise than it was trained, a line each; nothing of other policies.
+
+    Args:
+        named: the policy.
+        n_brigades: brigades of the scenario.
+        choices: of the scenario; left out, nothing is said of them.
+    """
     if TEAM_ATTACHMENT not in named.attachments or not isinstance(named.policy, KernelPolicy):
         return ""
-    n_tables = len(named.policy.tables)
+    notes = (_note_on_tables(len(named.policy.kinds), n_brigades), _note_on_choices(named.trained_choices, choices))
+    return "\n".join(f"{named.name}: {note}" for note in notes if note)
+
+
+def _note_on_tables(n_tables: int, n_brigades: int) -> str:
+    """Say which brigade follows which table, if there is not one for each."""
     if n_tables in {1, n_brigades}:
         return ""
     if n_tables > n_brigades:
-        return (
-            f"{named.name}: {n_tables} tables for {n_brigades} brigades: the last {n_tables - n_brigades} are not used"
-        )
-    return f"{named.name}: {n_tables} tables for {n_brigades} brigades: brigade b follows table b modulo {n_tables}"
+        return f"{n_tables} tables for {n_brigades} brigades: the last {n_tables - n_brigades} are not used"
+    return f"{n_tables} tables for {n_brigades} brigades: brigade b follows table b modulo {n_tables}"
 
 
-def _load_team(path: Path) -> NamedPolicy:
+def _note_on_choices(trained: str, choices: str) -> str:
+    """Say so if the brigades learned to choose in another order than the scenario has it."""
+    if not (trained and choices) or trained == choices:
+        return ""
+    return f"trained with choices {trained}, run with choices {choices}; --set choices={trained} runs it as trained"
+
+
+def _load_team(path: Path, *, name: str) -> NamedPolicy:
     """Return the policy of a team file; a recording names it without its folder and takes the file along."""
     content = read_bytes(path)
-    team, _ = parse_team(content, source=str(path))
+    team = parse_team_file(content, source=str(path))
     policy = team.policy()
-    return NamedPolicy(path.name, policy.digest, policy, {TEAM_ATTACHMENT: content})
+    return NamedPolicy(name, policy.digest, policy, {TEAM_ATTACHMENT: content}, team.choices)
 
 
 def _load_own(name: str) -> NamedPolicy:

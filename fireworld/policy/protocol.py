@@ -12,17 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fireworld.kernels.arrays import CityTables, Constants, WorldArrays
-from fireworld.kernels.observation import find_target
+from fireworld.kernels.observation import find_target, site_place
+from fireworld.kernels.ranking import OWN_TARGET
 
 
 class Action(IntEnum):
-    """The paper's four actions; each names a burning building of the brigade's fire site."""
+    """The paper's four actions, each of which names a burning building of the brigade's fire site; and a fifth."""
 
     EASIEST = 0
     """The one with the lowest temperature."""
     NEAREST_TO_CIVILIAN = 1
     NEAREST_TO_CENTER = 2
     NEAREST_TO_ME = 3
+    OWN_TARGET = OWN_TARGET
+    """Not in the paper: the burning building of its fire site that the policy itself names."""
 
 
 @dataclass(frozen=True)
@@ -30,8 +33,12 @@ class Decision:
     """What one brigade does in one step, and why."""
 
     action: int
+    target: int | None = None
+    """With Action.OWN_TARGET: the index of a burning building of the brigade's site."""
     q_values: Sequence[float] | None = None
     """Values of the four actions, where the policy has them."""
+    value: float | None = None
+    """Value of the target, where the policy ranks targets."""
     explored: bool = False
     epsilon: float = 0.0
 
@@ -55,6 +62,9 @@ class Observation:
     """Burning volume, 0 very low .. 5 huge."""
     others: tuple[bool, bool, bool, bool]
     """Whether another brigade does each of the four actions."""
+    known_targets: NDArray[np.int32]
+    """(b,) index of the building that each brigade goes for, -1 none: those before this one in this step, the others
+    in the last step."""
     city: CityTables
     """The city's arrays; not to be changed."""
     world: WorldArrays
@@ -67,6 +77,14 @@ class Observation:
         """The building that each of the four actions names."""
         named = [self._target(action) for action in range(4)]
         return named[0], named[1], named[2], named[3]
+
+    @cached_property
+    def burning(self) -> NDArray[np.uint32]:
+        """(k,) indices of the burning buildings of the brigade's fire site: what it may name as its own target."""
+        sites = self.world.sites
+        place = int(site_place(self.brigade, self.world.brigades, sites))
+        here: NDArray[np.uint32] = sites.member[sites.start[place] : sites.start[place + 1]]
+        return here if place >= 0 else here[:0]
 
     def _target(self, action: int) -> int:
         return int(

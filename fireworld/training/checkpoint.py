@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -58,8 +59,22 @@ def check_identity(team: Team, trainer: Trainer, path: Path) -> None:
     found = provenance.get("curriculum")
     if isinstance(found, dict):
         provenance["curriculum"] = {key: found.get(key) for key in ("name", "digest")}
-    for key, wanted in trainer.identity.items():
-        got = provenance.get(key)
+    check_same(provenance, trainer.identity, path)
+
+
+def check_same(found: Mapping[str, Any], identity: Mapping[str, Any], path: Path) -> None:
+    """Refuse to go on from work that was begun with something else; name the first key that differs.
+
+    Args:
+        found: what the work was begun with, as plain values; keys that are not of the identity are of no account.
+        identity: what is asked for.
+        path: where it was found.
+
+    Raises:
+        TrainingError: they differ.
+    """
+    for key, wanted in identity.items():
+        got = found.get(key)
         if got == wanted:
             continue
         if isinstance(got, dict) and isinstance(wanted, dict):
@@ -71,7 +86,8 @@ def check_identity(team: Team, trainer: Trainer, path: Path) -> None:
 def _progress(trainer: Trainer, team: Team, place: Array, path: Path) -> Progress:
     """Return the progress that a checkpoint tells of."""
     number, episode, n_unchanged = (int(value) for value in place)
-    in_curriculum = 0 <= number < trainer.curriculum.n_scenarios
+    n_scenarios = trainer.curriculum.n_scenarios
+    in_curriculum = 0 <= number < n_scenarios or (number, episode) == (n_scenarios, 0)
     if not (in_curriculum and 0 <= n_unchanged <= episode < trainer.method.n_episodes_max):
         wanted = "[scenario, episode, episodes without a change] within the curriculum"
         raise TrainingError(expected(str(path), "place", wanted, str(place.tolist())))

@@ -24,7 +24,7 @@ N_VARIATIONS_MAX: Final = 10_000
 
 
 class StageText(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A stage as written: scenarios by name, or every variation of one."""
+    """A stage as written: scenarios by name, or variations of one."""
 
     name: str
     cooperation: bool
@@ -33,6 +33,9 @@ class StageText(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     base: str | None = None
     set: dict[str, Any] = {}
     vary: dict[str, Annotated[list[Any], Meta(min_length=1)]] = {}
+    """Every combination of these values."""
+    each: tuple[dict[str, Any], ...] = ()
+    """One scenario, or one for every combination, for each of these groups of values."""
 
 
 class CurriculumText(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -145,9 +148,9 @@ def _build_stage(stage: StageText, *, where: str, folder: Path) -> CurriculumSta
     if bool(stage.scenarios) == (stage.base is not None):
         got = "both" if stage.scenarios else "neither"
         raise TrainingError(expected(where, "", "either `scenarios` or `base`", got))
-    if stage.base is None and (stage.set or stage.vary):
-        raise TrainingError(expected(where, "", "`set` and `vary` with `base`", "them with `scenarios`"))
-    if math.prod(len(values) for values in stage.vary.values()) > N_VARIATIONS_MAX:
+    if stage.base is None and (stage.set or stage.vary or stage.each):
+        raise TrainingError(expected(where, "", "`set`, `vary` and `each` with `base`", "them with `scenarios`"))
+    if math.prod(len(values) for values in stage.vary.values()) * max(1, len(stage.each)) > N_VARIATIONS_MAX:
         raise TrainingError(expected(where, "vary", f"at most {N_VARIATIONS_MAX} combinations", "more of them"))
     try:
         scenarios = (
@@ -166,8 +169,9 @@ def _load(name: str, folder: Path) -> Scenario:
 
 
 def _variations(base: Scenario, stage: StageText) -> Iterator[Scenario]:
-    """Yield every combination of the values that a stage varies; what is named first changes last."""
-    for number, values in enumerate(itertools.product(*stage.vary.values()), 1):
-        settings = {**stage.set, **dict(zip(stage.vary, values, strict=True))}
+    """Yield each group of values with every combination of those that vary; what is named first changes last."""
+    combinations = [dict(zip(stage.vary, values, strict=True)) for values in itertools.product(*stage.vary.values())]
+    for number, (group, values) in enumerate(itertools.product(stage.each or ({},), combinations), 1):
+        settings = {**stage.set, **group, **values}
         varied = base.with_settings({key: json.dumps(value) for key, value in settings.items()})
         yield msgspec.structs.replace(varied, name=f"{stage.name}-{number}")

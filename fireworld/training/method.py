@@ -92,6 +92,8 @@ class Method:
 PAPER: Final = Method()
 METHODS: Final = {"paper": PAPER}
 """Methods by name."""
+SEARCH: Final = "search"
+"""The name of the other way to train: `fireworld.training.search`."""
 
 
 def method_keys() -> list[str]:
@@ -106,7 +108,7 @@ def find_method(name: str) -> Method:
         TrainingError: no such method.
     """
     if name not in METHODS:
-        raise TrainingError(expected("--method", "", "one of " + ", ".join(METHODS), name))
+        raise TrainingError(expected("--method", "", "one of " + ", ".join((*METHODS, SEARCH)), name))
     return METHODS[name]
 
 

@@ -12,7 +12,8 @@ from threading import Event
 from typing import Final
 
 from fireworld.errors import OutputError, TrainingError, expected
-from fireworld.policy.team import Team, check_free, read_team, save_team
+from fireworld.policy.npz import check_free
+from fireworld.policy.team import Team, read_team, save_team
 from fireworld.training.checkpoint import check_identity, checkpoint_path, restore_checkpoint, save_checkpoint
 from fireworld.training.trainer import EpisodeReport, Trainer
 
@@ -31,6 +32,8 @@ class Training:
     log: str = ""
     team: Team | None = None
     """The trained team, once its file is written."""
+    is_kept: bool = False
+    """Whether there is a checkpoint of this training."""
 
     @property
     def checkpoint(self) -> Path:
@@ -69,36 +72,59 @@ class Training:
                 self.log = restore_checkpoint(self.trainer, self.checkpoint).decode()
             except UnicodeDecodeError:
                 raise TrainingError(expected(str(self.checkpoint), "log", "text", "other bytes")) from None
+            self.is_kept = True
             return True
         self.begin()
         return False
 
     def run(self, stop: Event, report: Callable[[Training, EpisodeReport], None]) -> None:
-        """Train until done, or until asked to stop; then write the team, or a checkpoint.
+        """Train until done, or until asked to stop; write a checkpoint after every scenario, at last the team.
 
         Args:
-            stop: set it, and the training stops after the episode under way.
+            stop: set it, and the training stops after the episode under way, with a checkpoint.
             report: called after every episode.
+
+        Raises:
+            OutputError: something cannot be written; the last checkpoint stays.
         """
         if self.team is not None or stop.is_set():
             return
         for episode in self.trainer:
             self.log += _csv_line(astuple(episode))
             report(self, episode)
+            if stop.is_set() or not self.trainer.progress.episode:
+                self._keep()
             if stop.is_set():
                 break
         if self.trainer.done:
             self._finish()
-        else:
+
+    def _keep(self) -> None:
+        try:
             save_checkpoint(self.trainer, self.checkpoint, log=self.log.encode())
+        except OutputError as error:
+            raise self._with_what_is_kept(error) from None
+        self.is_kept = True
 
     def _finish(self) -> None:
         team = self.trainer.team()
-        if self.log_path is not None:
-            _write_text(self.log_path, log_heading() + self.log)
-        save_team(team, self.path, force=self.force)
+        try:
+            if self.log_path is not None:
+                _write_text(self.log_path, log_heading() + self.log)
+            try:
+                save_team(team, self.path, force=self.force)
+            except OutputError:
+                if self.log_path is not None:
+                    self.log_path.unlink(missing_ok=True)  # in the way of the next attempt
+                raise
+        except OutputError as error:
+            raise self._with_what_is_kept(error) from None
         self.checkpoint.unlink(missing_ok=True)
-        self.team = team
+        self.team, self.is_kept = team, False
+
+    def _with_what_is_kept(self, error: OutputError) -> OutputError:
+        hint = f"; {self.checkpoint} of this training is kept: go on with --resume" if self.is_kept else ""
+        return OutputError(f"{error}{hint}")
 
 
 def train_all(

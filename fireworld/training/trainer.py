@@ -84,6 +84,8 @@ class Trainer:
         self._grounds = grounds if grounds is not None else {}
         self._plan = [(stage, scenario) for stage in curriculum.stages for scenario in stage.scenarios]
         self.progress = progress if progress is not None else self._begin()
+        self.graduate: Team | None = None
+        """The team at the end of the last scenario finished here, before one of its tables was drawn for all."""
 
     @property
     def done(self) -> bool:
@@ -120,8 +122,11 @@ class Trainer:
         return Team(tables=progress.tables.copy(), visits=progress.visits.copy(), provenance=provenance)
 
     def shape(self, scenario_number: int) -> tuple[int, int, int]:
-        """Return the shape of the tables (tables, states, actions) that a scenario of the curriculum trains."""
-        stage, scenario = self._plan[scenario_number]
+        """Return the shape of the tables (tables, states, actions) that a scenario of the curriculum trains.
+
+        After the last scenario the tables are those it has trained.
+        """
+        stage, scenario = self._plan[min(scenario_number, len(self._plan) - 1)]
         return self._n_tables(scenario), _n_states(stage), len(ACTIONS)
 
     def _begin(self) -> Progress:
@@ -184,6 +189,7 @@ class Trainer:
         progress = self.progress
         number = progress.scenario_number
         progress.scenario_number, progress.episode, progress.n_unchanged = number + 1, 0, 0
+        self.graduate = self.team()
         if self.done:
             return
         n_tables, n_states, _ = self.shape(progress.scenario_number)

@@ -136,6 +136,7 @@ class Observer:
         brigades = self.world.arrays.brigades
         decisions = choices.decisions
         known = any(decision.q_values is not None for decision in decisions)
+        ranked = any(decision.value is not None for decision in decisions)
         values = [decision.q_values or (0.0, 0.0, 0.0, 0.0) for decision in decisions] if known else []
         return Decisions(
             action=brigades.action.copy(),
@@ -144,6 +145,9 @@ class Observer:
             q_values=np.array(values, dtype=np.float64).ravel(),
             epsilon=max((float(decision.epsilon) for decision in decisions), default=0.0),
             td_error=np.zeros(0),
+            target_value=np.array(
+                [decision.value or 0.0 for decision in decisions] if ranked else [], dtype=np.float64
+            ),
         )
 
     def _brigades(self) -> Brigades:

@@ -16,7 +16,7 @@ from fireworld.kernels.outcome import assess
 from fireworld.kernels.sites import find_sites
 from fireworld.parameters import Parameters
 from fireworld.policy.asking import ask
-from fireworld.policy.protocol import Decision, Observation, Policy
+from fireworld.policy.protocol import Action, Decision, Observation, Policy
 from fireworld.world.state import NO_LEARNER, fresh_world
 from fireworld.world.tables import city_tables, world_constants
 
@@ -168,30 +168,37 @@ class World:
         states = np.full(self.n_brigades, -1, dtype=np.int64)
         decisions = [NO_DECISION] * self.n_brigades
         brigades = self.arrays.brigades
-        brigades.target[:] = -1
-        before = brigades.action.copy()
-        shown = brigades.action if self.constants.observation.in_turn else before
+        before, target_before = brigades.action.copy(), brigades.target.copy()
+        in_turn = self.constants.observation.in_turn
+        shown, known = (brigades.action, brigades.target) if in_turn else (before, target_before)
         keeps = getattr(policy, "keeps", None)
         for brigade in range(self.n_brigades):
             states[brigade] = observe(
                 brigade, shown, brigades, self.arrays.sites, self.constants.observation, features[brigade]
             )
+            target = -1
             if can_choose(brigade, brigades, self.arrays.sites):
-                if keeps is not None and keeps(brigade, int(before[brigade]), self.step_number):
-                    decisions[brigade] = Decision(int(before[brigade]))
+                last = Decision(int(before[brigade]), target=int(target_before[brigade]))
+                if keeps is not None and self._burns(last) and keeps(brigade, last.action, self.step_number):
+                    decisions[brigade] = last
                 else:
-                    decisions[brigade] = self._ask(policy, brigade, features[brigade], int(states[brigade]))
-                brigades.target[brigade] = self._target(brigade, decisions[brigade].action)
-            brigades.action[brigade] = decisions[brigade].action
+                    decisions[brigade] = self._ask(policy, brigade, features[brigade], int(states[brigade]), known)
+                target = self._target(brigade, decisions[brigade])
+            brigades.action[brigade], brigades.target[brigade] = decisions[brigade].action, target
         return Choices(features=features, state_index=states, decisions=tuple(decisions))
 
-    def _target(self, brigade: int, action: int) -> int:
-        arrays, tables = self.arrays, self.tables
-        return int(
-            find_target(brigade, action, arrays.brigades, tables.buildings, arrays.fire, tables.geometry, arrays.sites)
-        )
+    def _burns(self, last: Decision) -> bool:
+        """Tell whether a last choice can still be kept: a target of one's own only while it burns."""
+        return last.action != Action.OWN_TARGET or bool(1 <= self.arrays.fire.fieryness[last.target] <= 3)
 
-    def _ask(self, policy: Policy, brigade: int, features: Array, state: int) -> Decision:
+    def _target(self, brigade: int, decision: Decision) -> int:
+        if decision.action == Action.OWN_TARGET and decision.target is not None:
+            return decision.target
+        arrays, tables = self.arrays, self.tables
+        action, geometry, sites = decision.action, tables.geometry, arrays.sites
+        return int(find_target(brigade, action, arrays.brigades, tables.buildings, arrays.fire, geometry, sites))
+
+    def _ask(self, policy: Policy, brigade: int, features: Array, state: int, known: Array) -> Decision:
         seen = [int(feature) for feature in features]
         return ask(
             policy,
@@ -205,6 +212,7 @@ class World:
                 distance_from_civilian=seen[2],
                 volume=seen[3],
                 others=(bool(seen[4]), bool(seen[5]), bool(seen[6]), bool(seen[7])),
+                known_targets=known,
                 city=self.tables,
                 world=self.arrays,
                 constants=self.constants,

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import json
 import signal
 from threading import Event
 
+import msgspec
+import numpy as np
 import pytest
 
-from fireworld.cli import reproduce
+from fireworld.cli import kept, reproduce
 from fireworld.cli.repetitions import Training, random_tables, without_flags
 from fireworld.cli.workers import Workers
+from fireworld.errors import OutputError
 from fireworld.evaluation import paper
 from fireworld.evaluation.sheets import SHEETS
 from fireworld.evaluation.study import ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS
-from fireworld.policy import team
 from fireworld.policy.team import load_team
+from fireworld.scenario import load_scenario
 from fireworld.training.curriculum import load_curriculum
 from fireworld.training.method import Method
 from fireworld.training.trainer import Trainer
@@ -56,10 +60,16 @@ def small(tmp_path, monkeypatch, curriculum):
     return tmp_path
 
 
-def train(curriculum, number=1):
+def train(curriculum, number=1, **more):
     stop, seen = Event(), []
     training = Training(
-        curriculum=curriculum, method=METHOD, number=number, grounds={}, stop=stop, on_scenario=lambda: seen.append(1)
+        curriculum=curriculum,
+        method=METHOD,
+        number=number,
+        grounds={},
+        stop=stop,
+        on_scenario=lambda: seen.append(1),
+        **more,
     )
     return training(), len(seen)
 
@@ -84,6 +94,30 @@ def test_a_repetition_equals_trainings_from_end_to_end(curriculum):
     assert 0.0 <= found.agreement <= 1.0
 
 
+def test_graduates_are_the_team_after_each_scenario(tmp_path):
+    path = tmp_path / "three.yaml"
+    path.write_text(CURRICULUM.replace("[quick, quick]", "[quick, a.yaml, b.yaml]"))
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.yaml").write_text(msgspec.structs.replace(load_scenario("quick"), name=name).to_yaml())
+    chosen = load_curriculum(path)
+    found, _ = train(chosen, with_graduates=True)
+    assert list(found.graduates) == ["quick", "a", "b"]
+    trainer, after = Trainer(chosen, METHOD, seed=1), {}
+    assert trainer.graduate is None
+    for report in trainer:
+        if not trainer.progress.episode:
+            after[report.scenario] = trainer.graduate
+            n_brigades, n_before = trainer.graduate.tables.shape[0], len(trainer.progress.tables)
+            assert trainer.graduate.provenance["scenarios_done"] == trainer.progress.scenario_number
+            if n_brigades == n_before == 2 and not trainer.done:  # one table was drawn for all, after this was noted
+                assert (trainer.progress.tables[0] == trainer.progress.tables[1]).all()
+    for name, team in found.graduates.items():
+        np.testing.assert_array_equal(team.tables, after[name].tables)
+    assert found.graduates["b"].digest == found.teams[TOGETHER].digest
+    assert (found.graduates["a"].tables[0] != found.graduates["a"].tables[1]).any()
+    assert not train(chosen)[0].graduates
+
+
 def test_random_tables_differ_between_brigades_and_repetitions():
     one, other = random_tables(1, n_brigades=2), random_tables(2, n_brigades=2)
     assert one.shape == (2, 4320, 4)
@@ -100,9 +134,10 @@ def test_everything_is_written_and_twice_the_same(small, fireworld):  # noqa: F8
     folder = small / "found"
     first = {path.name: path.read_bytes() for path in folder.glob("*.csv")}
     assert sorted(first) == sorted(SHEETS)
-    assert sorted(path.name for path in (folder / "teams").iterdir()) == sorted(
-        f"{name}-{number}.npz" for name in (ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS) for number in (1, 2)
-    )
+    assert sorted(path.name for path in (folder / "teams").iterdir()) == sorted([
+        *(f"{name}-{number}.npz" for name in (ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS) for number in (1, 2)),
+        f"{TOGETHER}-1-after-quick.npz",
+    ])  # fmt: skip
     assert load_team(folder / "teams" / f"{TOGETHER}-1.npz").tables.shape == (2, 4320, 4)
     recordings = sorted(path.name for path in (folder / "recordings").iterdir())
     assert recordings == ["quick-cooperative.mcap", "quick-non-cooperative.mcap"]
@@ -121,20 +156,167 @@ def test_everything_is_written_and_twice_the_same(small, fireworld):  # noqa: F8
     assert first == {name: (folder / name).read_bytes() for name in SHEETS}
 
 
-def test_ctrl_c_keeps_the_teams_that_are_trained(small, fireworld, monkeypatch):  # noqa: F811
-    save = team.save_team
+class Killed(BaseException):
+    """What nothing catches, like the end of a process."""
 
-    def save_and_interrupt(found, path):
-        save(found, path)
-        if path.stem == f"{TOGETHER}-1":
-            signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(team, "save_team", save_and_interrupt)
+@pytest.fixture
+def undrawn(monkeypatch):
+    """No images, which take most of the time."""
+    monkeypatch.setattr("fireworld.cli.pictures.draw_all", lambda *_: iter(()))
+
+
+WHOLE = {}
+
+
+@pytest.fixture
+def whole(small, undrawn, fireworld):  # noqa: F811
+    """The files of a reproduction without an interruption, by their path in its folder; made once for all tests."""
+    if not WHOLE:
+        assert fireworld(*FEW[:-1], "whole").code == 0
+        folder = small / "whole"
+        WHOLE.update({str(path.relative_to(folder)): data for path, data in contents(folder).items()})
+    return WHOLE
+
+
+def contents(folder):
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def assert_whole(folder, whole):
+    """Compare a folder with that of an uninterrupted reproduction, file by file."""
+    assert whole == {str(path.relative_to(folder)): data for path, data in contents(folder).items()}
+
+
+def at_write(monkeypatch, name, act):
+    """Do something once, before a piece of work is kept under a name."""
+    write = kept.write_file
+
+    def write_file(path, data):
+        if path.name == name:
+            monkeypatch.setattr(kept, "write_file", write)
+            act()
+        write(path, data)
+
+    monkeypatch.setattr(kept, "write_file", write_file)
+
+
+def kept_files(small):
+    return sorted(path.name for path in (small / "found" / "kept").iterdir())
+
+
+def test_ctrl_c_and_resume(small, fireworld, whole, monkeypatch):  # noqa: F811
+    at_write(monkeypatch, "tests-1.json", lambda: signal.raise_signal(signal.SIGINT))
     done = fireworld(*FEW, "--jobs", 1)
     assert done.code == 130
-    assert done.err == "interrupted; 1 of 2 trainings are kept in found/teams\n"
-    assert len([*(small / "found" / "teams").iterdir()]) == 3
+    assert done.err == "interrupted; 1 of 2 trainings are kept in found: go on with --resume\n"
+    assert kept_files(small) == ["settings.json", "tests-1.json", "training-1.json"]
     assert not [*(small / "found").glob("*.csv"), *(small / "found").glob("report.html")]
+    refused = fireworld(*FEW)
+    assert (refused.code, refused.err.count("\n")) == (2, 1)
+    assert "--resume goes on with it, --force replaces what is there" in refused.err
+    trained, call = [], Training.__call__
+    monkeypatch.setattr(Training, "__call__", lambda self: trained.append(self.number) or call(self))
+    resumed = fireworld(*FEW, "--resume")
+    assert resumed.code == 0, resumed.err
+    assert trained == [2], "the first is not trained again"
+    assert_whole(small / "found", whole)
+    again = fireworld(*FEW, "--resume")
+    assert (again.code, again.out) == (0, resumed.out)
+    assert trained == [2], "what is done can be judged and drawn once more"
+
+
+def test_a_kill_and_resume(small, fireworld, whole, monkeypatch):  # noqa: F811
+    def die():
+        raise Killed
+
+    at_write(monkeypatch, "training-2.json", die)  # its teams are written by then
+    with pytest.raises(Killed):
+        fireworld(*FEW, "--jobs", 1)
+    assert kept_files(small) == ["settings.json", "tests-1.json", "training-1.json"]
+    assert fireworld(*FEW, "--resume", "--jobs", 1).code == 0
+    assert_whole(small / "found", whole)
+
+
+def test_a_full_disk_keeps_what_was_done(small, fireworld, monkeypatch):  # noqa: F811
+    def fail():
+        raise OutputError("found/kept/tests-2.json: cannot be written: No space left on device")
+
+    at_write(monkeypatch, "tests-2.json", fail)
+    done = fireworld(*FEW, "--jobs", 1)
+    assert (done.code, done.out, done.err.count("\n")) == (2, "", 1)
+    assert {"training-1.json", "tests-1.json", "training-2.json"} < set(kept_files(small))
+
+
+@pytest.fixture
+def begun(small, undrawn, fireworld, monkeypatch):  # noqa: F811
+    """A folder with one repetition kept."""
+    with monkeypatch.context() as once:
+        at_write(once, "tests-1.json", lambda: signal.raise_signal(signal.SIGINT))
+        assert fireworld(*FEW, "--jobs", 1).code == 130
+    return small / "found"
+
+
+def refusal(fireworld, folder, *words):  # noqa: F811
+    """Ask to go on; return what is said against it. Nothing is changed."""
+    before = contents(folder)
+    done = fireworld(*FEW, *words, "--resume")
+    assert (done.code, done.out, done.err.count("\n")) == (2, "", 1)
+    assert contents(folder) == before
+    return done.err
+
+
+def test_other_settings_are_refused(begun, fireworld, monkeypatch):  # noqa: F811
+    settings = "fireworld: found/kept/settings.json: "
+    hint = "; name what it was begun with, or begin again with --force\n"
+    assert refusal(fireworld, begun, "--repetitions", 3) == f"{settings}repetitions: expected 3, got 2{hint}"
+    assert refusal(fireworld, begun, "--seeds", 1) == f"{settings}seeds: expected [1000], got [1000, 1001]{hint}"
+    monkeypatch.setattr("fireworld.training.method.PAPER", METHOD.with_settings({"gamma": "0.9"}))
+    assert refusal(fireworld, begun) == f"{settings}method.gamma: expected 0.9, got 0.5{hint}"
+    monkeypatch.setattr("fireworld.training.method.PAPER", METHOD)
+    monkeypatch.setattr("fireworld.cli.pieces.__version__", "9")
+    assert refusal(fireworld, begun) == f"{settings}fireworld: expected 9, got '0.1.0'{hint}"
+
+
+def test_a_changed_curriculum_is_refused(begun, fireworld, curriculum):  # noqa: F811
+    curriculum.write_text(CURRICULUM.replace("steps: 40", "steps: 41"))
+    assert "settings.json: curriculum.digest: expected " in refusal(fireworld, begun)
+
+
+@pytest.mark.parametrize("name", ["settings.json", "training-1.json", "tests-1.json"])
+@pytest.mark.parametrize("damage", ["cut off", "{}", "[1]"])
+def test_damage_is_named(begun, fireworld, name, damage):  # noqa: F811
+    path = begun / "kept" / name
+    path.write_bytes(path.read_bytes()[:-9] if damage == "cut off" else damage.encode())
+    assert refusal(fireworld, begun, "--jobs", 1).startswith(f"fireworld: found/kept/{name}: ")
+
+
+def test_changed_tests_and_teams_are_named(begun, fireworld):  # noqa: F811
+    path = begun / "kept" / "tests-1.json"
+    whole = json.loads(path.read_text())
+    whole["quick"][TOGETHER]["score"].pop()
+    text, path_text = json.dumps(whole), path.read_text()
+    path.write_text(text)
+    assert "of 2 runs, got 'others'; delete it and it is made anew" in refusal(fireworld, begun, "--jobs", 1)
+    path.write_text(path_text)
+    team = begun / "teams" / f"{TOGETHER}-1.npz"
+    team.write_bytes((begun / "teams" / f"{ALONE}-1.npz").read_bytes())
+    assert refusal(fireworld, begun, "--jobs", 1).startswith(
+        f"fireworld: found/teams/{TOGETHER}-1.npz: expected the team "
+    )
+    team.unlink()
+    assert "expected a team file, got No such file" in refusal(fireworld, begun, "--jobs", 1)
+
+
+def test_nothing_to_resume(small, fireworld):  # noqa: F811
+    done = fireworld(*FEW, "--resume")
+    assert (done.code, done.out) == (2, "")
+    assert done.err == (
+        "fireworld: --resume: expected a reproduction to go on with, got no found/kept/settings.json; "
+        "leave out --resume\n"
+    )
+    assert not (small / "found").exists()
+    assert fireworld(*FEW, "--resume", "--force").code == 2
 
 
 @pytest.mark.parametrize(

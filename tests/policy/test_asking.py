@@ -8,6 +8,7 @@ import pytest
 from fireworld.errors import LogError, PolicyError
 from fireworld.policy.asking import begin, name_of
 from fireworld.policy.protocol import Action, Decision
+from tests.kernels.small import make_city, make_world, square
 from tests.world.town import town_world
 
 NAME = "policy tests.policy.test_asking:Scripted"
@@ -53,9 +54,9 @@ def test_values_may_be_an_array():
 @pytest.mark.parametrize(
     ("answer", "message"),
     [
-        (None, "expected a Decision with an action from 0 to 3, got None"),
-        (2, "expected a Decision with an action from 0 to 3, got 2"),
-        (Decision(4), "got action 4"),
+        (None, "expected a Decision with an action from 0 to 4, got None"),
+        (2, "expected a Decision with an action from 0 to 4, got 2"),
+        (Decision(5), "got action 5"),
         (Decision(-1), "got action -1"),
         (Decision(1.0), "got action 1.0"),
         (Decision("easiest"), "got action 'easiest'"),
@@ -66,11 +67,72 @@ def test_values_may_be_an_array():
         (Decision(1, q_values=(0.0, 0.0, 0.0, float("nan"))), "expected q_values that are 4 numbers"),
         (Decision(1, q_values=3.0), "expected q_values that are 4 numbers"),
         (Decision(1, epsilon="low"), "expected epsilon as a number, got epsilon 'low'"),
+        (Decision(1, value="high"), "expected value as a number, or None, got value 'high'"),
+        (Decision(1, value=float("nan")), "expected value as a number, or None, got value nan"),
     ],
 )
 def test_answers_that_are_no_decision(answer, message):
     with pytest.raises(PolicyError, match=f"^{NAME}: step 1, brigade 1: .*{message}"):
         step(answer)
+
+
+NAMED = "with OWN_TARGET a target that is one of observation.burning, got target "
+
+
+@pytest.mark.parametrize(
+    ("target", "shown"),
+    [(None, "None"), ("7", "'7'"), (2.0, "2.0"), (-1, "-1"), (999, "999"), (np.array([1, 2]), r"array\(\[1, 2\]\)")],
+)
+def test_own_targets_that_are_none(target, shown):
+    with pytest.raises(PolicyError, match=f"^{NAME}: step 1, brigade 1: expected {NAMED}{shown}$"):
+        step(Decision(Action.OWN_TARGET, target=target))
+
+
+class Naming:
+    """Names a building that burns in the brigade's site, or one that does not."""
+
+    def __init__(self, choose):
+        self.choose = choose
+
+    def decide(self, observation):
+        return Decision(Action.OWN_TARGET, target=self.choose(observation), value=np.float32(0.5))
+
+
+@pytest.mark.parametrize("kind", [int, np.uint32, np.array])
+def test_own_targets_are_whole_numbers_of_any_kind(kind):
+    world = town_world(seed=1)
+    decisions = world.step(Naming(lambda observation: kind(observation.burning[-1]))).decisions
+    assert [decision.action for decision in decisions] == [Action.OWN_TARGET] * 3
+    assert [decision.target for decision in decisions] == world.arrays.brigades.target.tolist()
+    assert all(type(decision.target) is int for decision in decisions)
+    assert [decision.value for decision in decisions] == [0.5] * 3
+
+
+def test_an_own_target_burns_in_the_brigades_own_site():
+    """A building that does not burn is refused, and so is one that burns elsewhere."""
+
+    def elsewhere(observation):
+        burning = np.flatnonzero(observation.world.sites.place >= 0)
+        return int(np.setdiff1d(burning, observation.burning)[0])
+
+    def cold(observation):
+        return int(np.flatnonzero(observation.world.sites.place < 0)[0])
+
+    for choose in (elsewhere, cold):
+        world = two_sites()
+        with pytest.raises(PolicyError, match=rf"Naming: step 1, brigade 0: expected {NAMED}\d+$") as caught:
+            world.step(Naming(choose))
+        assert "\n" not in str(caught.value)
+
+
+def two_sites():
+    world = make_world(make_city(square(0, 0), square(500, 0), square(1000, 0)), ignited=[0, 1], brigades=[2])
+    assert not world.arrays.sites.counts[0], "nobody has looked yet"
+    return world
+
+
+def test_a_target_without_its_action_is_none():
+    assert step(Decision(2, target=17)) == Decision(2)
 
 
 def fail():

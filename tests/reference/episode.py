@@ -12,7 +12,8 @@ from fireworld.city.city import Array, City, Float64Array
 from fireworld.draws import BURN_RATE, DAMAGE, DAMAGE_NOISE
 from fireworld.parameters import Parameters
 from fireworld.policy.kernel import KernelPolicy
-from tests.reference import fire, luck, outcome, people, sites, team
+from tests.reference import fire, luck, outcome, people, ranking, sites, team
+from tests.reference.learning import Learner
 
 
 @dataclass(frozen=True)
@@ -122,9 +123,11 @@ class World:
         return deepcopy(self)
 
 
-def advance(tables: Tables, world: World, policy: KernelPolicy, *, seed: int, step: int) -> None:
+def advance(
+    tables: Tables, world: World, policy: KernelPolicy, *, seed: int, step: int, learner: Learner | None = None
+) -> None:
     """Run one step: look and decide, act, burn, hurt, assess."""
-    decide(tables, world, policy, seed=seed, step=step)
+    decide(tables, world, policy, seed=seed, step=step, learner=learner)
     world.outcome.water_litres += team.act(
         world.team,
         alive(world),
@@ -139,13 +142,26 @@ def advance(tables: Tables, world: World, policy: KernelPolicy, *, seed: int, st
 
 
 def run_episode(
-    tables: Tables, world: World, policy: KernelPolicy, *, seed: int, first_step: int, last_step: int
+    tables: Tables,
+    world: World,
+    policy: KernelPolicy,
+    *,
+    seed: int,
+    first_step: int,
+    last_step: int,
+    learner: Learner | None = None,
 ) -> int:
-    """Run steps first_step..last_step, or until nothing burns; return the last step run."""
+    """Run steps first_step..last_step, or until nothing burns; return the last step run. A learner learns meanwhile."""
     for step in range(first_step, last_step + 1):
-        advance(tables, world, policy, seed=seed, step=step)
+        advance(tables, world, policy, seed=seed, step=step, learner=learner)
+        if learner is not None:
+            learner.take(sum(world.outcome.reward))
         if world.outcome.n_burning == 0:
+            if learner is not None:
+                learner.end()
             return step
+    if learner is not None:
+        decide(tables, world, policy, seed=seed, step=last_step + 1, learner=learner, truncated=True)
     return last_step
 
 
@@ -163,21 +179,47 @@ def look(tables: Tables, world: World) -> sites.Sites | None:
     return found
 
 
-def decide(tables: Tables, world: World, policy: KernelPolicy, *, seed: int, step: int) -> None:
-    """Let the brigades look and choose, one after another."""
+def decide(
+    tables: Tables,
+    world: World,
+    policy: KernelPolicy,
+    *,
+    seed: int,
+    step: int,
+    learner: Learner | None = None,
+    truncated: bool = False,
+) -> None:
+    """Let the brigades look and choose, one after another; a learner hears of it, after a truncation of all of them."""
     found = look(tables, world)
     before = [brigade.action for brigade in world.team]
+    went_for = [brigade.target for brigade in world.team]
     for who, (brigade, lives) in enumerate(zip(world.team, alive(world), strict=True)):
         brigade.target = -1
         if found is None or brigade.refilling or not lives:
             brigade.action = -1
             continue
-        if not team.keeps_choice(policy, who, before[who], step):
-            known = [other.action for other in world.team] if tables.in_turn else before
-            state = team.observe(brigade, known[:who] + known[who + 1 :], found)
+        if ranking.ranks(policy, who):
+            goals = [other.target for other in world.team] if tables.in_turn else went_for
+            others = goals[:who] + goals[who + 1 :]
+            moment = ranking.Moment(tables.fire, tables.sites, tables.parameters.brigades, world.fire, found)
+            brigade.action, brigade.target = ranking.choose(
+                policy, who, brigade, moment, last_target=went_for[who], others=others
+            )
+            continue
+        known = [other.action for other in world.team] if tables.in_turn else before
+        state = team.observe(brigade, known[:who] + known[who + 1 :], found)
+        keeps = team.keeps_choice(policy, who, before[who], step)
+        if not keeps:
             brigade.action = team.choose(policy, who, state, seed=seed, step=step)
+        if learner is not None and (truncated or not keeps):
+            learner.hear(who, state, brigade.action, bound=keeps)
         brigade.target = team.find_target(
-            brigade, tables=tables.sites, found=found, energy=world.fire.energy, capacity=tables.fire.capacity
+            brigade,
+            brigade.action,
+            tables=tables.sites,
+            found=found,
+            energy=world.fire.energy,
+            capacity=tables.fire.capacity,
         )
 
 

@@ -183,16 +183,22 @@ def choose(policy: KernelPolicy, who: int, state: int, *, seed: int, step: int) 
 
 
 def find_target(
-    brigade: Brigade, *, tables: sites.SiteTables, found: sites.Sites, energy: Float64Array, capacity: Float64Array
+    brigade: Brigade,
+    action: int,
+    *,
+    tables: sites.SiteTables,
+    found: sites.Sites,
+    energy: Float64Array,
+    capacity: Float64Array,
 ) -> int:
-    """Return the burning building of a brigade's site that its action names; ties: lowest id."""
+    """Return the burning building of a brigade's site that an action names; ties: lowest id."""
     part = found.members(found.of_number(brigade.site))
     members = found.member[part]
-    if brigade.action == EASIEST:
+    if action == EASIEST:
         measure = energy[members] / capacity[members]
-    elif brigade.action == NEAREST_TO_CIVILIAN:
+    elif action == NEAREST_TO_CIVILIAN:
         measure = found.civilian_square[part]
-    elif brigade.action == NEAREST_TO_CENTER:
+    elif action == NEAREST_TO_CENTER:
         measure = tables.extremes[4, members]
     else:
         dx, dy = tables.x[members] - brigade.x, tables.y[members] - brigade.y

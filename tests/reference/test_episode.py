@@ -18,7 +18,7 @@ from fireworld.city.generator import generate_plan
 from fireworld.city.streets import streets_of
 from fireworld.kernels.observation import observe
 from fireworld.parameters import PAPER
-from fireworld.policy.kernel import always, at_random, each_another, from_tables
+from fireworld.policy.kernel import always, at_random, each_another, from_rankings, from_tables
 from fireworld.records import ACTIVITIES
 from fireworld.scenario import load_scenario
 from fireworld.world.stage import build_stage
@@ -36,6 +36,8 @@ POLICIES = {
     "table": from_tables(RANDOM.random((2, 4320, 4)), epsilon=0.2),
     "small table": from_tables(RANDOM.random((3, 270, 4))),
     "kept choices": from_tables(RANDOM.random((2, 4320, 4)), epsilon=0.5, commit=3),
+    "ranking of named": from_rankings(RANDOM.normal(size=(2, 17)), own_targets=False),
+    "ranking of all": from_rankings(RANDOM.normal(size=(2, 17)), own_targets=True),
 }
 
 
@@ -149,7 +151,7 @@ def test_shipped_scenarios(scenario, policy):
         assert plain.outcome.water_litres > 0
 
 
-@pytest.mark.parametrize("policy", ["table", "kept choices"])
+@pytest.mark.parametrize("policy", ["table", "kept choices", "ranking of named", "ranking of all"])
 def test_simultaneous_choices(policy):
     plain, _ = shipped("test-1", in_turn=False).run(policy, seed=3, n_steps=200)
     other, _ = shipped("test-1").run(policy, seed=3, n_steps=200)
@@ -183,7 +185,7 @@ def rough(seed: int) -> Play:
     return Play(city, tables, start)
 
 
-@pytest.mark.parametrize("policy", ["nearest-to-me", "random", "table"])
+@pytest.mark.parametrize("policy", ["nearest-to-me", "random", "table", "ranking of named", "ranking of all"])
 def test_a_town_where_everything_happens(policy):
     seen: set[int] = set()
     for seed in (1, 2, 3):

@@ -6,9 +6,10 @@ import json
 import signal
 import time
 
+import numpy as np
 import pytest
 
-from fireworld.policy.team import load_team
+from fireworld.policy.team import FORMAT, load_team
 from fireworld.training.trainer import Trainer
 from recorder.reader import open_log
 from tests.training.conftest import SHORT_WORDS
@@ -80,8 +81,8 @@ def test_ctrl_c_and_resume(here, fireworld, files, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("train", "absent", "-o", "t.npz"), "fireworld: absent: expected a curriculum file or one of paper, got "),
-        ((*TRAIN, "t.npz", "--method", "magic"), "fireworld: --method: expected one of paper, got 'magic'"),
+        (("train", "absent", "-o", "t.npz"), "fireworld: absent: expected a curriculum file or one of "),
+        ((*TRAIN, "t.npz", "--method", "magic"), "fireworld: --method: expected one of paper"),
         ((*TRAIN, "t.npz", "--set", "alpha"), "fireworld: --set: expected KEY=VALUE, got 'alpha'; try alpha=0.1"),
         ((*TRAIN, "t.npz", "--set", "alpha=7"), "fireworld: method: alpha: expected a number from 0 to 1, got 7.0"),
         (
@@ -133,3 +134,107 @@ def test_policy_show_and_diff(here, fireworld):
     assert refused.code == 2
     assert refused.err == "fireworld: B: tables: expected 3 of 4320 states, as in A, got 1 of 270 states\n"
     assert fireworld("policy", "show", "a.npz", "5000").code == 2
+
+
+def test_a_full_disk_keeps_the_checkpoint(here, fireworld, files, monkeypatch):
+    assert fireworld(*TRAIN, "whole.npz").code == 0
+    with monkeypatch.context() as changed:
+        changed.setattr("fireworld.training.teams.save_team", _failing("t.npz"))
+        done = fireworld(*TRAIN, "t.npz")
+    assert (done.code, done.out) == (2, "")
+    assert done.err.splitlines()[-1] == (
+        "fireworld: t.npz: cannot be written: No space left on device; "
+        "t.npz.checkpoint of this training is kept: go on with --resume"
+    )
+    assert files() == ["t.npz.checkpoint", "whole.npz"]
+    assert fireworld(*TRAIN, "t.npz", "--resume").code == 0
+    assert (here / "t.npz").read_bytes() == (here / "whole.npz").read_bytes()
+
+
+def _failing(name):
+    """Return a writer that finds no space left for one file."""
+    from fireworld.errors import OutputError
+    from fireworld.policy.team import save_team
+
+    def save(team, path, **more):
+        if path.name == name:
+            raise OutputError(f"{path}: cannot be written: No space left on device")
+        save_team(team, path, **more)
+
+    return save
+
+
+def write_team(path, *, form=FORMAT, shape=(2, 270, 4), nan_at=None, **provenance):
+    tables = np.zeros(shape)
+    if nan_at is not None:
+        tables[nan_at] = np.nan
+    header = np.frombuffer(json.dumps({"format": form, **provenance}).encode(), dtype=np.uint8)
+    np.savez(path, header=header, tables=tables, visits=np.zeros(shape, dtype=np.int64))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"shape": (2, 5040, 4)}, "tables: expected float64 tables of shape (brigades, 4320 or 270, 4), got "),
+        ({"form": "fireworld-team/9"}, "format: expected fireworld-team/1, got 'fireworld-team/9'"),
+        ({"nan_at": (1, 17, 2)}, "tables[1, 17, 2]: expected a finite number, got nan"),
+    ],
+)
+def test_team_files_that_cannot_be_followed(here, fireworld, files, changes, message):
+    write_team(here / "bad.npz", **changes)
+    content = (here / "bad.npz").read_bytes()
+    for words in (
+        ("run", "quick", "--policy", "bad.npz", "--record", "a.mcap"),
+        ("policy", "show", "bad.npz"),
+        (*TRAIN, "bad.npz", "--resume"),
+    ):
+        done = fireworld(*words)
+        assert (done.code, done.out, done.err.count("\n")) == (2, "", 1)
+        assert done.err.startswith(f"fireworld: bad.npz: {message}")
+    assert files() == ["bad.npz"]
+    assert (here / "bad.npz").read_bytes() == content
+
+
+@pytest.mark.parametrize("n_bytes", [0, 100, 1000, -40])
+def test_a_checkpoint_cut_off_is_left_as_it_is(here, fireworld, files, n_bytes):
+    assert fireworld(*TRAIN, "t.npz").code == 0
+    content = (here / "t.npz").read_bytes()[:n_bytes]
+    (here / "t.npz").unlink()
+    (here / "t.npz.checkpoint").write_bytes(content)
+    done = fireworld(*TRAIN, "t.npz", "--resume")
+    assert (done.code, done.out, done.err.count("\n")) == (2, "", 1)
+    assert done.err.startswith("fireworld: t.npz.checkpoint: expected a team file (.npz), got BadZipFile")
+    assert files() == ["t.npz.checkpoint"]
+    assert (here / "t.npz.checkpoint").read_bytes() == content
+
+
+@pytest.mark.parametrize(
+    ("stage", "message"),
+    [
+        ("scenarios: [train-9]", "own.yaml: stages.0: scenario: expected the name of a scenario or a .yaml file, got "),
+        ("base: nowhere.yaml", "own.yaml: stages.0: nowhere.yaml: "),
+        ("base: quick, vary: {brigades.m: [1]}", "own.yaml: stages.0: "),
+    ],
+)
+def test_a_curriculum_of_what_is_not_there(here, fireworld, files, stage, message):
+    (here / "own.yaml").write_text(f"stages:\n  - {{name: alone, cooperation: false, {stage}}}\n")
+    done = fireworld("train", "own.yaml", "-o", "t.npz")
+    assert (done.code, done.out, done.err.count("\n")) == (2, "", 1)
+    assert done.err.startswith(f"fireworld: {message}")
+    assert files() == []
+
+
+@pytest.mark.parametrize(
+    ("trained", "run", "note"),
+    [
+        ("simultaneous", "in-turn", "; --set choices=simultaneous runs it as trained\n"),
+        ("in-turn", "simultaneous", "; --set choices=in-turn runs it as trained\n"),
+        ("simultaneous", "simultaneous", ""),
+        ({}, "in-turn", ""),
+    ],
+)
+def test_a_team_trained_with_other_choices(here, fireworld, trained, run, note):
+    write_team(here / "t.npz", method={"choices": trained})
+    done = fireworld("run", "quick", "--steps", 3, "--policy", "t.npz", "--set", f"choices={run}", "--json")
+    assert done.code == 0
+    assert done.err == (note and f"t.npz: trained with choices {trained}, run with choices {run}{note}")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fireworld.kernels import learning
-from fireworld.kernels.learning import choose_and_learn, forget, take_reward, update, value_of
+from fireworld.kernels.learning import choose_and_learn, forget, go_on_and_learn, take_reward, update, value_of
 from fireworld.policy.kernel import from_tables
 from fireworld.scenario import load_scenario
 from fireworld.training.method import RULES
@@ -59,6 +59,15 @@ def test_the_end_of_an_episode_is_worth_nothing():
     assert learner.tables[0, 0, 1] == ALPHA * -10.0
 
 
+@pytest.mark.parametrize("rule", range(len(RULES)))
+def test_who_is_bound_counts_on_the_action_it_goes_on_with(rule):
+    learner = make_learner(rule=rule, next_values=(9.0, -6.0, 4.0, 0.0))
+    take_reward(-10.0, learner)
+    take_reward(-20.0, learner)
+    go_on_and_learn(0, 0, 1, 1, learner)
+    assert learner.tables[0, 0, 1] == ALPHA * (-10.0 + GAMMA * -20.0 + GAMMA**2 * -6.0)
+
+
 def test_who_has_not_chosen_learns_nothing():
     learner = make_learner()
     forget(learner)
@@ -106,8 +115,8 @@ def world_of(*, n_steps_max, seed=1, **settings):
     return build_stage(scenario).world(seed=seed, n_steps_max=n_steps_max)
 
 
-def learn(world, tables, *, alpha=ALPHA):
-    policy = from_tables(tables).for_brigades(world.n_brigades)
+def learn(world, tables, *, alpha=ALPHA, commit=1):
+    policy = from_tables(tables, commit=commit).for_brigades(world.n_brigades)
     learner = fresh_learner(policy.tables, world.n_brigades, alpha=alpha, gamma=GAMMA)
     world.run(policy, learner)
     return learner
@@ -120,6 +129,17 @@ def test_a_truncated_episode_counts_on_what_would_come_next():
     reward = world.arrays.outcome.reward[4]
     ((_, state, action),) = np.argwhere(learner.visits)
     assert learner.tables[0, state, action] == 8.0 + ALPHA * (reward + GAMMA * 8.0 - 8.0)
+
+
+def test_a_truncated_episode_counts_on_the_choice_that_is_kept():
+    """With commit 5, brigade 0 chooses in step 1, and would keep its choice in step 4, after the last."""
+    world = world_of(n_steps_max=3)
+    learner = learn(world, np.full((1, 4320, 4), 8.0), commit=5)
+    assert world.truncated
+    ((_, state, action),) = np.argwhere(learner.visits)
+    assert learner.discount[0] == GAMMA**3
+    error = learner.reward[0] + GAMMA**3 * 8.0 - 8.0
+    assert learner.tables[0, state, action] == 8.0 + ALPHA * error
 
 
 def test_a_terminated_episode_does_not():

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+import zipfile
+from pathlib import Path
 from threading import Event
 
 import numpy as np
@@ -142,6 +145,7 @@ def test_a_checkpoint_of_another_curriculum_or_version(make_training, key, value
         ({"place": np.array([9, 0, 0])}, r"place: expected .* within the curriculum, got '?\[9, 0, 0\]"),
         ({"place": np.array([-1, 0, 0])}, "within the curriculum"),
         ({"place": np.array([1, 6, 0])}, "within the curriculum"),
+        ({"place": np.array([4, 1, 0])}, "within the curriculum"),
         ({"place": np.array([1, 2, 3])}, "within the curriculum"),
         ({"place": np.array([3, 0, 0])}, r"tables: expected shape \(3, 4320, 4\), got '?\(1, 270, 4\)"),
         ({"place": np.array([1, 2, 0]), "log": np.array([255], dtype=np.uint8)}, "log: expected text"),
@@ -188,3 +192,102 @@ def test_what_is_in_the_way(make_training, whole, here):
     with pytest.raises(OutputError, match=r"got a folder$"):
         Training(whole.trainer, here, force=True).begin()
     assert load_team(here / "team.npz").digest == whole.team.digest
+
+
+def test_a_checkpoint_after_every_scenario(make_training, curriculum):
+    training, places = make_training(), []
+
+    def report(training, episode):
+        if training.checkpoint.exists():
+            places.append(read_team(training.checkpoint)[1]["place"].tolist())
+
+    training.run(Event(), report)
+    expected = [[number, 0, 0] for number in range(1, curriculum.n_scenarios)]
+    assert [list(place) for place in dict.fromkeys(map(tuple, places))] == expected
+
+
+class FullDisk(zipfile.ZipFile):
+    """A writer that finds no space left for what is not a checkpoint."""
+
+    def __init__(self, file, *words, **more):
+        if isinstance(file, Path) and self.fails_at(file):
+            raise OSError(errno.ENOSPC, "No space left on device")
+        super().__init__(file, *words, **more)
+
+    def fails_at(self, file):
+        return file.name.endswith(".npz.partial")
+
+
+def test_a_full_disk_loses_no_training(make_training, whole, here, monkeypatch):
+    training = make_training()
+    with monkeypatch.context() as full:
+        full.setattr(zipfile, "ZipFile", FullDisk)
+        message = r"team.npz: cannot be written: No space left on device; .*checkpoint .*is kept: go on with --resume$"
+        with pytest.raises(OutputError, match=message):
+            training.run(Event(), quiet)
+    assert training.team is None
+    assert sorted(path.name for path in here.glob("team*")) == ["team.npz.checkpoint"]
+    again, episodes = make_training(), []
+    assert again.resume()
+    assert again.trainer.done
+    again.run(Event(), lambda *episode: episodes.append(episode))
+    assert not episodes, "nothing is trained again"
+    assert sorted(path.name for path in here.glob("team*")) == ["team.csv", "team.npz"]
+    for suffix in (".npz", ".csv"):
+        assert (here / f"team{suffix}").read_bytes() == (here / f"whole{suffix}").read_bytes()
+
+
+def test_a_log_that_cannot_be_written_loses_no_training(make_training, whole, here, monkeypatch):
+    training = make_training()
+    training.log_path = here / "absent" / "log.csv"
+    with pytest.raises(OutputError, match=r"log.csv: cannot be written: No such file or directory; .* is kept"):
+        training.run(Event(), quiet)
+    assert not training.path.exists()
+    assert load_team(training.checkpoint).digest == whole.team.digest
+
+
+def test_a_disk_that_fills_up_leaves_the_checkpoint_before(make_training, whole, monkeypatch):
+    training = make_training()
+    with monkeypatch.context() as full:
+
+        def report(training, episode):
+            if training.checkpoint.exists():
+                full.setattr(FullDisk, "fails_at", lambda *_: True)
+
+        full.setattr(zipfile, "ZipFile", FullDisk)
+        with pytest.raises(OutputError, match=r"checkpoint: cannot be written: .*; .* is kept: go on with --resume$"):
+            training.run(Event(), report)
+    again = make_training()
+    assert again.resume()
+    assert again.trainer.progress.scenario_number == 1
+    again.run(Event(), quiet)
+    assert again.team.digest == whole.team.digest
+
+
+class Killed(BaseException):
+    """What nothing catches, like the end of a process."""
+
+
+def test_a_kill_while_a_checkpoint_is_written_leaves_the_one_before(make_training, whole, here, monkeypatch):
+    checkpoint = stopped(make_training())
+    content, write_array, n_left = checkpoint.read_bytes(), np.lib.format.write_array, [2]
+
+    def write_some(*words, **more):
+        n_left[0] -= 1
+        if n_left[0] == 0:
+            raise Killed
+        write_array(*words, **more)
+
+    going_on, stop = make_training(), Event()
+    assert going_on.resume()
+    with monkeypatch.context() as dying:
+        dying.setattr(np.lib.format, "write_array", write_some)
+        with pytest.raises(Killed):
+            going_on.run(stop, stop_after(2, stop))
+    assert checkpoint.read_bytes() == content
+    assert (here / "team.npz.checkpoint.partial").exists(), "what a kill leaves behind is in nobody's way"
+    training = make_training()
+    assert training.resume()
+    training.run(Event(), quiet)
+    assert training.team.digest == whole.team.digest
+    assert sorted(path.name for path in here.glob("team*")) == ["team.csv", "team.npz"]

@@ -129,20 +129,21 @@ def test_records_are_copies():
         np.testing.assert_array_equal(getattr(getattr(record, topic[1:]), name), value, err_msg=f"{topic}.{name}")
 
 
-@pytest.mark.parametrize("name", ["table", "random"])
+@pytest.mark.parametrize("name", ["table", "random", "ranking-of-named", "ranking-of-all"])
 def test_what_a_step_tells(name):
     world = town_world(seed=2, n_brigades=4)
     observer, policy = Observer(world), begin(policy_named(name), world)
     record = observer.record(world.step(policy))
     decisions, seen = record.decisions, record.observations
-    assert len(decisions.q_values) == (16 if name == "table" else 0)
+    assert len(decisions.q_values) == (0 if name == "random" else 16)
+    assert len(decisions.target_value) == (4 if name.startswith("ranking") else 0)
     assert decisions.epsilon == (0.3 if name == "table" else 0.0)
     assert (seen.state_index >= 0).all()
     assert (seen.site_id == np.sort(seen.site_id)).all()
     assert seen.site_n_burning.sum() == 3
     assert set(seen.site) <= set(seen.site_id)
     for action, target, b in zip(decisions.action, decisions.target, range(4), strict=True):
-        assert 0 <= action < 4
+        assert (action == 4) if name == "ranking-of-all" else (0 <= action < 4)
         place = seen.site_id.tolist().index(seen.site[b])
         x, y = world.tables.geometry.x[target] / 1000, world.tables.geometry.y[target] / 1000
         assert seen.site_west_m[place] <= x <= seen.site_east_m[place]

@@ -12,11 +12,11 @@ from fireworld.city.city import City
 from fireworld.city.generator import generate_plan
 from fireworld.kernels.arrays import CityTables
 from fireworld.parameters import PAPER, Parameters
-from fireworld.policy.kernel import KernelPolicy, always, at_random, each_another, from_tables
+from fireworld.policy.kernel import KernelPolicy, always, at_random, each_another, from_rankings, from_tables
 from fireworld.world.tables import city_tables
 from fireworld.world.world import World
 
-POLICIES = ("fixed", "each-another", "random", "table", "table-of-270")
+POLICIES = ("fixed", "each-another", "random", "table", "table-of-270", "ranking-of-named", "ranking-of-all")
 
 
 @lru_cache
@@ -45,6 +45,8 @@ def policy_named(name: str) -> KernelPolicy:
         "random": at_random,
         "table": lambda: from_tables(random.normal(size=(3, 4320, 4)), epsilon=0.3),
         "table-of-270": lambda: from_tables(random.normal(size=(1, 270, 4))),
+        "ranking-of-named": lambda: from_rankings(random.normal(size=(2, 17)), own_targets=False),
+        "ranking-of-all": lambda: from_rankings(random.normal(size=(2, 17)), own_targets=True),
     }[name]()
 
 

@@ -1,0 +1,67 @@
+"""The trained teams that come with fireworld: train them again by the documented commands, and compare or replace them.
+
+`python -m benchmarks.shipped` trains each anew, half a minute on two cores, and says whether it is the shipped one;
+`--write` puts what was trained in its place.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final
+
+import click
+
+from fireworld.policy.shipped import team_path
+from fireworld.policy.team import Team, load_team, save_team
+
+COMMANDS: Final[Mapping[str, tuple[str, ...]]] = {
+    "paper-cooperative": ("train", "paper", "--seed", "1"),
+    "paper-noncooperative": ("train", "paper", "--stages", "alone", "--seed", "1"),
+}
+"""How each team is trained: the words after `fireworld`, `-o TEAM.npz` apart."""
+
+
+def train_all(folder: Path) -> dict[str, Team]:
+    """Train every team by its command, side by side; files go to the folder."""
+    program = [sys.executable, "-c", "from fireworld.cli import main; main()"]
+    started = {
+        name: subprocess.Popen(
+            [*program, *words, "-o", f"{name}.npz"], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        for name, words in COMMANDS.items()
+    }
+    for name, process in started.items():
+        if process.wait() != 0:
+            raise click.ClickException(f"{name}: fireworld {' '.join(COMMANDS[name])}: exit code {process.returncode}")
+    return {name: load_team(folder / f"{name}.npz") for name in COMMANDS}
+
+
+def same(team: Team, other: Team) -> bool:
+    """Tell whether two teams have learned the same from the same; the version of fireworld may be another."""
+    origins = [{**one.provenance, "fireworld": ""} for one in (team, other)]
+    return team.digest == other.digest and bool((team.visits == other.visits).all()) and origins[0] == origins[1]
+
+
+@click.command()
+@click.option("--write", is_flag=True, help="Replace the shipped teams by those trained now, where they differ.")
+@click.pass_context
+def main(context: click.Context, *, write: bool) -> None:
+    """Train the shipped teams again; exit code 1 if one comes out otherwise."""
+    n_others = 0
+    with TemporaryDirectory() as folder:
+        for name, team in train_all(Path(folder)).items():
+            path = team_path(name)
+            unchanged = path.is_file() and same(team, load_team(path))
+            if not unchanged and write:
+                save_team(team, path, force=True)
+            n_others += not (unchanged or write)
+            click.echo(f"{name}: {'the same' if unchanged else 'written' if write else 'ANOTHER'}, {team.digest}")
+    context.exit(1 if n_others else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,99 @@
+"""`fireworld train --method search`: find the weights of a ranking."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from fireworld.cli.interrupt import gentle_interrupt
+
+if TYPE_CHECKING:
+    from fireworld.training.curriculum import Curriculum
+    from fireworld.training.search import Generation
+    from fireworld.training.searches import SearchRun
+
+
+def train_by_search(
+    curriculum: Curriculum,
+    settings: dict[str, str],
+    *,
+    output: Path,
+    seed: int,
+    repetitions: int,
+    jobs: int | None,
+    resume: bool,
+    force: bool,
+) -> bool:
+    """Search for rankings, one after another, each with all cores; tell whether all were found.
+
+    Raises:
+        FireworldError: as in training.
+    """
+    from fireworld.errors import TrainingError, expected
+    from fireworld.training.search import Search, Searcher
+    from fireworld.training.searches import SearchRun
+    from fireworld.training.teams import numbered
+    from fireworld.world.stage import Ground
+
+    search = Search().with_settings(settings)
+    grounds: dict[str, Ground] = {}
+    runs = [
+        SearchRun(
+            Searcher(curriculum, search, seed=seed + number - 1, grounds=grounds),
+            numbered(output, number, n_all=repetitions),
+            force,
+        )
+        for number in range(1, repetitions + 1)
+    ]
+    if resume:
+        found = [run.resume() for run in runs]
+        if not any(found):
+            got = f"no {runs[0].checkpoint}"
+            raise TrainingError(expected("--resume", "", "a checkpoint to go on from", got, "leave out --resume"))
+    else:
+        for run in runs:
+            run.begin()
+    n_threads = jobs or os.cpu_count() or 1
+    with gentle_interrupt() as interrupted, _progress(runs) as report:
+        for run in runs:
+            if not interrupted.is_set():
+                run.run(interrupted, n_threads=n_threads, report=report)
+                _show(run)
+    return all(run.ranking is not None for run in runs)
+
+
+def _show(run: SearchRun) -> None:
+    """Say what came of a search."""
+    if run.ranking is not None:
+        what = "own targets" if run.ranking.own_targets else "the paper's actions"
+        click.echo(f"{run.path}: seed {run.searcher.seed}, a ranking of {what}, digest {run.ranking.digest}")
+    elif run.checkpoint.exists():
+        n = run.searcher.state.generation
+        click.echo(f"interrupted after {n} generations; {run.checkpoint} is kept: go on with --resume", err=True)
+
+
+@contextmanager
+def _progress(runs: Sequence[SearchRun]) -> Iterator[Callable[[SearchRun, Generation], None]]:
+    """Show progress: a bar where people watch, else a line for every generation."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    def words(run: SearchRun, done: Generation) -> str:
+        return (
+            f"seed {run.searcher.seed}: generation {done.generation + 1} of {run.searcher.search.n_generations}, "
+            f"score {done.score_mean:.3f}, of the best {done.score_best:.3f}, spread {done.spread:.2f}"
+        )
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda run, done: click.echo(words(run, done), err=True)
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task("the first generation", total=sum(run.searcher.search.n_generations for run in runs))
+        yield lambda run, done: progress.update(task, advance=1, description=words(run, done))

@@ -1,0 +1,65 @@
+"""The frame of the project's HTML pages: one file each, with its style and every image in it."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Sequence
+from html import escape
+from typing import Final
+
+_STYLE: Final = """
+body { font: 15px/1.5 system-ui, sans-serif; color: #222; background: #fbfaf8; max-width: 74rem; margin: 2rem auto;
+  padding: 0 1.5rem; }
+h1 { margin-bottom: .2rem; } h2 { margin-top: 2.6rem; border-bottom: 1px solid #d8d4cc; } h3 { margin-bottom: .4rem; }
+table { border-collapse: collapse; margin: .8rem 0; font-size: 14px; }
+th, td { padding: .3rem .7rem; text-align: right; border-bottom: 1px solid #e5e1d9; white-space: nowrap; }
+th { background: #f0ede6; font-weight: 600; } td.text, th.text { text-align: left; white-space: normal; }
+.interval { color: #777; font-size: 12.5px; }
+.mark { border-radius: 3px; padding: .05rem .45rem; font-size: 12.5px; white-space: nowrap; }
+.good { background: #d8efd9; color: #17561d; } .fair { background: #fbeec3; color: #6a4d00; }
+.bad { background: #f8d9d5; color: #86201a; } .open { background: #e6e6ea; color: #444; }
+.caveat { background: #fbeec3; padding: .6rem 1rem; border-radius: 4px; }
+.maps { display: grid; grid-template-columns: repeat(3, 1fr); gap: .6rem; } img { max-width: 100%; }
+figure { margin: 0; } figcaption { font-size: 13px; color: #555; }
+"""
+"""Marks are good, fair, bad or open."""
+
+
+def html_page(title: str, body: Iterable[str], *, style: str = "") -> str:
+    """Write a page.
+
+    Args:
+        title: of the window.
+        body: HTML, part by part.
+        style: rules besides those that all pages share.
+    """
+    head = f'<meta charset="utf-8"><title>{escape(title)}</title><style>{_STYLE}{style}</style>'
+    return f'<!doctype html>\n<html lang="en"><head>{head}</head><body>\n' + "\n".join(body) + "\n</body></html>\n"
+
+
+def html_table(heads: Sequence[str], rows: Iterable[Sequence[str]], *, n_text: int = 1) -> str:
+    """Write a table; cells are HTML, to the right unless made by `text_cell`. The first `n_text` headings are words."""
+    head = "".join(f"<th{' class=text' if k < n_text else ''}>{name}</th>" for k, name in enumerate(heads))
+    body = "\n".join("<tr>" + "".join(_cell(cell) for cell in row) + "</tr>" for row in rows)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table>"
+
+
+def text_cell(html: str) -> str:
+    """Mark a cell as words, for `html_table`."""
+    return f"\0{html}"
+
+
+def _cell(html: str) -> str:
+    return f'<td class="text">{html[1:]}</td>' if html.startswith("\0") else f"<td>{html}</td>"
+
+
+def html_mark(text: str, kind: str) -> str:
+    """Write a word on a colored ground: good, fair, bad or open."""
+    return f'<span class="mark {kind}">{escape(text)}</span>'
+
+
+def html_figure(png: bytes, caption: str) -> str:
+    """Write a picture, held in the page itself."""
+    data = base64.b64encode(png).decode()
+    picture = f'<img alt="{escape(caption)}" src="data:image/png;base64,{data}">'
+    return f"<figure>{picture}<figcaption>{escape(caption)}</figcaption></figure>"

@@ -1,0 +1,185 @@
+"""Ranking: how much a brigade would like to fight a burning building, as a weighted sum of what it sees of it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fireworld.kernels.arrays import (
+    Array,
+    BrigadeConstants,
+    BrigadeState,
+    BuildingTables,
+    FireConstants,
+    FireState,
+    GeometryTables,
+    LinkTables,
+    SiteState,
+)
+from fireworld.kernels.jit import inner, kernel
+from fireworld.kernels.observation import N_ACTIONS, find_target, site_place
+
+N_OF_BUILDING, N_OF_BRIGADE, N_OF_TEAM = 7, 3, 3
+N_TARGET_FEATURES = N_OF_BUILDING + N_OF_BRIGADE + N_OF_TEAM
+N_WEIGHTS = N_TARGET_FEATURES + N_ACTIONS
+"""Weights of a ranking: one for each feature of a target, then one for each of the four actions that may name it."""
+OWN_TARGET = N_ACTIONS
+"""The action of a brigade that names a building by itself."""
+DEGREES, METERS_100, METERS_50_SQUARE, METERS_MOST = 500.0, 1e5, 2.5e9, 3.0
+"""Units of the features: degrees; lengths in mm; the longest distance told apart, in hundreds of metres."""
+
+
+@inner
+def describe_building(
+    b: int,
+    buildings: BuildingTables,
+    links: LinkTables,
+    geometry: GeometryTables,
+    fire: FireState,
+    sites: SiteState,
+    fire_constants: FireConstants,
+    power: int,
+    out: Array,
+) -> None:
+    """Write the features of a burning building that are the same for every brigade; docs/model.md lists them.
+
+    Only arithmetic and roots: they give the same bits on every machine.
+
+    Args:
+        b: the building.
+        buildings, links, geometry, fire, sites: of the city and the moment.
+        fire_constants: heat that water takes.
+        power: litres that a brigade sprays in a step.
+        out: (7,) float64, written.
+    """
+    capacity = buildings.capacity[b]
+    out[0] = fire.energy[b] / capacity / DEGREES
+    out[1] = np.sqrt(geometry.volume[b] / 1000.0)
+    out[2] = fire.fuel[b] / buildings.initial_fuel[b]
+    out[3] = min(np.sqrt(sites.building_civilian_square[b]) / METERS_100, METERS_MOST)
+    exposure, kindling = 0.0, 0.0
+    for k in range(links.ptr[b], links.ptr[b + 1]):
+        other = links.building[k]
+        if fire.fieryness[other] in (0, 4) and buildings.inflammable[other] != 0:
+            share = links.share[k]
+            exposure += share
+            warmth = fire.energy[other] / buildings.capacity[other] / buildings.ignition_point[other]
+            kindling += share * min(warmth, 1.0)
+    out[4] = 3.0 * exposure
+    out[5] = 5.0 * kindling
+    heat = fire.energy[b] - buildings.ignition_point[b] * capacity
+    litres = heat / fire_constants.water_heat_burning - fire.water[b]
+    out[6] = np.sqrt(max(litres, 0.0) / max(power, 1))
+
+
+@inner
+def value_of_target(
+    brigade: int,
+    b: int,
+    known: Array,
+    weights: Array,
+    described: Array,
+    brigades: BrigadeState,
+    geometry: GeometryTables,
+    range_square: float,
+) -> float:
+    """Return a brigade's value of a building: its weighted features, those of the brigade and the team included.
+
+    Args:
+        brigade: who looks.
+        b: the building.
+        known: (b,) what the brigades go for, -1 nothing.
+        weights: (17,) of the ranking.
+        described: (7,) features of the building.
+        brigades, geometry: of the moment.
+        range_square: of the pumps, mm^2.
+    """
+    value = 0.0
+    for k in range(N_OF_BUILDING):
+        value += weights[k] * described[k]
+    x, y = geometry.x[b], geometry.y[b]
+    dx, dy = x - brigades.x[brigade], y - brigades.y[brigade]
+    square = dx * dx + dy * dy
+    if square <= range_square:
+        value += weights[7]
+    else:
+        value += weights[8] * min((np.sqrt(square) - np.sqrt(range_square)) / METERS_100, METERS_MOST)
+    if brigades.target[brigade] == b:
+        value += weights[9]
+    here, near = 0.0, 0.0
+    for other in range(len(known)):
+        target = known[other]
+        if other != brigade and target >= 0:
+            dx, dy = x - geometry.x[target], y - geometry.y[target]
+            near += 1.0 / (1.0 + (dx * dx + dy * dy) / METERS_50_SQUARE)
+            if target == b:
+                here += 1.0
+    value += weights[10] * here + weights[11] * near
+    if here > 0.0 and here >= described[6] * described[6]:
+        value += weights[12]
+    return value
+
+
+@kernel
+def rank(
+    brigade: int,
+    own: bool,
+    step: int,
+    known: Array,
+    weights: Array,
+    described: Array,
+    described_at: Array,
+    brigades: BrigadeState,
+    buildings: BuildingTables,
+    links: LinkTables,
+    geometry: GeometryTables,
+    fire: FireState,
+    sites: SiteState,
+    fire_constants: FireConstants,
+    brigade_constants: BrigadeConstants,
+    values: Array,
+) -> tuple[np.int64, np.int64]:
+    """Return the action with the target that a brigade values most, and that target; -1, -1 without a site.
+
+    The four targets that the actions name are valued, each with the weight of its action on top; where the brigade may
+    name a target of its own, all burning buildings of its site are instead, and its action is OWN_TARGET. Ties: the
+    lowest action, the lowest building id.
+
+    Args:
+        brigade: who chooses.
+        own: it may name a target of its own.
+        step: of the moment; what is known of a building is worked out once a step.
+        known: (b,) what the brigades go for, as far as this one knows, -1 nothing.
+        weights: (17,) of the ranking.
+        described: (n, 7) float64, scratch.
+        described_at: (n,) int64, scratch: the step that a row of it is of; -1 at first.
+        brigades, buildings, links, geometry, fire, sites, fire_constants, brigade_constants: of the moment.
+        values: (5,) float64, written: of the four targets, without the weights of the actions where it may name its
+            own, and of the one chosen.
+    """
+    best_action, best = np.int64(-1), np.int64(-1)
+    site = site_place(brigade, brigades, sites)
+    if site < 0:
+        return best_action, best
+    power, range_square = brigade_constants.power, brigade_constants.range_square
+    start, n_members = np.int64(sites.start[site]), sites.start[site + 1] - sites.start[site]
+    best_value = 0.0
+    for k in range(N_ACTIONS + (n_members if own else 0)):
+        if k < N_ACTIONS:
+            b = np.int64(find_target(brigade, k, brigades, buildings, fire, geometry, sites))
+        else:
+            b = np.int64(sites.member[start + k - N_ACTIONS])
+        if described_at[b] != step:
+            describe_building(b, buildings, links, geometry, fire, sites, fire_constants, power, described[b])
+            described_at[b] = step
+        value = value_of_target(brigade, b, known, weights, described[b], brigades, geometry, range_square)
+        if k < N_ACTIONS:
+            if not own:
+                value += weights[N_TARGET_FEATURES + k]
+            values[k] = value
+            if own:
+                continue
+        lower = own and value == best_value and buildings.building_id[b] < buildings.building_id[best]
+        if best < 0 or value > best_value or lower:
+            best_action, best, best_value = np.int64(OWN_TARGET if own else k), b, value
+    values[N_ACTIONS] = best_value
+    return best_action, best

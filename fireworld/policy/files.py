@@ -1,0 +1,35 @@
+"""Team files of either kind: tables of values, and rankings of targets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fireworld.policy import ranking
+from fireworld.policy.npz import parse_arrays, read_bytes
+from fireworld.policy.ranking import Ranking, parse_ranking
+from fireworld.policy.team import Team, parse_team
+
+
+def parse_team_file(content: bytes, *, source: str) -> Team | Ranking:
+    """Read the content of a team file of either kind.
+
+    Args:
+        content: of the file.
+        source: what errors call it.
+
+    Raises:
+        TrainingError: it is not a team file, of another format, or makes no sense.
+    """
+    header, _ = parse_arrays(content, source=source)
+    if header.get("format") == ranking.FORMAT:
+        return parse_ranking(content, source=source)[0]
+    return parse_team(content, source=source)[0]
+
+
+def load_team_file(path: Path) -> Team | Ranking:
+    """Read a team file of either kind.
+
+    Raises:
+        TrainingError: as for `parse_team_file`.
+    """
+    return parse_team_file(read_bytes(path), source=str(path))

@@ -1,0 +1,20 @@
+"""The teams that come with fireworld: the team files in `fireworld/teams`, each named without its suffix."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+from fireworld.policy.npz import SUFFIX
+
+_FOLDER: Final = Path(__file__).parents[1] / "teams"
+
+
+def team_names() -> list[str]:
+    """Name the teams."""
+    return sorted(path.stem for path in _FOLDER.glob(f"*{SUFFIX}"))
+
+
+def team_path(name: str) -> Path:
+    """Return the file of a team."""
+    return _FOLDER / f"{name}{SUFFIX}"

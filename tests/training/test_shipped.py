@@ -1,0 +1,76 @@
+"""The teams that come with fireworld: found by name, known where they come from, recorded with their file."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from benchmarks.shipped import COMMANDS
+from fireworld.errors import PolicyError
+from fireworld.policy.names import load_policy
+from fireworld.policy.shipped import team_names, team_path
+from fireworld.policy.team import Team, load_team, save_team
+from fireworld.training.curriculum import load_curriculum
+from fireworld.training.method import PAPER
+from fireworld.training.trainer import Trainer
+from recorder.reader import open_log
+
+SHAPES = {"paper-cooperative": (4, 4320, 4), "paper-noncooperative": (1, 270, 4)}
+CURRICULA = {
+    "paper-cooperative": load_curriculum("paper"),
+    "paper-noncooperative": load_curriculum("paper").only(["alone"]),
+}
+
+
+def test_the_papers_teams_are_there():
+    assert set(SHAPES) == set(COMMANDS) <= set(team_names())
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_team_comes_from_the_shipped_curriculum(name):
+    """Training again takes half a minute: `python -m benchmarks.shipped` does. This finds a curriculum that changed."""
+    team = load_team(team_path(name))
+    assert team.tables.shape == SHAPES[name]
+    wanted = Trainer(CURRICULA[name], PAPER, seed=1).identity
+    origin = team.provenance
+    assert {key: origin["curriculum"][key] for key in ("name", "digest")} == wanted["curriculum"]
+    assert (origin["method"], origin["seed"]) == (wanted["method"], 1)
+    assert origin["scenarios_done"] == CURRICULA[name].n_scenarios
+    assert team_path(name).stat().st_size < 300_000
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_by_its_name(name):
+    named = load_policy(name)
+    assert named.name == name
+    assert named.attachments == {"policy.npz": team_path(name).read_bytes()}
+    assert named.digest == load_policy(str(team_path(name))).digest
+
+
+def test_run_and_recorded(here, fireworld):
+    words = ("run", "quick", "--policy", "paper-noncooperative", "--steps", 5)
+    done = fireworld(*words, "--record", "a.mcap", "--json")
+    assert (done.code, done.err) == (0, "")
+    assert json.loads(done.out)["policy"] == "paper-noncooperative"
+    header = open_log(here / "a.mcap").header
+    assert header.policy == "paper-noncooperative"
+    assert header.attachments["policy.npz"] == team_path("paper-noncooperative").read_bytes()
+    assert fireworld("verify", "a.mcap").code == 0
+
+
+def test_help_and_hints_name_them(fireworld):
+    text = "".join(fireworld("run", "--help").out.split())  # lines may end within a name
+    for name in team_names():
+        assert name in text
+    with pytest.raises(PolicyError, match=r"one of .*paper-noncooperative.*; try paper-cooperative$"):
+        load_policy("paper-coperative")
+
+
+def test_any_team_in_the_folder_is_found(tmp_path, monkeypatch):
+    monkeypatch.setattr("fireworld.policy.shipped._FOLDER", tmp_path)
+    assert team_names() == []
+    save_team(Team(np.zeros((1, 270, 4)), np.zeros((1, 270, 4), dtype=np.int64)), tmp_path / "mine.npz")
+    assert team_names() == ["mine"]
+    assert load_policy("mine").policy.tables.shape == (1, 270, 4)
