@@ -1,8 +1,11 @@
-"""Rows of the recorder: writing a step, and reading the history of a building back."""
+"""Rows of the recorder: writing a step, reading the history of a building back, and comparing two recordings."""
 
 from __future__ import annotations
 
 import json
+import shutil
+import subprocess
+import sys
 import tempfile
 import zlib
 from collections.abc import Iterator
@@ -14,9 +17,20 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.fires import city_of
-from benchmarks.runs import header, new_world, record_of, records, run_silently, write_log
+from benchmarks.fires import city_of, tables_of
+from benchmarks.runs import (
+    SEED,
+    from_the_corner,
+    header,
+    new_world,
+    record_of,
+    records,
+    run_silently,
+    start_of,
+    write_log,
+)
 from benchmarks.timing import Contender, Row, compare, duration, measure
+from fireworld.parameters import PAPER
 from fireworld.policy.kernel import each_another
 from fireworld.records import STEP_TOPICS, StepRecord
 from fireworld.world.world import World
@@ -113,6 +127,37 @@ def read_rows(size: int, n_steps: int, folder: Path, *, seconds: float) -> Itera
     yield measure("log", "open and check all of it", label, opening, seconds=seconds)
 
 
+def other_world(size: int, n_steps: int) -> World:
+    """Set up the same world as `new_world`, in which one building less burns at first."""
+    city = city_of(size)
+    start = start_of(size, from_the_corner(city)[1:])
+    return World(city, PAPER, **start, seed=SEED, n_steps_max=n_steps, tables=tables_of(size))
+
+
+def diff_rows(size: int, n_steps: int, folder: Path, *, seconds: float) -> Iterator[Row]:
+    """Time `fireworld diff` as a whole process, for recordings that are the same and for two that are not."""
+    golden, same, other = (folder / f"{name}.mcap" for name in ("golden", "same", "other"))
+    write_log(golden, new_world(size, n_steps))
+    shutil.copy(golden, same)
+    write_log(other, other_world(size, n_steps))
+    label = f"{city_of(size).n_buildings} buildings, {len(open_log(golden))} steps, whole process"
+    baseline = Contender('python -c "import numpy"', lambda _: _python("import numpy", code=0))
+    for what, path, code in (("the same", same, 0), ("different", other, 1)):
+        line = f"import sys; sys.argv = {['fireworld', 'diff', str(golden), str(path)]}"
+        ours = Contender("", partial(_diff, line=f"{line}; from fireworld.cli import main; main()", code=code))
+        yield compare("log", f"fireworld diff, {what}", label, ours, baseline, seconds=seconds)
+
+
+def _diff(_: None, *, line: str, code: int) -> None:
+    _python(line, code=code)
+
+
+def _python(line: str, *, code: int) -> None:
+    """Start a Python process, wait for its end and check how it ended."""
+    done = subprocess.run([sys.executable, "-c", line], check=False, stdout=subprocess.DEVNULL)
+    assert done.returncode == code
+
+
 def rows(*, quick: bool) -> Iterator[Row]:
     """Yield the rows of the recorder."""
     size, n_steps, seconds = (100, 50, 0.3) if quick else (1000, 300, 2.0)
@@ -122,3 +167,4 @@ def rows(*, quick: bool) -> Iterator[Row]:
         yield observe_row(size, n_steps, seconds=seconds)
         yield run_row(size, n_steps, folder, seconds=seconds)
         yield from read_rows(size, n_steps, folder, seconds=seconds)
+        yield from diff_rows(size, n_steps, folder, seconds=seconds)

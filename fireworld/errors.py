@@ -4,7 +4,10 @@ from __future__ import annotations
 
 
 class FireworldError(Exception):
-    """Base of every error that a user's input, file or flag can cause."""
+    """Base of every error that a user's input, file or flag can cause; its message is one printable line."""
+
+    def __str__(self) -> str:
+        return one_line(super().__str__())
 
 
 class ScenarioError(FireworldError):
@@ -53,6 +56,9 @@ def expected(where: str, key: str, wanted: str, got: object, hint: str = "") -> 
     if len(shown) > 80:
         shown = shown[:77] + "..."
     place = f"{where}: {key}" if key else where
-    message = f"{place}: expected {wanted}, got {shown}" + (f"; {hint}" if hint else "")
-    # Names and keys are the user's: a line break in one of them must not make two lines of the message.
+    return one_line(f"{place}: expected {wanted}, got {shown}" + (f"; {hint}" if hint else ""))
+
+
+def one_line(message: str) -> str:
+    """Escape what cannot be printed: a line break in a name or key of the user's must not make two lines of it."""
     return "".join(character if character.isprintable() else repr(character)[1:-1] for character in message)

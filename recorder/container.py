@@ -20,6 +20,10 @@ MAGIC: Final = b"\x89MCAP0\r\n"
 CHUNK_BYTES_MAX: Final = 1 << 28
 """A chunk holds a step, which is far below this even for a city of a million buildings."""
 
+REGISTRATIONS_MAX: Final = 1 << 17
+"""Schemas and channels of one chunk: their numbers have 16 bits."""
+
+_IN_CHUNK: Final = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL), int(Opcode.MESSAGE)})
 _LAST: Final = frozenset({int(Opcode.DATA_END), int(Opcode.FOOTER)})
 _RECORD: Final = struct.Struct("<BQ")
 _MESSAGE: Final = struct.Struct("<HIQQ")
@@ -202,7 +206,7 @@ def split(block: bytes, position: int = 0) -> Iterator[tuple[int, int, memoryvie
     """Yield position, opcode and body of every record inside a chunk.
 
     Raises:
-        LogError: a record is longer than its chunk.
+        LogError: a record is longer than its chunk, or does not belong into one.
     """
     view, end = memoryview(block), len(block)
     while position < end:
@@ -212,6 +216,8 @@ def split(block: bytes, position: int = 0) -> Iterator[tuple[int, int, memoryvie
         start = position + _RECORD.size
         if length > end - start:
             raise LogError("a chunk ends inside a record")
+        if opcode not in _IN_CHUNK:  # else a few bytes could unpack to millions of records that say nothing
+            raise LogError(f"a chunk holds a record of type {opcode}")
         yield position, opcode, view[start : start + length]
         position = start + length
 

@@ -1,52 +1,30 @@
-"""Compare two runs step by step, phase by phase, and find where they first differ."""
+"""Compare two runs step by step, phase by phase: find where they first differ, and how that spread."""
 
 from __future__ import annotations
 
 import dataclasses
-import sys
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from functools import partial
 
-from fireworld.records import (
-    PHASES,
-    STEP_TOPICS,
-    CityRecord,
-    Decisions,
-    Events,
-    Observations,
-    Recording,
-    RunHeader,
-    Snapshot,
-    StepRecord,
+from fireworld.errors import LogError, expected
+from fireworld.records import CityRecord, Recording, Snapshot, StepRecord
+from recorder.comparable import header_differences
+from recorder.match import Rules
+from recorder.places import (
+    FirstDifference,
+    describe,
+    find_city_difference,
+    find_ending_difference,
+    find_places,
+    find_snapshot_difference,
 )
-from recorder import words
-from recorder.match import Rules, Spot, find, first_unequal
-from recorder.schema import Commit, Field, message_of
+from recorder.schema import Commit
+from recorder.spread import Spread, SpreadRow, SpreadTally
 from recorder.totals import Totals, totals_at, totals_of
 
-_IN_TURN: Final = (Observations.topic, Decisions.topic)
-_ENDINGS: Final = tuple(item for item in message_of(Commit).fields if item.wire == "bool")
-
-
-@dataclass(frozen=True)
-class FirstDifference:
-    """The first place where two runs differ."""
-
-    step: int | None
-    """None in the city."""
-    phase: str
-    """One of records.PHASES, "end" for how a run ended, "length" for steps that only one run has."""
-    topic: str
-    field: str
-    entity: str | None
-    """building, brigade, civilian, site, event or entry; None for a single value."""
-    index: int | None
-    """Of the entity."""
-    a: Any
-    b: Any
-    sentence: str
+__all__ = ["Difference", "FirstDifference", "Steps", "compare"]
 
 
 @dataclass(frozen=True)
@@ -56,11 +34,16 @@ class Difference:
     first: FirstDifference | None
     """None if they are the same."""
     totals: tuple[Totals, Totals]
+    """At the last step of each that was looked at."""
     header: Mapping[str, tuple[str | int, str | int]]
     """What the runs were asked to do differently; no difference by itself."""
     n_steps_compared: int
     n_steps_differing: Mapping[str, int]
-    """By topic; of another city's steps nothing is compared."""
+    """By topic, in the order in which they came to differ; of another city's steps nothing is compared."""
+    first_by_topic: Mapping[str, FirstDifference] = dataclasses.field(default_factory=dict)
+    """The same topics: where each came to differ."""
+    spread: Spread = dataclasses.field(default_factory=Spread)
+    """Empty for runs of one digest, which are not read, and of different cities."""
 
     @property
     def same(self) -> bool:
@@ -68,34 +51,57 @@ class Difference:
         return self.first is None
 
 
+@dataclass(frozen=True, kw_only=True)
+class Steps:
+    """Which steps are compared, both ends included; None is as far as it goes."""
+
+    first: int | None = None
+    last: int | None = None
+
+    def __contains__(self, step: int) -> bool:
+        return (self.first is None or step >= self.first) and (self.last is None or step <= self.last)
+
+
 def compare(
-    a: Recording, b: Recording, *, tolerances: Mapping[str, float] | None = None, ignore: Collection[str] = ()
+    a: Recording,
+    b: Recording,
+    *,
+    tolerances: Mapping[str, float] | None = None,
+    ignore: Collection[str] = (),
+    steps: Steps | None = None,
+    watch: Callable[[SpreadRow], None] | None = None,
 ) -> Difference:
     """Compare two runs on the steps that both have, in the order in which things happen within a step.
 
     NaN equals NaN. Steps that only one run has are a difference too, reported if there is no other. Snapshots are
-    compared array by array, unless there is a tolerance.
+    compared array by array, unless something is let pass by a tolerance or ignored.
 
     Args:
         a: the run that is right, or came first.
         b: the run to hold against it.
         tolerances: by `topic.field` or `field`: the largest difference that counts as none.
         ignore: topics, `topic.field`s or `field`s to leave out.
+        steps: the steps to compare; all if left out.
+        watch: called for every step that either run has with how far the difference has come, unless the digests are
+            the same or the cities are not.
 
     Raises:
-        LogError: a tolerance or an ignored name is not a field, or a log cannot be read.
+        LogError: a tolerance or an ignored name is not a field, neither run has a step that is to be compared, or a
+            log cannot be read.
     """
     rules = Rules(tolerances or {}, ignore)
-    header = _header_differences(a.header, b.header)
+    steps = steps or Steps()
+    _check_steps(a, b, steps)
+    header = header_differences(a.header, b.header)
     digest = getattr(a, "digest", None)
     if digest is not None and digest == getattr(b, "digest", None):
-        totals = totals_of(a)
+        totals = _totals_within(a, steps)
         return Difference(None, (totals, totals), header, totals.n_steps, {})
-    comparison = _Comparison(rules, a.city)
-    comparison.take_city(b.city)
-    if comparison.first is not None:
-        return Difference(comparison.first, (totals_of(a), totals_of(b)), header, 0, {})
-    comparison.take_steps(iter(a), iter(b))
+    first = find_city_difference(a.city, b.city, rules)
+    if first is not None:
+        return Difference(first, (totals_of(a), totals_of(b)), header, 0, {})
+    comparison = _Comparison(rules, SpreadTally(a.city, watch), a.city)
+    comparison.take_steps(_within(a, steps), _within(b, steps))
     tally_a, tally_b = comparison.tallies
     return Difference(
         first=comparison.first,
@@ -103,6 +109,8 @@ def compare(
         header=header,
         n_steps_compared=comparison.n_compared,
         n_steps_differing=dict(comparison.n_differing),
+        first_by_topic=comparison.first_by_topic,
+        spread=comparison.spread.spread(),
     )
 
 
@@ -122,20 +130,15 @@ class _Tally:
 class _Comparison:
     """The comparison while the steps come by."""
 
-    def __init__(self, rules: Rules, city: CityRecord) -> None:
+    def __init__(self, rules: Rules, spread: SpreadTally, city: CityRecord) -> None:
         self.first: FirstDifference | None = None
+        self.first_by_topic: dict[str, FirstDifference] = {}
         self.n_compared = 0
         self.n_differing: Counter[str] = Counter()
         self.tallies = (_Tally(), _Tally())
+        self.spread = spread
         self._rules = rules
         self._city = city
-
-    def take_city(self, other: CityRecord) -> None:
-        """Compare the cities."""
-        for item, tolerance in self._rules.fields[CityRecord.topic]:
-            spot = find(item, getattr(self._city, item.name), getattr(other, item.name), tolerance)
-            if spot is not None and self.first is None:
-                self.first = _describe(None, CityRecord.topic, item, spot, self._city)
 
     def take_steps(self, a: Iterator[StepRecord], b: Iterator[StepRecord]) -> None:
         """Compare all steps; those of one run only count as a difference if there is no other."""
@@ -147,121 +150,68 @@ class _Comparison:
                         tally.alone.append(record.step)
             if x is not None and y is not None:
                 self._take_step(x, y)
+            else:
+                self.spread.take_one(x, y)
         if self.first is None:
             self.first = _length_difference(*self.tallies)
 
     def _take_step(self, a: StepRecord, b: StepRecord) -> None:
         self.n_compared += 1
-        found = [(topic.topic, self._first_spot(topic.topic, a, b)) for topic in STEP_TOPICS]
-        for name, item, spot in _as_it_happened([(topic, *place) for topic, place in found if place is not None]):
-            self._note(name, self._tell(name, item, spot, a, b))
+        found = find_places(a, b, self._rules)
+        tell = partial(describe, a=a, b=b, city=self._city)
+        for places in found:
+            topic = places[0].topic
+            self._note(topic, tell(places[0]) if topic not in self.first_by_topic else None)
         if self._rules.snapshots and a.snapshot is not None and b.snapshot is not None:
-            self._take_snapshot(a.step, a.snapshot, b.snapshot)
-        for item in _ENDINGS:
-            ending = find(item, getattr(a, item.name), getattr(b, item.name))
-            if ending is not None:
-                self._note(Commit.topic, _describe(a, Commit.topic, item, ending, self._city))
-                break
+            difference = find_snapshot_difference(a.step, a.snapshot, b.snapshot)
+            if difference is not None:
+                self._note(Snapshot.topic, difference)
+        ending = find_ending_difference(a, b, self._rules, self._city)
+        if ending is not None:
+            self._note(Commit.topic, ending)
+        self.spread.take_both(a, b, found, tell, differs=self.first is not None)
 
-    def _first_spot(self, topic: str, a: StepRecord, b: StepRecord) -> tuple[Field, Spot] | None:
-        """Find the first difference in one topic of a step.
-
-        That is the first field's; of what brigades see and choose, one after another, the first brigade's.
-        """
-        x, y = getattr(a, topic[1:]), getattr(b, topic[1:])
-        spots = (
-            (item, spot)
-            for item, tolerance in self._rules.fields[topic]
-            if (spot := find(item, getattr(x, item.name), getattr(y, item.name), tolerance)) is not None
-        )
-        if topic not in _IN_TURN:
-            return next(spots, None)
-        return min(spots, key=lambda place: _turn(*place), default=None)
-
-    def _tell(self, topic: str, item: Field, spot: Spot, a: StepRecord, b: StepRecord) -> FirstDifference:
-        """Put a difference in one topic of a step into words."""
-        difference = _describe(a, topic, item, spot, self._city)
-        if topic == Events.topic:
-            return _with_sentence(difference, words.events_sentence(a.events, b.events))
-        if topic == Decisions.topic and item.name == "action" and spot.position is not None:
-            why = words.reason(a, b, spot.position)
-            return _with_sentence(difference, f"{difference.sentence}; {why}" if why else difference.sentence)
-        return difference
-
-    def _take_snapshot(self, step: int, x: Snapshot, y: Snapshot) -> None:
-        """Compare the arrays that both snapshots hold."""
-        for name in sorted(x.arrays.keys() & y.arrays.keys()):
-            a, b = x.arrays[name], y.arrays[name]
-            if a.shape != b.shape:
-                place, shown_a, shown_b, index = name, str(a.shape), str(b.shape), None
-            else:
-                index = first_unequal(a.ravel(), b.ravel())
-                if index is None:
-                    continue
-                place = f"{name}[{index}]"
-                shown_a, shown_b = a.flat[index].item(), b.flat[index].item()
-            text = f"step {step}, {PHASES[Snapshot.topic]}: {place} is {shown_b}, was {shown_a}"
-            difference = FirstDifference(
-                step, PHASES[Snapshot.topic], Snapshot.topic, name, "entry", index, shown_a, shown_b, text
-            )
-            self._note(Snapshot.topic, difference)
-            return
-
-    def _note(self, topic: str, difference: FirstDifference) -> None:
+    def _note(self, topic: str, difference: FirstDifference | None) -> None:
+        """Count a step in which a topic differs; the words are wanted the first time only."""
         self.n_differing[topic] += 1
-        if self.first is None:
-            self.first = difference
+        if difference is not None:
+            self.first_by_topic.setdefault(topic, difference)
+            self.first = self.first or difference
 
 
-def _turn(item: Field, spot: Spot) -> int:
-    """Return the brigade whose turn a difference in observations or decisions belongs to.
+def _check_steps(a: Recording, b: Recording, steps: Steps) -> None:
+    """Refuse a range of steps that neither run has anything of.
 
-    -1 for what is there before anyone's turn; the errors of learning, and lengths, come after everyone's.
+    Raises:
+        LogError: says which steps there are.
     """
-    if item.name == "td_error" or spot.lengths:
-        return sys.maxsize
-    if spot.position is None or words.entity_kind(item) != "brigade":
-        return -1
-    return words.entity_index(item, spot.position)
+    if steps == Steps():
+        return
+    held = {int(step) for run in (a, b) for step in run.steps}
+    if any(step in steps for step in held):
+        return
+    wanted = f"a range of the steps {min(held)} to {max(held)}" if held else "recordings with steps"
+    low, high = ("the first" if steps.first is None else steps.first, "the last" if steps.last is None else steps.last)
+    raise LogError(expected("--from and --to", "", wanted, f"steps {low} to {high}"))
 
 
-def _as_it_happened(places: list[tuple[str, Field, Spot]]) -> list[tuple[str, Field, Spot]]:
-    """Order a step's differences, given by topic, as they came about: a brigade sees what those before it chose."""
-    topics = [topic for topic, _, _ in places]
-    if topics.count(Observations.topic) and topics.count(Decisions.topic):
-        seen, chosen = topics.index(Observations.topic), topics.index(Decisions.topic)
-        if _turn(*places[chosen][1:]) < _turn(*places[seen][1:]):
-            places[seen], places[chosen] = places[chosen], places[seen]
-    return places
+def _within(run: Recording, steps: Steps) -> Iterator[StepRecord]:
+    """Yield the steps that are to be compared, and read no further than the last of them."""
+    for record in run:
+        if steps.last is not None and record.step > steps.last:
+            return
+        if record.step in steps:
+            yield record
 
 
-def _describe(step: StepRecord | None, topic: str, item: Field, spot: Spot, city: CityRecord) -> FirstDifference:
-    """Put a difference into words; `step` is the first run's, None for the city."""
-    phase = PHASES.get(topic, "end")
-    kind = words.entity_kind(item) if item.repeated else None
-    index = None if spot.position is None else words.entity_index(item, spot.position)
-    if spot.lengths:
-        text = words.length_sentence(item, kind or "entry", spot.a, spot.b)
-    else:
-        entity = None if index is None else words.entity_words(kind or "entry", index, city=city, step=step)
-        text = words.sentence(topic, item, entity, spot)
-    place = phase if step is None else f"step {step.step}, {phase}"
-    return FirstDifference(
-        step=None if step is None else step.step,
-        phase=phase,
-        topic=topic,
-        field=item.name,
-        entity=kind,
-        index=index,
-        a=spot.a,
-        b=spot.b,
-        sentence=f"{place}: {text}",
-    )
-
-
-def _with_sentence(difference: FirstDifference, text: str) -> FirstDifference:
-    prefix = f"step {difference.step}, {difference.phase}: "
-    return dataclasses.replace(difference, sentence=prefix + text.removeprefix(prefix))
+def _totals_within(run: Recording, steps: Steps) -> Totals:
+    """Read the outcome at the last step that is to be compared."""
+    if steps == Steps():
+        return totals_of(run)
+    tally = _Tally()
+    for record in _within(run, steps):
+        tally.add(record)
+    return totals_at(tally.last, tally.n_steps)
 
 
 def _aligned(a: Iterator[StepRecord], b: Iterator[StepRecord]) -> Iterator[tuple[StepRecord | None, StepRecord | None]]:
@@ -288,8 +238,3 @@ def _length_difference(a: _Tally, b: _Tally) -> FirstDifference | None:
     span = f"step {steps[0]} is" if len(steps) == 1 else f"{len(steps)} steps, {steps[0]} to {steps[-1]}, are"
     text = f"{span} only in the {'first' if first_is_longer else 'second'} run; all others are the same"
     return FirstDifference(steps[0], "length", "", "", None, None, a.n_steps, b.n_steps, text)
-
-
-def _header_differences(a: RunHeader, b: RunHeader) -> dict[str, tuple[str | int, str | int]]:
-    names = [item.name for item in dataclasses.fields(RunHeader) if item.name != "attachments"]
-    return {name: (getattr(a, name), getattr(b, name)) for name in names if getattr(a, name) != getattr(b, name)}

@@ -77,9 +77,12 @@ def from_metadata(metadata: Mapping[str, str], attachments: Mapping[str, bytes])
 
 def _integer(key: str, text: str) -> int:
     try:
-        return int(text)
+        number = int(text)
     except ValueError as error:
         raise LogError(expected(key, "", "a whole number", text)) from error
+    if not -(2**63) <= number < 2**63:
+        raise LogError(expected(key, "", "a whole number of 64 bits", text))
+    return number
 
 
 def _checksum(metadata: Mapping[str, str]) -> str:

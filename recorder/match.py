@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Collection, Mapping
 from typing import Any, Final, NamedTuple
@@ -11,10 +10,12 @@ import numpy as np
 
 from fireworld.errors import LogError, expected
 from fireworld.records import STEP_TOPICS, Array, CityRecord, Snapshot
-from recorder.schema import Field, message_of
+from recorder.schema import Commit, Field, message_of
 
 _TYPES: Final[tuple[type[Any], ...]] = (CityRecord, *STEP_TOPICS)
 _FIELDS: Final = {topic.topic: message_of(topic).fields for topic in _TYPES}
+_ENDINGS: Final = tuple(item for item in message_of(Commit).fields if item.wire == "bool")
+"""How a run ended: the fields of /commit that are no number of a step and no hash."""
 
 
 class Spot(NamedTuple):
@@ -24,6 +25,7 @@ class Spot(NamedTuple):
     a: Any
     b: Any
     lengths: bool = False  # a and b are the lengths of two arrays
+    unequal: Array | None = None  # (length,) where the arrays differ; None for a single value, and for other lengths
 
 
 class Rules:
@@ -31,21 +33,26 @@ class Rules:
 
     Args:
         tolerances: by `topic.field` or `field`: the largest difference that counts as none.
-        ignore: topics, `topic.field`s or `field`s to leave out.
+        ignore: topics, `topic.field`s or `field`s to leave out. A topic may begin with a slash.
 
     Raises:
         LogError: a name is not a field, or a tolerance is not a number >= 0.
     """
 
     def __init__(self, tolerances: Mapping[str, float], ignore: Collection[str]) -> None:
+        tolerances = {name.removeprefix("/"): tolerance for name, tolerance in tolerances.items()}
+        ignore = {name.removeprefix("/") for name in ignore}
         for name, tolerance in tolerances.items():
             check_field_name("tolerance", name)
             if not (math.isfinite(tolerance) and tolerance >= 0):
                 raise LogError(expected("tolerance", name, "a number >= 0", tolerance))
-        for name in ignore:
+        for name in sorted(ignore):
             check_field_name("ignore", name, topics=True)
-        # Snapshots hold what the topics hold, and more: a tolerance there would have to hold here too.
-        self.snapshots = not tolerances and Snapshot.topic[1:] not in ignore
+        # Snapshots hold what the topics hold, and more: what is let pass there would have to pass here too.
+        self.snapshots = not tolerances and not ignore
+        self.endings = [
+            item for item in _ENDINGS if {Commit.topic[1:], item.name, _full(Commit.topic, item)}.isdisjoint(ignore)
+        ]
         self.fields: dict[str, list[tuple[Field, float]]] = {}
         for topic, items in _FIELDS.items():
             self.fields[topic] = [
@@ -61,11 +68,14 @@ def check_field_name(where: str, name: str, *, topics: bool = False) -> None:
     Raises:
         LogError: with the nearest names.
     """
-    known = {_full(topic, item) for topic, items in _FIELDS.items() for item in items}
-    known |= {item.name for items in _FIELDS.values() for item in items}
+    fields = {**_FIELDS, Commit.topic: _ENDINGS} if topics else _FIELDS
+    known = {_full(topic, item) for topic, items in fields.items() for item in items}
+    known |= {item.name for items in fields.values() for item in items}
     if topics:
-        known |= {topic[1:] for topic in (*_FIELDS, Snapshot.topic)}
-    if name not in known:
+        known |= {topic[1:] for topic in (*fields, Snapshot.topic)}
+    if name.removeprefix("/") not in known:
+        import difflib
+
         near = difflib.get_close_matches(name, sorted(known), n=3)
         hint = f"try {', '.join(near)}" if near else "`fireworld info LOG --schema` lists them"
         raise LogError(expected(where, "", "a field of the log", name, hint))
@@ -77,22 +87,25 @@ def find(item: Field, a: Any, b: Any, tolerance: float = 0.0) -> Spot | None:
         return None if _values_equal(a, b, tolerance) else Spot(None, a, b)
     if len(a) != len(b):
         return Spot(None, len(a), len(b), lengths=True)
-    index = first_unequal(a, b, tolerance)
-    return None if index is None else Spot(index, a[index].item(), b[index].item())
+    unequal = unequal_entries(a, b, tolerance)
+    if unequal is None:
+        return None
+    index = int(np.argmax(unequal))
+    return Spot(index, a[index].item(), b[index].item(), unequal=unequal)
 
 
-def first_unequal(a: Array, b: Array, tolerance: float = 0.0) -> int | None:
-    """Return the first index at which two arrays of one length differ; None if they are the same.
+def unequal_entries(a: Array, b: Array, tolerance: float = 0.0) -> Array | None:
+    """Return at which entries two arrays of one length differ, (length,) bool; None if they are the same.
 
     NaN equals NaN, -0.0 equals 0.0, and an infinity only itself, whatever the tolerance.
     """
     if a.tobytes() == b.tobytes():
         return None
-    unequal = (a != b) & ~((a != a) & (b != b))  # noqa: PLR0124  # only NaN differs from itself
+    unequal: Array = (a != b) & ~((a != a) & (b != b))  # noqa: PLR0124  # only NaN differs from itself
     if tolerance:
         with np.errstate(invalid="ignore", over="ignore"):
             unequal &= ~(np.abs(a.astype(np.float64) - b.astype(np.float64)) <= tolerance)
-    return int(np.argmax(unequal)) if unequal.any() else None
+    return unequal if unequal.any() else None
 
 
 def _values_equal(a: Any, b: Any, tolerance: float) -> bool:

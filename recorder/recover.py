@@ -43,7 +43,7 @@ def recover(path: Path | str, output: Path | str, *, force: bool = False) -> Rec
         Path(output),
         metadata=log.found.metadata,
         attachments=log.header.attachments,
-        channels=_channels(log),
+        channels=channels_of(log),
         city=log.found.city,
         force=force,
         scratch_suffix=".recovering",
@@ -54,8 +54,8 @@ def recover(path: Path | str, output: Path | str, *, force: bool = False) -> Rec
     return Recovery(n_steps=len(log), last_step=log.found.steps[-1], damage=log.damage, digest=log.digest)
 
 
-def _channels(log: Log) -> list[Channel]:
-    """List the log's own channels: those of a later version are carried over with their schemas."""
+def channels_of(log: Log) -> list[Channel]:
+    """List the topics of a log with their schemas as it carries them, those of a later version too."""
     none = Schema(0, "", "", b"")
     pairs = [(item, log.found.schemas.get(item.schema_id, none)) for _, item in sorted(log.found.channels.items())]
     return [Channel(item.topic, schema.name, schema.data) for item, schema in pairs]

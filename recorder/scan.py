@@ -12,7 +12,7 @@ import zstandard
 from mcap.opcode import Opcode
 
 from fireworld.errors import LogError, expected
-from fireworld.records import CityRecord, RunHeader, Snapshot
+from fireworld.records import STEP_SECONDS, CityRecord, RunHeader, Snapshot
 from recorder import container
 from recorder.chain import Chain
 from recorder.codec import decode
@@ -25,6 +25,8 @@ State = Literal["complete", "partial", "damaged"]
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = (
     int(opcode) for opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK)
 )
+_STEP_MAX: Final = (2**64 - 1) // (STEP_SECONDS * 1_000_000_000)
+"""The last step that the time of a message can hold."""
 _BARE: Final = frozenset({_SCHEMA, _CHANNEL, _MESSAGE})
 
 
@@ -69,14 +71,16 @@ class Scan:
         good = f"good up to step {self.steps[-1]}" if self.steps else "no step is good"
         return f"{self.state}: {self.fault}; {good}"
 
-    def add(self, commit: Commit, start: Start, sizes: list[tuple[str, int]]) -> None:
+    def add(self, commit: Commit, start: Start, sizes: Mapping[str, int]) -> None:
         """Take in a step whose hash fits."""
+        if not 0 <= commit.step <= _STEP_MAX:
+            raise LogError(f"a step has the number {commit.step}")
         if self.steps and commit.step <= self.steps[-1]:
             raise LogError(f"step {commit.step} follows step {self.steps[-1]}")
         self.hash = commit.hash
         self.steps.append(commit.step)
         self.starts.append(start)
-        for topic, n_bytes in sizes:
+        for topic, n_bytes in sizes.items():
             size = self.topics.setdefault(topic, TopicSize())
             size.n_messages += 1
             size.n_bytes += n_bytes
@@ -144,10 +148,12 @@ def _follow(found: Scan, chain: Chain, stream_of_messages: Iterator[tuple[str, m
         LogError: the first fault; what was found before it is good.
     """
     start: Start | None = None
-    sizes: list[tuple[str, int]] = []
+    sizes: dict[str, int] = {}
     for topic, payload, place in stream_of_messages:
         start = start or place
-        sizes.append((topic, len(payload)))
+        if topic in sizes:
+            raise LogError(f"a step holds {topic} twice")
+        sizes[topic] = len(payload)
         if topic != Commit.topic:
             chain.add(topic, payload)
             continue
@@ -222,11 +228,15 @@ class _Stream:
                 return
             checksum = zlib.crc32(record.body, zlib.crc32(record.head, checksum))
             self._take(record)
+            n_registrations = 0
             for position, opcode, body in container.split(_block(record, self._decompressor)):
                 if opcode == _MESSAGE:
                     place = Start(record.offset, position)
                     yield _channel_of(body, self.channels).topic, container.payload_of(body), place
                 else:
+                    n_registrations += 1
+                    if n_registrations > container.REGISTRATIONS_MAX:
+                        raise LogError("a chunk holds more schemas and channels than there can be")
                     self._register(opcode, body)
         raise LogError("the data section has no end")
 

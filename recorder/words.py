@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-import re
+from collections.abc import Mapping
 from typing import Any, Final
 
 from fireworld.records import (
@@ -24,7 +24,7 @@ from fireworld.records import (
 from recorder.match import Spot
 from recorder.schema import Field
 
-_NAMES: Final = {
+NAMES: Final[Mapping[str, tuple[str, ...]]] = {
     "/city.material": MATERIALS,
     "/observations.distance_from_center": LEVELS,
     "/observations.distance_from_civilian": LEVELS,
@@ -49,13 +49,12 @@ _ENTITIES: Final = {
 
 def entity_kind(item: Field) -> str:
     """Return what an entry of this field belongs to: building, brigade, civilian, site, event, or entry."""
-    shape = re.match(r"\(([^,]*),\)", item.doc)
-    return _ENTITIES.get(shape[1], "entry") if shape else "entry"
+    return _ENTITIES.get(item.shape, "entry")
 
 
 def entity_index(item: Field, index: int) -> int:
     """Return the entity that an entry of this field belongs to; Q-values come four to a brigade."""
-    return index // len(ACTIONS) if item.doc.startswith("(n_brigades * 4,)") else index
+    return index // len(ACTIONS) if item.shape == "n_brigades * 4" else index
 
 
 def entity_words(kind: str, index: int, *, city: CityRecord, step: StepRecord | None) -> str:
@@ -69,7 +68,7 @@ def entity_words(kind: str, index: int, *, city: CityRecord, step: StepRecord | 
 
 def show(topic: str, name: str, value: Any) -> str:
     """Write a value: by its name if it stands for one, else as a number."""
-    names: tuple[str, ...] = _NAMES.get(f"{topic}.{name}", ())
+    names = NAMES.get(f"{topic}.{name}", ())
     if names and 0 <= value < len(names):
         return names[int(value)]
     if topic == Decisions.topic and name in {"action", "target"} and value == -1:
@@ -94,7 +93,7 @@ def sentence(topic: str, item: Field, entity: str | None, spot: Spot) -> str:
     field = item.name.replace("_", " ")
     if topic == Decisions.topic and item.name == "q_values" and spot.position is not None:
         field = f"Q of {ACTIONS[spot.position % len(ACTIONS)]}"
-    distance = "" if f"{topic}.{item.name}" in _NAMES else apart(spot.a, spot.b)
+    distance = "" if f"{topic}.{item.name}" in NAMES else apart(spot.a, spot.b)
     subject = f"{entity}: {field}" if entity else field
     return f"{subject} is {shown_b}, was {shown_a}" + (f" (differs by {distance})" if distance else "")
 

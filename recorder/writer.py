@@ -16,12 +16,15 @@ from fireworld.errors import OutputError, expected
 from fireworld.records import FORMAT, STEP_SECONDS, CityRecord, RunHeader, Snapshot, StepRecord
 from recorder.chain import Chain, step_messages
 from recorder.codec import encode, encode_snapshot
+from recorder.container import CHUNK_BYTES_MAX
 from recorder.header import METADATA_NAME, PROFILE, to_metadata
 from recorder.schema import PACKAGE, Commit, descriptors
 
 PARTIAL_SUFFIX: Final = ".partial"
 _STEP_NANOSECONDS: Final = STEP_SECONDS * 1_000_000_000
 _CHUNK_BYTES: Final = 1 << 40  # a chunk ends with its step, never before
+CHUNK_PAYLOAD_MAX: Final = CHUNK_BYTES_MAX - (1 << 20)
+"""Bytes of the messages of a chunk; the rest is for their heads, and for the schemas in the first one."""
 _MEDIA_TYPES: Final = {".yaml": "application/yaml", ".json": "application/json"}
 
 
@@ -66,6 +69,7 @@ class StepFile:
         self.path = path
         self.partial = path.with_name(path.name + (scratch_suffix or PARTIAL_SUFFIX))
         self.n_commits = 0
+        self._n_chunk_bytes = 0
         self._force = force
         self._keep_partial = not scratch_suffix
         self._open = False
@@ -87,7 +91,7 @@ class StepFile:
                 schema_id = self._writer.register_schema(channel.schema_name, "protobuf", channel.schema)
                 self._channel_ids[channel.topic] = self._writer.register_channel(channel.topic, "protobuf", schema_id)
             self._add(CityRecord.topic, city, step=0)
-            self._writer.flush()  # type: ignore[no-untyped-call]
+            self._flush()
 
     def commit(self, step: int, messages: Iterable[tuple[str, bytes]]) -> None:
         """Write the messages of a step, /commit last; when this returns a kill cannot lose them.
@@ -98,7 +102,7 @@ class StepFile:
         with self._guard():
             for topic, data in messages:
                 self._add(topic, data, step=step)
-            self._writer.flush()  # type: ignore[no-untyped-call]
+            self._flush()
             self.n_commits += 1
 
     def close(self) -> None:
@@ -145,7 +149,16 @@ class StepFile:
         """Whether the partial file is worth keeping."""
         return self._keep_partial and self.n_commits > 0
 
+    def _flush(self) -> None:
+        """End the chunk."""
+        self._writer.flush()  # type: ignore[no-untyped-call]
+        self._n_chunk_bytes = 0
+
     def _add(self, topic: str, data: bytes, *, step: int) -> None:
+        self._n_chunk_bytes += len(data)
+        if self._n_chunk_bytes > CHUNK_PAYLOAD_MAX:  # a reader would refuse it
+            wanted = f"at most {CHUNK_PAYLOAD_MAX} bytes in a step"
+            raise OutputError(expected(str(self.path), f"step {step}", wanted, f"{self._n_chunk_bytes} bytes"))
         time = step * _STEP_NANOSECONDS
         self._writer.add_message(self._channel_ids[topic], time, data, time, step)
 

@@ -4,3 +4,5 @@ import os
 
 # Tests call the inner kernels one by one; see fireworld.kernels.jit.
 os.environ["FIREWORLD_OPEN_KERNELS"] = "1"
+
+pytest_plugins = ["pytester"]

@@ -13,26 +13,72 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("log", metavar="LOG", type=click.Path(path_type=Path))
+@click.argument("log", metavar="[LOG]", required=False, type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Write JSON.")
-@click.option("--schema", is_flag=True, help="Write the messages of the log format as a .proto file instead.")
+@click.option("--schema", is_flag=True, help="Say which topics and fields it has: types, shapes, units, meaning.")
+@click.option("--proto", is_flag=True, help="Write the messages of this version's logs as a .proto file.")
 @click.pass_context
-def command(context: click.Context, *, log: Path, as_json: bool, schema: bool) -> None:
+def command(context: click.Context, *, log: Path | None, as_json: bool, schema: bool, proto: bool) -> None:
     """Say what LOG recorded, what it holds and how far it is good.
 
+    \b
+    fireworld info run.mcap             header, outcome, size of each topic
+    fireworld info run.mcap --schema    its topics and fields, those of a later version too
+    fireworld info --schema             those that this version writes
+
     Exit code: 0 good, 1 cut off or damaged but good up to a step, 2 not readable.
-    """
+    """  # noqa: D301 - click wants the character
     from recorder.reader import open_log
     from recorder.schema import PROTO
 
-    recording = open_log(log, partial=True)
-    if schema:
+    if schema and proto:
+        raise click.UsageError("--schema and --proto exclude each other.")
+    if log is None and not (schema or proto):
+        raise click.UsageError("Missing argument 'LOG'; only --schema and --proto do without.")
+    recording = None if log is None else open_log(log, partial=True)
+    if proto:
         click.echo(PROTO.read_text(encoding="utf-8"), nl=False)
-    elif as_json:
-        click.echo(json.dumps(_summary(recording), indent=2))
-    else:
-        _show(recording)
-    context.exit(0 if recording.damage is None else 1)
+    elif schema:
+        _show_schema(recording, as_json=as_json)
+    elif recording is not None:
+        if as_json:
+            click.echo(json.dumps(_summary(recording), indent=2))
+        else:
+            _show(recording)
+    context.exit(0 if recording is None or recording.damage is None else 1)
+
+
+def _show_schema(log: Log | None, *, as_json: bool) -> None:
+    """Say what the messages of a log are, or those that this version writes."""
+    from fireworld.errors import LogError, one_line
+    from fireworld.records import FORMAT
+    from recorder.describe import describe
+    from recorder.plain import plain
+    from recorder.recover import channels_of
+    from recorder.writer import own_channels
+
+    try:
+        topics = describe(own_channels() if log is None else channels_of(log))
+    except LogError as error:
+        raise LogError(f"{log.path}: {error}" if log is not None else str(error)) from None
+    if as_json:
+        click.echo(json.dumps({"format": FORMAT, "topics": plain(topics)}, indent=2))
+        return
+    click.echo(FORMAT)
+    for topic in topics:
+        phase = f" Phase: {topic.phase}." if topic.phase else ""
+        click.echo(
+            f"\n{one_line(topic.topic)}  {topic.doc if topic.known else 'Not known to this version; skipped.'}{phase}"
+        )
+        rows = [("no.", "field", "type", "shape", "unit", "meaning")]
+        rows += [
+            (str(item.number), item.name, item.type, item.shape and f"({item.shape},)", item.unit, item.doc)
+            for item in topic.fields
+        ]
+        widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]) - 1)]
+        for row in rows:
+            cells = [cell.ljust(width) for cell, width in zip(row[:-1], widths, strict=True)]
+            click.echo(one_line("  ".join(["", *cells, row[-1]]).rstrip()))
 
 
 def _summary(log: Log) -> dict[str, Any]:
@@ -75,6 +121,9 @@ def _ending(log: Log) -> str:
 
 
 def _show(log: Log) -> None:
+    """Say it for people; names in a recording are whoever's, so that what cannot be printed is escaped."""
+    from fireworld.errors import one_line
+
     summary = _summary(log)
     header, totals, steps = summary["header"], summary["totals"], summary["steps"]
     span = f"{steps['n']}, from {steps['first']} to {steps['last']}" if steps["n"] else "none"
@@ -100,7 +149,7 @@ def _show(log: Log) -> None:
     lines["attachments"] = ", ".join(f"{name} ({n} bytes)" for name, n in summary["attachments"].items()) or "none"
     for label, text in lines.items():
         if text:
-            click.echo(f"{label:<12} {text}")
+            click.echo(f"{label:<12} {one_line(text)}")
     click.echo(f"\n{'topic':<14} {'messages':>9} {'bytes':>13}")
     for topic, size in summary["topics"].items():
-        click.echo(f"{topic:<14} {size['n_messages']:>9} {size['n_bytes']:>13,}")
+        click.echo(f"{one_line(topic):<14} {size['n_messages']:>9} {size['n_bytes']:>13,}")

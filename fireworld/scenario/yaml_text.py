@@ -44,6 +44,16 @@ class _Reader(yaml.SafeLoader):
             raise _RefusedError("values without tags", f"the tag {event.tag}", event.start_mark)
         return super().compose_node(parent, index)
 
+    def construct_scalar(self, node: Any) -> Any:
+        """Join characters that JSON writes as two escapes; refuse half of such a pair, which is no text."""
+        text = super().construct_scalar(node)
+        if text.isascii():
+            return text
+        try:
+            return text.encode("utf-16", "surrogatepass").decode("utf-16")
+        except UnicodeDecodeError:
+            raise _RefusedError("Unicode text", "half a surrogate pair", node.start_mark) from None
+
     def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
         """Refuse keys that are written twice, or are not text."""
         mapping: dict[Any, Any] = {}
@@ -121,6 +131,8 @@ def read_yaml(text: bytes | str, *, source: str) -> Any:
         raise ScenarioError(expected(source, "", "YAML", _broken(str(error)))) from None
     except RecursionError:
         raise ScenarioError(expected(source, "", "YAML", "nesting that is too deep")) from None
+    except (ValueError, OverflowError):  # PyYAML does not check the numbers in \U escapes and in a %YAML line
+        raise ScenarioError(expected(source, "", "YAML", "broken text (a number beyond all bounds)")) from None
 
 
 def write_yaml(document: dict[str, Any]) -> str:

@@ -162,7 +162,7 @@ def test_a_recording_that_cannot_be_written(here, fireworld, files):
     ("policy", "message"),
     [
         ("Failing", "step 5, brigade 1: RuntimeError: lost the thread (policies.py, line "),
-        ("Wrong", "step 5, brigade 0: expected a Decision with an action from 0 to 3, got action 7"),
+        ("Wrong", "step 5, brigade 0: expected a Decision with an action from 0 to 4, got action 7"),
     ],
 )
 def test_a_policy_that_fails_leaves_the_steps_before(here, fireworld, files, policy, message):

@@ -5,11 +5,15 @@ import sys
 import types
 
 import pytest
+from google.protobuf import descriptor_pb2
 
 from fireworld.records import MemoryRecording
+from recorder.header import to_metadata
 from recorder.schema import PROTO
+from recorder.writer import Channel
 from tests.recorder import synthetic
 from tests.recorder.conftest import write_log
+from tests.recorder.test_damage import custom_log
 from tests.recorder.test_diff import altered
 
 
@@ -47,7 +51,88 @@ def test_info_of_a_complete_log(run_cli, log_path):
     assert facts["header"]["seed"] == "7"
     assert facts["topics"]["/commit"]["n_messages"] == 31
     assert facts["totals"]["n_burnt_out"] == 3
-    assert run_cli("info", log_path, "--schema") == (0, PROTO.read_text(encoding="utf-8"), "")
+    assert run_cli("info", log_path, "--proto") == (0, PROTO.read_text(encoding="utf-8"), "")
+    assert run_cli("info", "--proto") == run_cli("info", log_path, "--proto")
+
+
+def test_schema_of_a_log_and_of_this_version(run_cli, log_path, cut_log):
+    code, out, _ = run_cli("info", "--schema")
+    assert code == 0
+    assert out.startswith("fireworld-log/1\n\n/city  The city")
+    assert "/buildings  The fire after the step. Phase: fire.\n" in out
+    rows = [" ".join(line.split()) for line in out.splitlines()]
+    assert "4 water_litres repeated sfixed32 (n,) litres water lying on the building" in rows
+    assert "1 kind repeated uint32 (n_events,) index into EVENT_KINDS" in rows
+    assert "2 Array.dtype string numpy type, such as <f8" in rows
+    assert run_cli("info", log_path, "--schema") == (0, out, "")
+    assert run_cli("info", cut_log, "--schema") == (1, out, "")
+    code, out, _ = run_cli("info", "--schema", "--json")
+    facts = json.loads(out)
+    topics = {topic["topic"]: topic for topic in facts["topics"]}
+    assert (code, facts["format"], topics["/commit"]["message"]) == (0, "fireworld-log/1", "fireworld.log.v1.Commit")
+    assert topics["/buildings"]["phase"] == "fire"
+    assert topics["/buildings"]["fields"][1] == {
+        "number": 2,
+        "name": "energy",
+        "type": "repeated double",
+        "shape": "n",
+        "unit": "energy units",
+        "doc": "heat, energy units, exact",
+    }
+
+
+def test_schema_lists_what_a_later_version_added(run_cli, tmp_path, records, city):
+    files = descriptor_pb2.FileDescriptorSet()
+    message = files.file.add(name="a.proto", package="fireworld.log.v1").message_type.add(name="Ambulances")
+    kinds = descriptor_pb2.FieldDescriptorProto
+    message.field.add(name="x_m", number=7, label=kinds.LABEL_REPEATED, type=kinds.TYPE_DOUBLE)
+    message.field.add(name="mood", number=8, label=kinds.LABEL_OPTIONAL, type=kinds.TYPE_ENUM, type_name=".a.Mood")
+    extra = Channel("/ambulances", "fireworld.log.v1.Ambulances", files.SerializeToString())
+
+    def add(messages):
+        return [("/ambulances", b""), *messages]
+
+    path = custom_log(tmp_path / "later.mcap", records[:2], city, channels=[extra], change=add)
+    code, out, _ = run_cli("info", path, "--schema")
+    rows = [" ".join(line.split()) for line in out.splitlines()]
+    assert code == 0
+    assert "/ambulances Not known to this version; skipped." in rows
+    assert "7 x_m repeated double (any,)" in rows
+    assert "8 mood Mood" in rows
+    code, out, _ = run_cli("info", path, "--schema", "--json")
+    assert [topic["topic"] for topic in json.loads(out)["topics"] if not topic["known"]] == ["/ambulances"]
+    assert run_cli("diff", path, path)[0] == 0
+    broken = custom_log(tmp_path / "broken.mcap", records[:2], city, channels=[extra._replace(schema=b"\x0a\x09")])
+    code, out, err = run_cli("info", broken, "--schema")
+    assert (code, out) == (2, "")
+    assert "broken.mcap: the schema of /ambulances is no protobuf descriptor" in err
+
+
+@pytest.mark.parametrize("command", [("info",), ("info", "--schema"), ("verify",), ("export", "--parquet", "x")])
+def test_a_newer_major_version_is_refused_with_a_clear_message(run_cli, tmp_path, records, city, command):
+    path = tmp_path / "newer.mcap"
+    custom_log(path, records[:2], city, metadata=to_metadata(synthetic.header()) | {"format": "fireworld-log/2"})
+    code, out, err = run_cli(*command, path)
+    assert (code, out) == (2, "")
+    assert err == (
+        f"fireworld: {path}: format: expected fireworld-log/1, got 'fireworld-log/2';"
+        " it was written by a newer fireworld: try to upgrade\n"
+    )
+
+
+def test_names_in_a_log_cannot_steer_the_terminal(run_cli, tmp_path, records):
+    header = synthetic.header(policy="\x1b[2Jmine\nstate complete")
+    code, out, _ = run_cli("info", write_log(tmp_path / "a.mcap", records[:2], header=header))
+    assert code == 0
+    assert "policy       \\x1b[2Jmine\\nstate complete (" in out
+
+
+def test_info_needs_a_log_or_says_what_does_without(run_cli, tmp_path):
+    code, _, err = run_cli("info")
+    assert code == 2
+    assert "only --schema and --proto do without" in err
+    assert run_cli("info", "--schema", "--proto")[0] == 2
+    assert run_cli("info", tmp_path / "missing.mcap", "--schema")[0] == 2
 
 
 def test_info_of_a_cut_off_damaged_and_unreadable_log(run_cli, cut_log, log_path, tmp_path):

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tracemalloc
 
+import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
@@ -49,6 +50,8 @@ class Checker:
         self._path.write_bytes(original)
         self._original = original
         self._steps = raw_steps(self._path)
+        self._rescued = {}
+        self._n_checks = 0
 
     def check(self, data):
         """Return how many steps are readable, -1 if the log is not."""
@@ -64,7 +67,20 @@ class Checker:
         steps = raw_steps(self._path)
         assert steps == self._steps[: len(steps)]
         assert len(list(log)) == len(steps)
+        self._n_checks += 1
+        if steps and self._n_checks % 5 == 0:
+            self._check_recovery(log)
         return len(steps)
+
+    def _check_recovery(self, log):
+        """What is rescued is a whole log of these steps, and the same bytes whatever the damage was."""
+        output = self._path.with_name("rescued.mcap")
+        assert recover(self._path, output, force=True).digest == log.digest
+        data = output.read_bytes()
+        if self._rescued.setdefault(len(log), data) is data:
+            assert open_log(output).digest == log.digest
+            assert raw_steps(output) == self._steps[: len(log)]
+        assert data == self._rescued[len(log)]
 
 
 @pytest.fixture
@@ -261,6 +277,7 @@ def test_topics_and_fields_of_later_versions_are_skipped_and_kept_by_recover(tmp
     assert [record.step for record in log] == [0, 1, 2, 3]
     assert log.column("/buildings", "fuel_share").shape == (4, 12)
     assert log.topics["/ambulances"].n_messages == 4
+    assert [record.buildings for record in log][3].energy.tolist() == records[3].buildings.energy.tolist()
     recover(path, tmp_path / "copy.mcap")
     assert (tmp_path / "copy.mcap").read_bytes() == path.read_bytes()
 
@@ -366,3 +383,52 @@ def test_a_log_rewritten_by_another_tool_is_the_same_run(tmp_path, log_path, opt
     assert [record.step for record in log] == list(range(31))
     assert log.step(20).snapshot is not None
     assert log.column("/buildings", "fuel_share").shape == (31, 12)
+
+
+def odd_log(path, city, messages):
+    """Write a log of steps given as (number, messages), every hash and checksum right."""
+    chain = Chain(encode(city))
+    with StepFile(
+        path,
+        metadata=to_metadata(synthetic.header()),
+        attachments=synthetic.header().attachments,
+        channels=own_channels(),
+        city=encode(city),
+        force=False,
+    ) as file:
+        for number, step in messages:
+            for topic, data in step:
+                chain.add(topic, data)
+            commit = chain.commit(step=number, terminated=False, truncated=False)
+            file.commit(0, [*step, (Commit.topic, encode(commit))])
+    return open_log(path, partial=True)
+
+
+@pytest.mark.parametrize("number", [-1, 307_445_735, 2**31 - 1])
+def test_a_step_whose_time_cannot_be_written_is_not_accepted(tmp_path, records, city, number):
+    log = odd_log(tmp_path / "a.mcap", city, [(0, step_messages(records[0])), (number, step_messages(records[1]))])
+    if number < 0:
+        assert log.damage == "damaged: a step has the number -1; good up to step 0"
+    assert len(log) == 1
+    assert recover(log.path, tmp_path / "b.mcap").n_steps == 1
+
+
+def test_a_topic_twice_in_a_step_is_not_accepted(tmp_path, records, city):
+    messages = step_messages(records[1])
+    log = odd_log(tmp_path / "a.mcap", city, [(0, step_messages(records[0])), (1, [*messages, messages[3]])])
+    assert log.damage == "damaged: a step holds /brigades twice; good up to step 0"
+
+
+def test_a_step_too_large_to_be_read_is_not_written(tmp_path, records, city, monkeypatch):
+    monkeypatch.setattr("recorder.writer.CHUNK_PAYLOAD_MAX", 20_000)
+    large = dataclasses.replace(records[1].events, kind=np.full(9000, 2, np.uint8), entity=np.zeros(9000, np.int32))
+    with pytest.raises(OutputError, match=r"a\.mcap: step 1: expected at most 20000 bytes in a step, got \d+ bytes"):
+        write_log(tmp_path / "a.mcap", [records[0], dataclasses.replace(records[1], events=large)], city=city)
+    assert len(open_log(tmp_path / "a.mcap.partial", partial=True)) == 1
+
+
+@pytest.mark.parametrize("seed", [str(2**63), str(-(2**63) - 1), "nine"])
+def test_a_seed_that_is_no_number_of_64_bits_is_refused(tmp_path, records, city, seed):
+    path = custom_log(tmp_path / "a.mcap", records[:1], city, header=synthetic.header(seed=seed))
+    with pytest.raises(LogError, match="seed: expected a whole number"):
+        open_log(path)

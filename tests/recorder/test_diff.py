@@ -8,7 +8,7 @@ import pytest
 from fireworld.errors import LogError
 from fireworld.records import ACTIONS, MemoryRecording, Snapshot
 from recorder.diff import compare
-from recorder.match import find, first_unequal
+from recorder.match import find, unequal_entries
 from recorder.reader import open_log
 from recorder.schema import TOPICS, message_of
 from recorder.verify import verify
@@ -218,13 +218,14 @@ def test_unknown_names_are_refused_with_the_nearest(run):
     ],
 )
 def test_equality_of_special_numbers(a, b, tolerance, index):
-    assert first_unequal(np.array(a), np.array(b), tolerance) == index
+    unequal = unequal_entries(np.array(a), np.array(b), tolerance)
+    assert (None if unequal is None else int(unequal.argmax())) == index
 
 
 def test_unsigned_numbers_are_compared_without_wrapping():
     a, b = np.array([3], np.uint8), np.array([5], np.uint8)
-    assert first_unequal(a, b, 1.0) == 0
-    assert first_unequal(a, b, 2.0) is None
+    assert unequal_entries(a, b, 1.0).tolist() == [True]
+    assert unequal_entries(a, b, 2.0) is None
     (key,) = (item for item in message_of(TOPICS[1]).fields if item.name == "key")
     assert find(key, 2**64 - 1, 2**64 - 2) is not None
 

@@ -93,3 +93,22 @@ def test_any_text_is_read_or_refused(text):
         assert "\n" not in str(error)  # noqa: PT017 -- either outcome is right
     else:
         assert not isinstance(value, float) or math.isfinite(value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (r'a: "\ud800"', "a.yaml: line 1, column 4: expected Unicode text, got half a surrogate pair"),
+        (r'a: "\U00110000"', "a.yaml: expected YAML, got broken text (a number beyond all bounds)"),
+        (r'a: "\Uffffffff"', "a.yaml: expected YAML, got broken text (a number beyond all bounds)"),
+        ("%YAML " + "9" * 5000 + ".1\n--- 1", "a.yaml: expected YAML, got broken text (a number beyond all bounds)"),
+    ],
+)
+def test_escapes_that_are_no_characters_are_refused(text, message):
+    with pytest.raises(ScenarioError) as caught:
+        read_yaml(text, source="a.yaml")
+    assert str(caught.value) == message
+
+
+def test_a_character_that_json_writes_as_two_escapes_is_one():
+    assert read_yaml(r'"\ud83d\udd25"', source="a.yaml") == "\N{FIRE}"

@@ -1,0 +1,100 @@
+"""A comparison of two recordings as JUnit XML, which CI servers show: a test case for each topic."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+from fireworld.records import STEP_TOPICS, Snapshot
+
+if TYPE_CHECKING:
+    from recorder.diff import Difference
+    from recorder.match import Rules
+
+COMMIT: Final = "/commit"
+LENGTH: Final = "length"
+"""The case of steps that only one run has."""
+_FORBIDDEN: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""Characters that XML cannot hold; a file's name can."""
+
+
+def junit_xml(difference: Difference, rules: Rules, *, paths: tuple[Path, Path]) -> bytes:
+    """Write a comparison as a suite with a test case for each topic, in the order in which things happen.
+
+    A topic that differs is a failure whose message, and text, is its first difference; one that was left out is
+    skipped. The class of all cases is made of the first recording's path, so that several goldens stay apart.
+
+    Args:
+        difference: what was found.
+        rules: by which it was found.
+        paths: of the two recordings.
+    """
+    class_name = ".".join(["fireworld", "diff", *_words(paths[0])])
+    cases = [_case(name, class_name, difference, rules) for name in _names()]
+    counts = {
+        "tests": str(len(cases)),
+        "failures": str(sum(case.find("failure") is not None for case in cases)),
+        "errors": "0",
+        "skipped": str(sum(case.find("skipped") is not None for case in cases)),
+    }
+    root = Element("testsuites", {"name": "fireworld diff", **counts})
+    suite = SubElement(root, "testsuite", {"name": _clean(f"{paths[0]} and {paths[1]}"), **counts})
+    if difference.header:
+        properties = SubElement(suite, "properties")
+        for key, (a, b) in difference.header.items():
+            SubElement(properties, "property", {"name": key, "value": _clean(f"{b}, was {a}")})
+    suite.extend(cases)
+    indent(root)
+    text: bytes = tostring(root, encoding="utf-8", xml_declaration=True)
+    return text + b"\n"
+
+
+def _names() -> Iterator[str]:
+    yield from (topic.topic for topic in STEP_TOPICS)
+    yield from (Snapshot.topic, COMMIT, LENGTH)
+
+
+def _case(name: str, class_name: str, difference: Difference, rules: Rules) -> Element:
+    case = Element("testcase", {"classname": class_name, "name": name.removeprefix("/"), "time": "0"})
+    failure = _failure(name, difference)
+    if failure is not None:
+        sentence, details = failure
+        message = {"message": _clean(sentence), "type": "difference"}
+        SubElement(case, "failure", message).text = _clean(f"{sentence}\n{details}")
+    elif not _is_compared(name, rules):
+        SubElement(case, "skipped", {"message": "left out by --ignore or --tolerance"})
+    return case
+
+
+def _failure(name: str, difference: Difference) -> tuple[str, str] | None:
+    """Return the first difference of a topic and how often it differs, or None."""
+    if name == LENGTH:
+        first, (a, b) = difference.first, difference.totals
+        if first is not None and first.phase == LENGTH:
+            return first.sentence, f"{b.n_steps} steps, was {a.n_steps}"
+        return (f"{b.n_steps} steps, was {a.n_steps}", "") if a.n_steps != b.n_steps else None
+    if name not in difference.first_by_topic:
+        return None
+    n = difference.n_steps_differing[name]
+    return difference.first_by_topic[name].sentence, f"differs in {n} of {difference.n_steps_compared} steps"
+
+
+def _is_compared(name: str, rules: Rules) -> bool:
+    if name == LENGTH:
+        return True
+    if name == Snapshot.topic:
+        return rules.snapshots
+    return bool(rules.endings if name == COMMIT else rules.fields[name])
+
+
+def _words(path: Path) -> list[str]:
+    """Return the parts of a path as words of a class name, which dots separate."""
+    parts = [re.sub(r"[^\w-]+", "_", part) for part in path.with_suffix("").parts]
+    return [part for part in parts if part.strip("_")]
+
+
+def _clean(text: str) -> str:
+    return _FORBIDDEN.sub("?", text)

@@ -1,0 +1,296 @@
+"""`fireworld export`: what is in the tables is what is in the log, and a folder is there only when it is complete."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from fireworld import records
+from fireworld.errors import LogError, OutputError
+from fireworld.records import ACTIONS, EVENT_KINDS, FIERYNESS
+from recorder import open_log
+from recorder.tables import TABLES
+from tests.recorder.conftest import write_log
+
+parquet = pytest.importorskip("recorder.parquet")
+
+
+@pytest.fixture(scope="module")
+def exported(log_path, tmp_path_factory):
+    """All tables of the log of 31 steps, in groups of far fewer rows than it has."""
+    folder = tmp_path_factory.mktemp("export") / "run"
+    parquet.export(open_log(log_path), folder, rows_per_group=100)
+    return folder
+
+
+def table_of(folder, name):
+    return pq.read_table(folder / f"{name}.parquet")
+
+
+def values_of(table, name):
+    return table.column(name).to_numpy(zero_copy_only=False)
+
+
+@pytest.mark.parametrize(
+    ("table", "topic", "skipped"),
+    [
+        ("buildings", records.Buildings, ()),
+        ("brigades", records.Brigades, ()),
+        ("civilians", records.Civilians, ()),
+        ("events", records.Events, ()),
+        ("decisions", records.Decisions, ("q_values", "epsilon")),
+    ],
+)
+def test_rows_are_those_that_the_reader_gives(exported, log_path, table, topic, skipped):
+    log, found = open_log(log_path), table_of(exported, table)
+    names = [item.name for item in dataclasses.fields(topic) if item.name not in skipped]
+    for name in names:
+        arrays = log.ragged(topic.topic, name)
+        if not any(map(len, arrays)):
+            assert found.column(name).null_count == found.num_rows
+            continue
+        assert values_of(found, name).tolist() == np.concatenate(arrays).tolist(), name
+        lengths = [len(array) for array in arrays]
+        assert values_of(found, "step").tolist() == np.repeat(log.steps, lengths).tolist()
+        assert values_of(found, found.schema.names[1]).tolist() == [k for n in lengths for k in range(n)]
+        dtype = arrays[0].dtype
+        assert found.schema.field(name).type == pa.from_numpy_dtype(dtype)
+
+
+def test_sites_are_those_that_the_reader_gives(exported, log_path):
+    log, found = open_log(log_path), table_of(exported, "sites")
+    assert found.schema.names[:2] == ["step", "site_id"]
+    for name in found.schema.names[1:]:
+        assert values_of(found, name).tolist() == np.concatenate(log.ragged("/observations", name)).tolist()
+
+
+def test_a_step_is_a_row_with_luck_reward_score_and_ending(exported, log_path):
+    log, found = open_log(log_path), table_of(exported, "steps")
+    assert found.num_rows == 31
+    for column, topic, name in (
+        ("draw_key", "/draws", "key"),
+        ("epsilon", "/decisions", "epsilon"),
+        ("reward_total", "/rewards", "total"),
+        ("reward_sum_so_far", "/rewards", "sum_so_far"),
+        ("score", "/score", "score"),
+        ("n_burnt_out", "/score", "n_burnt_out"),
+    ):
+        assert values_of(found, column).tolist() == log.column(topic, name).tolist()
+    assert values_of(found, "truncated").tolist() == [False] * 30 + [True]
+
+
+def test_decisions_have_features_names_and_a_value_for_each_action(exported, log_path):
+    log, rows = open_log(log_path), table_of(exported, "decisions").to_pylist()
+    assert len(rows) == 30 * 3
+    row, step = rows[7], log.step(3)
+    assert (row["step"], row["brigade"]) == (3, 1)
+    assert row["state_index"] == step.observations.state_index[1]
+    assert (row["action"], row["action_name"]) == (1, "nearest-to-civilian")
+    assert row["distance_from_center_name"] == "medium"
+    values = [row["q_" + action.replace("-", "_")] for action in ACTIONS]
+    assert values == step.decisions.q_values[4:8].tolist()
+
+
+def test_names_stand_beside_the_numbers(exported):
+    rows = table_of(exported, "events").to_pylist()
+    assert {row["kind_name"] for row in rows} == {EVENT_KINDS[2]}
+    buildings = table_of(exported, "buildings").to_pylist()
+    assert all(row["fieryness_name"] == FIERYNESS[row["fieryness"]] for row in buildings)
+
+
+def test_the_city_has_a_row_for_each_building(exported, city):
+    found = table_of(exported, "city")
+    assert found.num_rows == 12
+    assert found.column("building").to_pylist() == list(range(12))
+    assert found.column("building_id").to_pylist() == city.building_id.tolist()
+    assert found.column("heat_capacity").to_pylist() == city.heat_capacity.tolist()
+    assert found.column("material_name").to_pylist()[:3] == ["wood", "steel", "concrete"]
+
+
+def test_units_and_the_run_are_in_the_metadata(exported, log_path):
+    schema = pq.read_schema(exported / "buildings.parquet")
+    assert schema.field("water_litres").metadata[b"unit"] == b"litres"
+    assert schema.field("temperature").metadata[b"unit"] == b"degrees above ambient"
+    assert schema.field("temperature").metadata[b"doc"].startswith(b"degrees above ambient, to the nearest 1/64")
+    assert b"unit" not in schema.field("fieryness").metadata
+    facts = {key.decode(): text.decode() for key, text in schema.metadata.items()}
+    assert (facts["fireworld.scenario"], facts["fireworld.seed"]) == ("synthetic", "7")
+    assert facts["fireworld.digest"] == open_log(log_path).digest
+    assert facts["fireworld.state"] == "complete"
+    assert json.loads(facts["fireworld.units"])["energy"] == "energy units"
+
+
+def test_every_length_and_amount_has_a_unit():
+    columns = [column for table in TABLES.values() for column in table.columns]
+    for column in columns:
+        if column.name.endswith(("_m", "_m2", "_m3", "_litres")):
+            assert column.unit == column.name.rpartition("_")[2]
+    assert {column.unit for column in columns if column.name == "hp"} == {"health points"}
+
+
+def test_rows_are_written_in_groups_so_that_memory_does_not_grow_with_the_log(exported):
+    file = pq.ParquetFile(exported / "buildings.parquet").metadata
+    sizes = [file.row_group(k).num_rows for k in range(file.num_row_groups)]
+    assert sum(sizes) == 31 * 12
+    assert max(sizes) < 100 + 12
+    assert len(sizes) == 4
+
+
+def test_the_same_log_gives_the_same_bytes(exported, log_path, tmp_path):
+    parquet.export(open_log(log_path), tmp_path / "again", rows_per_group=100)
+    for name in TABLES:
+        assert (tmp_path / "again" / f"{name}.parquet").read_bytes() == (exported / f"{name}.parquet").read_bytes()
+
+
+def test_an_empty_field_is_null_and_an_unnamed_number_too(tmp_path, records, city):
+    silent = dataclasses.replace(
+        records[1].decisions, q_values=np.empty(0), td_error=np.empty(0), action=np.array([-1, 0, 9], np.int32)
+    )
+    steps = [records[0], dataclasses.replace(records[1], decisions=silent), records[2]]
+    parquet.export(open_log(write_log(tmp_path / "a.mcap", steps, city=city)), tmp_path / "a", tables=["decisions"])
+    rows = table_of(tmp_path / "a", "decisions").to_pylist()
+    assert [row["action_name"] for row in rows[:3]] == [None, "easiest", None]
+    assert [row["action"] for row in rows[:3]] == [-1, 0, 9]
+    assert [row["q_easiest"] is None for row in rows] == [True] * 3 + [False] * 3
+    assert [row["td_error"] is None for row in rows] == [True] * 3 + [False] * 3
+
+
+def test_a_log_without_steps_has_tables_without_rows(tmp_path, city):
+    rows = parquet.export(open_log(write_log(tmp_path / "a.mcap", [], city=city)), tmp_path / "a")
+    assert rows.pop("city") == 12
+    assert set(rows.values()) == {0}
+    assert table_of(tmp_path / "a", "buildings").schema.names[:2] == ["step", "building"]
+
+
+def test_fields_of_different_lengths_are_refused_and_nothing_is_left(tmp_path, records, city):
+    wrong = dataclasses.replace(records[2].brigades, hp=np.array([1, 2], np.int32))
+    steps = [*records[:2], dataclasses.replace(records[2], brigades=wrong)]
+    log = open_log(write_log(tmp_path / "a.mcap", steps, city=city))
+    with pytest.raises(LogError, match=r"a\.mcap: step 2: brigades: expected 3 values in every field, got 2"):
+        parquet.export(log, tmp_path / "out")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]
+
+
+def test_a_partial_log_is_exported_as_far_as_it_is_good(run_cli, log_path, tmp_path):
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(log_path.read_bytes()[:30_000])
+    n_steps = len(open_log(cut, partial=True))
+    code, out, err = run_cli("export", cut, "--parquet", tmp_path / "cut")
+    assert code == 0
+    assert f"buildings.parquet: {n_steps * 12:,} rows" in out
+    assert "partial: the file ends inside a record; good up to step" in err
+    assert f"exported {n_steps} committed steps" in err
+    assert pq.read_schema(tmp_path / "cut" / "steps.parquet").metadata[b"fireworld.state"] == b"partial"
+    code, out, _ = run_cli("export", cut, "--parquet", tmp_path / "b", "--json", "--tables", "steps, events")
+    facts = json.loads(out)
+    assert (code, facts["state"], sorted(facts["n_rows"])) == (0, "partial", ["events", "steps"])
+    assert sorted(path.name for path in (tmp_path / "b").iterdir()) == ["events.parquet", "steps.parquet"]
+
+
+def test_export_replaces_only_an_export_and_only_with_force(run_cli, log_path, tmp_path):
+    out = tmp_path / "out"
+    out.mkdir()
+    assert run_cli("export", log_path, "--parquet", out, "--tables", "city")[0] == 0
+    code, _, err = run_cli("export", log_path, "--parquet", out)
+    assert code == 2
+    assert "--force replaces it" in err
+    assert run_cli("export", log_path, "--parquet", out, "--tables", "steps", "--force")[0] == 0
+    assert [path.name for path in out.iterdir()] == ["steps.parquet"]
+    (out / "notes.txt").write_text("mine")
+    code, _, err = run_cli("export", log_path, "--parquet", out, "--force")
+    assert code == 2
+    assert "notes.txt in it" in err
+    code, _, err = run_cli("export", log_path, "--parquet", log_path, "--force")
+    assert code == 2
+    assert "a file" in err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--tables", "streets"), "expected some of city, buildings, brigades"),
+        (("missing",), "No such file"),
+        (("no/such/folder",), "cannot be written"),
+    ],
+)
+def test_mistakes_are_refused_and_leave_nothing(run_cli, log_path, tmp_path, words, message):
+    log = tmp_path / "missing.mcap" if words == ("missing",) else log_path
+    folder = tmp_path / words[0] / "x" if "folder" in words[0] else tmp_path / "x"
+    code, out, err = run_cli("export", log, "--parquet", folder, *(words if words[0] == "--tables" else ()))
+    assert (code, out) == (2, "")
+    assert message in " ".join(err.split())
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupt_leaves_the_earlier_export_alone(log_path, tmp_path):
+    log = open_log(log_path)
+    parquet.export(log, tmp_path / "out", tables=["city"])
+
+    def interrupt(record):
+        if record.step == 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        parquet.export(log, tmp_path / "out", force=True, on_step=interrupt)
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["city.parquet"]
+
+
+def test_the_earlier_export_stays_if_the_new_one_cannot_take_its_place(log_path, tmp_path, monkeypatch):
+    log = open_log(log_path)
+    parquet.export(log, tmp_path / "out", tables=["city"])
+    rename = Path.rename
+
+    def refuse(self, target):
+        if self.name == "out.partial":
+            raise OSError(28, "No space left on device")
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "rename", refuse)
+    with pytest.raises(OutputError, match="out: cannot be written: No space left on device"):
+        parquet.export(log, tmp_path / "out", force=True)
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["city.parquet"]
+
+
+def test_a_leftover_of_a_killed_export_is_replaced_and_a_foreign_folder_is_not(log_path, tmp_path):
+    log = open_log(log_path)
+    (tmp_path / "out.partial").mkdir()
+    (tmp_path / "out.partial" / "city.parquet").write_bytes(b"half")
+    parquet.export(log, tmp_path / "out", tables=["city"])
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    (tmp_path / "b.partial").mkdir()
+    (tmp_path / "b.partial" / "thesis.tex").write_bytes(b"")
+    with pytest.raises(OutputError, match=r"b\.partial: expected .* thesis\.tex in it"):
+        parquet.export(log, tmp_path / "b")
+    assert (tmp_path / "b.partial" / "thesis.tex").exists()
+
+
+def test_without_pyarrow_it_says_what_to_install(run_cli, log_path, tmp_path, monkeypatch):
+    monkeypatch.setattr("fireworld.cli.export.find_spec", lambda _: None)
+    code, _, err = run_cli("export", log_path, "--parquet", tmp_path / "out")
+    assert code == 2
+    assert "pip install 'fireworld[archive]'" in err
+
+
+def test_opens_in_pandas(exported):
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.read_parquet(exported / "buildings.parquet")
+    assert frame.groupby("step")["energy"].sum().shape == (31,)
+
+
+def test_opens_in_polars(exported):
+    polars = pytest.importorskip("polars")
+    frame = polars.read_parquet(exported / "decisions.parquet")
+    assert set(frame["action_name"]) <= set(ACTIONS)
+
+
+def test_opens_in_duckdb(exported):
+    duckdb = pytest.importorskip("duckdb")
+    found = duckdb.read_parquet(str(exported / "buildings.parquet")).aggregate("max(step), count(*)").fetchone()
+    assert found == (30, 31 * 12)
