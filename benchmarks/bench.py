@@ -20,6 +20,7 @@ SECTIONS: Final = {
     "city": "city_rows",
     "log": "log_rows",
     "view": "view_rows",
+    "compare": "compare_rows",
     "start-up": "start_rows",
 }
 """Module of each section; each has `rows(*, quick) -> Iterator[Row]`."""

@@ -12,6 +12,7 @@ import click
 from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.interrupt import gentle_interrupt
+from fireworld.policy.shipped import team_names
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,7 +22,8 @@ if TYPE_CHECKING:
 
 POLICIES_HELP: Final = (
     "easiest, nearest-to-civilian, nearest-to-center, nearest-to-me, each-another, random, chief, "
-    "planner (planner:horizon=30,interval=4,rollouts=1), a team file (TEAM.npz), or MODULE:CLASS of your own."
+    "planner (planner:horizon=30,interval=4,rollouts=1), "
+    f"{', '.join(team_names())} (teams), a team file (TEAM.npz), or MODULE:CLASS of your own."
 )
 
 
@@ -69,20 +71,20 @@ def command(
 
     named = load_policy(policy)
     chosen = load_scenario(scenario).with_settings(split_settings(settings))
-    note = note_on_team(named, chosen.brigades.n)
+    note = note_on_team(named, chosen.brigades.n, choices=chosen.choices)
     if note:
         click.echo(note, err=True)
     run = prepare_run(build_stage(chosen), named, seed=seed, n_steps_max=steps)
-    last, digest = _carry_out(run, output=output, force=force, quiet=as_json)
-    outcome = _outcome(run, last, digest=digest, output=output)
+    last, digest = carry_out(run, output=output, force=force, quiet=as_json)
+    outcome = outcome_of(run, last, digest=digest, output=output)
     if as_json:
         click.echo(json.dumps(outcome, indent=2))
     else:
-        _show(outcome)
+        show_outcome(outcome)
     context.exit(INTERRUPTED if outcome["ended"] == "interrupted" else 0)
 
 
-def _carry_out(run: Run, *, output: Path | None, force: bool, quiet: bool) -> tuple[StepRecord, str]:
+def carry_out(run: Run, *, output: Path | None, force: bool, quiet: bool) -> tuple[StepRecord, str]:
     """Let a run happen, recorded if there is an output; return its last record and its digest.
 
     Raises:
@@ -143,7 +145,7 @@ def _with_progress(run: Run, *, quiet: bool) -> Iterator[StepRecord]:
             yield record
 
 
-def _outcome(run: Run, last: StepRecord, *, digest: str, output: Path | None) -> dict[str, Any]:
+def outcome_of(run: Run, last: StepRecord, *, digest: str, output: Path | None) -> dict[str, Any]:
     """Collect how a run ended."""
     score = last.score
     ended = "terminated" if last.terminated else "truncated" if last.truncated else "interrupted"
@@ -170,7 +172,7 @@ def _outcome(run: Run, last: StepRecord, *, digest: str, output: Path | None) ->
     }
 
 
-def _show(outcome: dict[str, Any]) -> None:
+def show_outcome(outcome: dict[str, Any]) -> None:
     """Show the outcome as a table."""
     from rich.console import Console
     from rich.table import Table

@@ -1,0 +1,220 @@
+"""`fireworld fork`: go on from a step of a recording with another decision or policy."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from fireworld.cli import INTERRUPTED
+from fireworld.cli.compiling import announce_compilation
+
+if TYPE_CHECKING:
+    from fireworld.forks.fork import Change, Swap
+    from fireworld.forks.resume import Resumed
+    from fireworld.policy.names import NamedPolicy
+    from fireworld.records import MemoryRecording
+    from recorder.reader import Log
+
+RECORDED: Final = "recorded"
+"""Names the policy that decides as is recorded, whatever happens."""
+
+
+@click.command()
+@click.argument("log", metavar="LOG", type=click.Path(path_type=Path))
+@click.option("--at", "step", required=True, metavar="STEP", type=click.IntRange(min=0), help="Go on after this step.")
+@click.option(
+    "--policy",
+    metavar="POLICY",
+    help="Who goes on: a policy as for `fireworld run`, which begins anew here, or `recorded`: the decisions recorded "
+    "in LOG, whatever happens.  [default: LOG's policy, which remembers what it saw]",
+)
+@click.option(
+    "--decide",
+    "decided",
+    metavar="BRIGADE=ACTION",
+    multiple=True,
+    help="What a brigade does in step STEP+1, unasked; repeatable.",
+)
+@click.option(
+    "--swap",
+    "swapped",
+    metavar="OTHER:BRIGADE",
+    multiple=True,
+    help="From step STEP+1 on that brigade does what it did in the recording OTHER, of the same scenario and seed; "
+    "repeatable.",
+)
+@click.option(
+    "--record", "output", metavar="FILE.mcap", type=click.Path(path_type=Path), help="Record every step to a file."
+)
+@click.option("--force", is_flag=True, help="Replace an existing recording.")
+@click.option("--json", "as_json", is_flag=True, help="Write the outcome as JSON.")
+@click.pass_context
+def command(
+    context: click.Context,
+    *,
+    log: Path,
+    step: int,
+    policy: str | None,
+    decided: tuple[str, ...],
+    swapped: tuple[str, ...],
+    output: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Take the recorded run LOG up again after STEP, let something be otherwise, and show how it ends then.
+
+    \b
+    fireworld fork a.mcap --at 14 --decide 2=nearest-to-me --record b.mcap
+    fireworld fork a.mcap --at 14 --policy planner --record b.mcap
+    fireworld fork a.mcap --at 14 --swap other.mcap:2 --record b.mcap
+    fireworld diff a.mcap b.mcap
+
+    The steps up to STEP are copied, and those from the last snapshot before it are computed again and compared. What
+    comes after is decided anew: once a decision is another, so is the world, and what is recorded no longer answers
+    it. So the policy is asked, the luck stays the same. If nothing is changed the fork is the same as LOG, to the bit.
+
+    A swapped brigade that may choose where it had no choice in OTHER (it refilled there, or OTHER has ended) goes on
+    with what it last did there.
+
+    Exit code: 0 forked, 2 could not fork (among others: LOG does not replay to what is recorded), 130 interrupted (the
+    recording keeps every step done).
+    """  # noqa: D301 - click wants the character
+    if force and output is None:
+        raise click.UsageError("--force goes with --record.")
+    announce_compilation()
+    from fireworld.cli.run import carry_out, outcome_of, show_outcome
+    from fireworld.forks.fork import Change, prepare_fork
+    from fireworld.forks.resume import has_memory, resume
+    from fireworld.policy.asking import begin
+    from fireworld.policy.names import note_on_team
+    from fireworld.replay import recorded_stage
+    from recorder.reader import open_log
+
+    original = open_log(log)
+    beginning = recorded_up_to(original, step)
+    named = _policy(original, policy)
+    change = Change(named, decided=_decided(decided), swaps=_swaps(swapped))
+    _check_told_once(change)
+    remembering = named if policy is None and has_memory(named.policy) else None
+    stage = recorded_stage(original.header)
+    resumed = resume(stage, beginning, source=str(log), remembering=remembering)
+    check_replay(resumed, source=str(log))
+    if remembering is None:
+        begin(named.policy, resumed.world.tables, n_brigades=resumed.world.n_brigades, seed=original.header.seed)
+    run = prepare_fork(resumed, change, original, list(beginning), digest=original.digest, source=str(log))
+    note = note_on_team(named, resumed.world.n_brigades, choices=stage.scenario.choices)
+    if note:
+        click.echo(note, err=True)
+    last, digest = carry_out(run, output=output, force=force, quiet=as_json)
+    outcome = outcome_of(run, last, digest=digest, output=output)
+    before = original.step(int(original.steps[-1])).score.score
+    if as_json:
+        click.echo(
+            json.dumps({**outcome, "forked_from": run.header.forked_from, "score_of_original": before}, indent=2)
+        )
+    else:
+        show_outcome(outcome)
+        same = "; the same run" if digest == original.digest else f", where the score was {before:.3f}"
+        click.echo(f"forked from {log} after step {step}{same}")
+    context.exit(INTERRUPTED if outcome["ended"] == "interrupted" else 0)
+
+
+def recorded_up_to(log: Log, step: int) -> MemoryRecording:
+    """Read the steps of a log up to one of them.
+
+    Raises:
+        LogError: the log has no such step.
+    """
+    from itertools import takewhile
+
+    from fireworld.errors import LogError, expected
+    from fireworld.records import MemoryRecording
+
+    if step not in log.steps:
+        held = f"a step of {log.path}, {log.steps[0]} to {log.steps[-1]}" if len(log) else f"steps in {log.path}"
+        raise LogError(expected("--at", "", held, step if len(log) else "none"))
+    return MemoryRecording(log.header, log.city, [*takewhile(lambda record: record.step <= step, log)])
+
+
+def check_replay(resumed: Resumed, *, source: str) -> None:
+    """Hold the steps that were computed again against those recorded.
+
+    Raises:
+        LogError: they differ; names the first step.
+    """
+    from fireworld.errors import LogError
+    from recorder.diff import compare
+
+    first = compare(resumed.recorded, resumed.replayed).first
+    if first is not None:
+        raise LogError(
+            f"{source}: does not replay to what is recorded: {first.sentence}; see `fireworld verify {source}`"
+        )
+
+
+def _policy(log: Log, name: str | None) -> NamedPolicy:
+    """Return who goes on."""
+    from fireworld.forks.decisions import RecordedDecisions
+    from fireworld.forks.resume import recorded_policy
+    from fireworld.policy.names import NamedPolicy, load_policy
+
+    if RECORDED in {name, log.header.policy if name is None else None}:
+        return NamedPolicy(RECORDED, log.digest, RecordedDecisions(log))
+    return load_policy(name) if name is not None else recorded_policy(log.header, source=str(log.path))
+
+
+def _decided(texts: tuple[str, ...]) -> dict[int, int]:
+    """Read BRIGADE=ACTION.
+
+    Raises:
+        PolicyError: there is no such action.
+    """
+    from difflib import get_close_matches
+
+    from fireworld.errors import PolicyError, expected
+    from fireworld.records import ACTIONS
+
+    decided: dict[int, int] = {}
+    for text in texts:
+        number, _, action = text.partition("=")
+        if not (number.isascii() and number.isdecimal() and action):
+            raise click.UsageError(f"--decide: expected BRIGADE=ACTION as in 2=nearest-to-me, got {text!r}")
+        if action not in ACTIONS:
+            near = [name for name in ACTIONS if action in name] or get_close_matches(action, ACTIONS, n=1)
+            hint = "try " + " or ".join(near) if near else ""
+            raise PolicyError(expected("--decide", number, "one of " + ", ".join(ACTIONS), action, hint))
+        if int(number) in decided:
+            raise click.UsageError(f"--decide: expected one action for brigade {int(number)}, got two")
+        decided[int(number)] = ACTIONS.index(action)
+    return decided
+
+
+def _swaps(texts: tuple[str, ...]) -> list[Swap]:
+    """Read OTHER:BRIGADE and the recordings it names."""
+    from fireworld.forks.decisions import RecordedDecisions
+    from fireworld.forks.fork import Swap
+    from recorder.reader import open_log
+
+    logs: dict[str, tuple[Log, RecordedDecisions]] = {}
+    swaps: list[Swap] = []
+    for text in texts:
+        path, _, number = text.rpartition(":")
+        if not (path and number.isascii() and number.isdecimal()):
+            raise click.UsageError(f"--swap: expected OTHER:BRIGADE as in other.mcap:2, got {text!r}")
+        if path not in logs:
+            other = open_log(path)
+            logs[path] = other, RecordedDecisions(other)
+        other, decisions = logs[path]
+        swaps.append(Swap(int(number), name=path, digest=other.digest, header=other.header, decisions=decisions))
+    return swaps
+
+
+def _check_told_once(change: Change) -> None:
+    """Refuse two orders for one brigade."""
+    brigades = [*change.decided, *(swap.brigade for swap in change.swaps)]
+    for brigade in brigades:
+        if brigades.count(brigade) > 1:
+            raise click.UsageError(f"--decide, --swap: expected one of them for brigade {brigade}, once")

@@ -1,0 +1,231 @@
+"""Two policies on the same scenarios and seeds, compared run by run: differences, verdicts, and the gate made of them.
+
+B is the new policy, A the reference; every difference is B less A. Both meet the same luck, so the pairs of runs are
+what is resampled. Over all scenarios, a seed is drawn with its runs in all of them: every scenario keeps its share of
+each resample, and what the runs of one seed have in common stays together.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from operator import add
+from typing import Final, Literal
+
+import numpy as np
+
+from fireworld.evaluation.runs import Outcomes
+from fireworld.evaluation.statistics import (
+    Estimate,
+    estimate,
+    interquartile_mean,
+    mean,
+    paired_difference,
+)
+from fireworld.kernels.arrays import Array
+
+Verdict = Literal["better", "worse", "cannot tell", "the same policy"]
+Judgement = Literal["not worse", "worse", "cannot tell"]
+
+N_SEEDS_MIN: Final = 6
+"""Seeds that must differ before anything is told: five all of one sign come by chance once in sixteen times."""
+N_SEEDS_ENOUGH: Final = 20
+"""Below it intervals are too narrow."""
+N_SEEDS_MAX: Final = 10_000
+"""Where more would be needed, the difference is too small to be told."""
+_POWER: Final = 7.849
+"""(1.960 + 0.842)^2: an interval of 95 % that leaves out zero four times in five."""
+
+
+@dataclass(frozen=True)
+class Metric:
+    """What policies are compared by."""
+
+    name: str
+    label: str
+    quantity: str
+    """Attribute of Outcomes."""
+    unit: str
+    digits: int
+    higher_is_better: bool
+
+    def gain(self, value: Array) -> Array:
+        """Turn values so that more is better."""
+        return value if self.higher_is_better else -value
+
+    def interval_of_gain(self, difference: Estimate) -> tuple[float, float]:
+        """Return the interval of a difference, turned so that more is better."""
+        low, high = difference.low, difference.high
+        return (low, high) if self.higher_is_better else (-high, -low)
+
+
+METRICS: Final = (
+    Metric("score", "score", "score_share", "of the maximum", 3, higher_is_better=True),
+    Metric("burnt-out", "burnt out", "burnt_out", "buildings", 1, higher_is_better=False),
+    Metric("time", "time to complete", "steps", "steps", 1, higher_is_better=False),
+    Metric("civilians", "civilians alive", "civilians_alive", "civilians", 2, higher_is_better=True),
+)
+
+
+@dataclass(frozen=True)
+class Side:
+    """How one policy did."""
+
+    mean: float
+    interquartile_mean: float
+    n_truncated: int
+    """Runs in which the fire was not out at the last step, which stands for their time to complete."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pairing:
+    """One metric in one scenario, or over all."""
+
+    scenario: str | None
+    """None: over all."""
+    metric: Metric
+    a: Side
+    b: Side
+    differences: Array
+    """(n_seeds,) B less A; over all: mean over the scenarios."""
+    difference: Estimate
+    improvement: Estimate
+    """Probability that a run of B is better than its pair; a tie counts as half."""
+    verdict: Verdict
+
+    @property
+    def n_differing(self) -> int:
+        """Seeds on which the two are not equal."""
+        return int(np.count_nonzero(self.differences))
+
+    @property
+    def more_seeds(self) -> int | None:
+        """Seeds still to be run until a verdict is likely to be found; None: it is found, or no number would do."""
+        return self.seeds_to_tell() if self.verdict == "cannot tell" else None
+
+    @property
+    def reason(self) -> str:
+        """Say what it would take to tell; nothing where it is told."""
+        return self.advice() if self.verdict == "cannot tell" else ""
+
+    def seeds_to_tell(self, *, margin: float = 0.0) -> int | None:
+        """Estimate how many more seeds would tell B from A, or from a loss of `margin`; None: no number would do.
+
+        They tell it four times in five, if the true difference is the one measured.
+        """
+        n, gain = len(self.differences), self.metric.gain(self.differences)
+        middle = mean(gain)
+        distance = max(abs(middle), middle + margin)
+        if n == 1 or distance == 0.0:
+            return N_SEEDS_MIN - n if n < N_SEEDS_MIN else None
+        variance = math.fsum(((gain - middle) ** 2).tolist()) / (n - 1)
+        n_of_which_enough_differ = n * N_SEEDS_MIN / self.n_differing if self.n_differing else 0.0
+        needed = max(_POWER * variance / distance**2, n_of_which_enough_differ, N_SEEDS_MIN, n + 1)
+        return math.ceil(needed) - n if needed <= N_SEEDS_MAX else None
+
+    def advice(self, *, margin: float = 0.0) -> str:
+        """Say in words how many more seeds would tell."""
+        more = self.seeds_to_tell(margin=margin)
+        if more is None:
+            return f"no number of seeds up to {N_SEEDS_MAX:,} would tell" if self.n_differing else "no run differs"
+        if len(self.differences) < N_SEEDS_MIN:
+            return f"at least {more:,} more seeds are needed"
+        return f"about {more:,} more seeds would tell"
+
+
+def compare_outcomes(
+    of_a: Mapping[str, Outcomes], of_b: Mapping[str, Outcomes], *, same_policy: bool = False
+) -> list[Pairing]:
+    """Compare two policies, scenario by scenario and then over all; all metrics of each.
+
+    Args:
+        of_a: the reference's runs by scenario, the same seeds in each.
+        of_b: the new policy's, of the same scenarios and seeds.
+        same_policy: there is nothing to be told apart.
+    """
+    names = list(of_a)
+    scopes = [(name, [name]) for name in names]
+    everything: list[tuple[str | None, list[str]]] = [*scopes, (None, names)]
+    return [
+        _pair(
+            scenario,
+            metric,
+            [of_a[name] for name in within],
+            [of_b[name] for name in within],
+            same_policy=same_policy,
+        )
+        for scenario, within in everything
+        for metric in METRICS
+    ]
+
+
+def over_all(pairings: Sequence[Pairing], metric: str = METRICS[0].name) -> Pairing:
+    """Find the comparison of one metric over all scenarios."""
+    return next(pairing for pairing in pairings if pairing.scenario is None and pairing.metric.name == metric)
+
+
+def judge(pairing: Pairing, *, margin: float = 0.0) -> Judgement:
+    """Tell whether B is not worse than A.
+
+    Not worse: the interval of the gain does not reach below -margin. Worse: otherwise, and it lies wholly below zero.
+
+    Args:
+        pairing: what was measured.
+        margin: loss that does not matter, in the metric's unit; >= 0.
+    """
+    if pairing.verdict == "the same policy":
+        return "not worse"
+    low, _ = pairing.metric.interval_of_gain(pairing.difference)
+    if len(pairing.differences) >= N_SEEDS_MIN and low >= -margin:
+        return "not worse"
+    return "worse" if pairing.verdict == "worse" else "cannot tell"
+
+
+def _pair(
+    scenario: str | None, metric: Metric, of_a: Sequence[Outcomes], of_b: Sequence[Outcomes], *, same_policy: bool
+) -> Pairing:
+    values_a, values_b = (
+        [getattr(outcomes, metric.quantity).astype(np.float64) for outcomes in side] for side in (of_a, of_b)
+    )
+    mean_a, mean_b = _over_scenarios(values_a), _over_scenarios(values_b)
+    difference = paired_difference(mean_b, mean_a)
+    differences = (mean_b - mean_a)[0]
+    return Pairing(
+        scenario=scenario,
+        metric=metric,
+        a=_side(of_a, values_a),
+        b=_side(of_b, values_b),
+        differences=differences,
+        difference=difference,
+        improvement=_improvement(metric, values_a, values_b),
+        verdict="the same policy" if same_policy else _verdict(metric, differences, difference),
+    )
+
+
+def _verdict(metric: Metric, differences: Array, difference: Estimate) -> Verdict:
+    low, high = metric.interval_of_gain(difference)
+    if np.count_nonzero(differences) < N_SEEDS_MIN:
+        return "cannot tell"
+    return "better" if low > 0.0 else "worse" if high < 0.0 else "cannot tell"
+
+
+def _improvement(metric: Metric, values_a: Sequence[Array], values_b: Sequence[Array]) -> Estimate:
+    chances = [
+        np.where(gain > 0.0, 1.0, np.where(gain == 0.0, 0.5, 0.0))
+        for gain in (metric.gain(b - a) for a, b in zip(values_a, values_b, strict=True))
+    ]
+    return estimate(_over_scenarios(chances))
+
+
+def _side(outcomes: Sequence[Outcomes], values: Sequence[Array]) -> Side:
+    pooled = np.concatenate(values)
+    n_truncated = sum(int(np.count_nonzero(~each.completed)) for each in outcomes)
+    return Side(mean=mean(pooled), interquartile_mean=interquartile_mean(pooled), n_truncated=n_truncated)
+
+
+def _over_scenarios(values: Sequence[Array]) -> Array:
+    """Return the mean over scenarios, seed by seed: (1, n_seeds)."""
+    total: Array = reduce(add, values) / len(values)
+    return total[np.newaxis]

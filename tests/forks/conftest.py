@@ -1,0 +1,106 @@
+"""Recorded runs to fork and to explain, and the command line in the folder where they are."""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+from functools import partial
+
+import pytest
+
+from recorder.reader import open_log
+from recorder.writer import LogWriter
+from tests import command_line
+
+STEPS = 60
+POLICIES = '''
+"""A policy with a memory: it counts how often it was asked. And one that names targets of its own."""
+from fireworld.policy.protocol import Action, Decision
+
+class Counting:
+    def begin(self, city, n_brigades, seed):
+        self.asked = 0
+    def decide(self, observation):
+        self.asked += 1
+        return Decision(self.asked // 3 % 4)
+
+class Own:
+    def decide(self, observation):
+        here = observation.burning
+        return Decision(Action.OWN_TARGET, target=int(here[-1 if observation.step % 5 else 0]))
+'''
+
+
+def take_folder(folder, monkeypatch):
+    """Work in a folder that holds own_policies.py."""
+    (folder / "own_policies.py").write_text(POLICIES)
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr(sys, "path", sys.path.copy())
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    monkeypatch.delitem(sys.modules, "own_policies", raising=False)
+
+
+@pytest.fixture(scope="session")
+def recordings(tmp_path_factory):
+    """Runs of `quick`, 60 steps, seed 1, by policy; "other-seed" and "other-scenario" besides."""
+    folder = tmp_path_factory.mktemp("recordings")
+    made = {name: ("--policy", name) for name in ("easiest", "nearest-to-me", "chief", "random")}
+    made["counting"] = ("--policy", "own_policies:Counting")
+    made["own"] = ("--policy", "own_policies:Own")
+    made["other-seed"] = ("--policy", "easiest", "--seed", "2")
+    made["other-scenario"] = ("--policy", "easiest", "--set", "fires.0.n_buildings=1")
+    made["stopped"] = ("--policy", "easiest", "--steps", str(STEPS))
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        take_folder(folder, monkeypatch)
+        for name, words in made.items():
+            steps = () if "--steps" in words else ("--steps", STEPS)
+            done = command_line.call(monkeypatch, "run", "quick", *steps, "--record", f"{name}.mcap", *words)
+            assert done.code == 0, done.err
+    sys.modules.pop("own_policies", None)
+    log = open_log(folder / "stopped.mcap")
+    write_log(folder / "stopped.mcap", log, list(log)[:21], force=True)
+    return folder
+
+
+def write_log(path, log, records, *, force=False):
+    """Write records to a log with another's header."""
+    header, city = log.header, log.city
+    with LogWriter(path, header, city, force=force) as writer:
+        for record in records:
+            writer.write(record)
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch, recordings):
+    """An empty folder to work in, beside which the recordings lie; what is imported from it is forgotten again."""
+    take_folder(tmp_path, monkeypatch)
+    for path in recordings.glob("*.mcap"):
+        (tmp_path / path.name).symlink_to(path)
+    yield tmp_path
+    sys.modules.pop("own_policies", None)
+
+
+@pytest.fixture
+def fireworld(monkeypatch):
+    """Call the command line in this process."""
+    monkeypatch.setenv("COLUMNS", "120")
+    return partial(command_line.call, monkeypatch)
+
+
+@pytest.fixture
+def answer(fireworld):
+    """Call the command line and return the JSON it writes."""
+
+    def call(*words):
+        done = fireworld(*words, "--json")
+        assert done.code == 0, done.err
+        return json.loads(done.out)
+
+    return call
+
+
+@pytest.fixture
+def interruptible(monkeypatch):
+    """Let Ctrl-C mean in this process what it means at a terminal."""
+    monkeypatch.setattr(signal, "getsignal", lambda _: signal.default_int_handler)

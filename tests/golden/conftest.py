@@ -1,0 +1,77 @@
+"""A folder with a policy in it, and the command line in this process."""
+
+from __future__ import annotations
+
+import os
+import sys
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from fireworld.cli.goldens import carry_out
+from fireworld.golden import Order, prepare_golden
+from tests import command_line
+
+CACHE = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+PLAIN = "-p no:cacheprovider -p no:hypothesispytest"
+"""Without plugins that are not at issue and take their time."""
+POLICY = """
+from fireworld.policy.protocol import Action, Decision
+
+class Policy:
+    def decide(self, observation):
+        return Decision(Action.NEAREST_TO_ME)
+"""
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """The current folder, empty but for mine.py; what is imported from it is forgotten again."""
+    (tmp_path / "mine.py").write_text(POLICY)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", sys.path.copy())
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    sys.modules.pop("mine", None)
+    yield tmp_path
+    sys.modules.pop("mine", None)
+
+
+@pytest.fixture
+def write_policy(here):
+    """Write another mine.py."""
+
+    def write(text: str) -> None:
+        (here / "mine.py").write_text(text)
+        sys.modules.pop("mine", None)
+
+    return write
+
+
+@pytest.fixture
+def change_policy(write_policy):
+    """Let the policy of mine.py choose another action."""
+    return lambda action: write_policy(POLICY.replace("NEAREST_TO_ME", action))
+
+
+@pytest.fixture
+def golden(monkeypatch):
+    """Call `fireworld golden` in this process."""
+    monkeypatch.setenv("COLUMNS", "140")
+    return partial(command_line.call, monkeypatch, "golden")
+
+
+@pytest.fixture(scope="session")
+def _warm():
+    """Let numba import all it needs: what is first imported within a test's own pytest is forgotten after it."""
+    carry_out(prepare_golden(Order(scenario="quick", policy="random", steps=2), Path()))
+
+
+@pytest.fixture
+def project(_warm, pytester, monkeypatch):
+    """A folder with a policy, in which a pytest of its own runs in this process."""
+    monkeypatch.setenv("XDG_CACHE_HOME", CACHE)  # pytester moves the home folder, where compiled kernels are kept
+    monkeypatch.setenv("PYTEST_ADDOPTS", PLAIN)
+    pytester.makepyfile(mine=POLICY)
+    pytester.syspathinsert()
+    return pytester

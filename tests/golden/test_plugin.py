@@ -1,0 +1,248 @@
+"""The pytest plugin: fixture, update, failures, options; and that it costs others nothing."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from fireworld.cli.goldens import carry_out, check_golden, find_goldens, store_golden
+from fireworld.golden import Order, order_of, prepare_golden
+from fireworld.pytest_plugin import NAME_MAX, golden_name
+from recorder.reader import open_log
+from tests.golden.conftest import POLICY
+
+UPDATE = "--fireworld-update"
+ONE = """
+def test_policy(recording):
+    recording(scenario="quick", policy="mine:Policy", seed=3, steps=5)
+"""
+
+
+def run(project, *words, outcome):
+    """Run the tests of the project and check how they went; return what was printed."""
+    result = project.runpytest_inprocess(*words)
+    result.assert_outcomes(**outcome)
+    assert "Traceback" not in result.stdout.str()
+    return result.stdout
+
+
+def change_policy(project, action):
+    """Let the policy choose another action; a file of another time, so that no compiled one is taken for it."""
+    project.makepyfile(mine=POLICY.replace("NEAREST_TO_ME", action))
+    for compiled in project.path.rglob("mine*.pyc"):
+        compiled.unlink()
+
+
+def test_a_missing_golden_fails_and_says_how_to_store_it(project):
+    project.makepyfile(test_mine=ONE)
+    out = run(project, outcome={"failed": 1})
+    missing = (
+        "recordings/test_mine-test_policy.mcap: there is no such recording; run with --fireworld-update to store it"
+    )
+    out.fnmatch_lines([missing])
+    assert not (project.path / "recordings").exists()
+
+
+def test_stored_and_the_same_then_changed_then_updated(project):
+    project.makepyfile(test_mine=ONE)
+    out = run(project, UPDATE, outcome={"passed": 1})
+    out.fnmatch_lines(["*fireworld: 1 recordings stored*", "recordings/test_mine-test_policy.mcap"])
+    log = open_log(project.path / "recordings" / "test_mine-test_policy.mcap")
+    assert (log.header.policy, log.header.seed, len(log)) == ("mine:Policy", 3, 6)
+    assert (project.path / "recordings" / "test_mine-test_policy.txt").is_file()
+    run(project, outcome={"passed": 1})
+
+    change_policy(project, "EASIEST")
+    out = run(project, outcome={"failed": 1})
+    out.fnmatch_lines(
+        [
+            "recordings/test_mine-test_policy.mcap: the run is not the same any more",
+            "step 1, choose: brigade 0 chose easiest, was nearest-to-me",
+            "  sum of rewards: *, was *",
+            "the new run: *test_mine-test_policy.mcap; *",
+            "if that is meant, run with --fireworld-update",
+        ]
+    )
+    assert "pytest_plugin.py" not in out.str()
+    (line,) = [line for line in out.lines if line.startswith("the new run: ")]
+    assert len(open_log(line.removeprefix("the new run: ").partition(";")[0])) == 6
+
+    run(project, UPDATE, outcome={"passed": 1})
+    run(project, outcome={"passed": 1})
+
+
+def test_update_leaves_what_is_the_same(project):
+    project.makepyfile(test_mine=ONE)
+    run(project, UPDATE, outcome={"passed": 1})
+    path = project.path / "recordings" / "test_mine-test_policy.mcap"
+    before = path.stat().st_mtime_ns
+    out = run(project, UPDATE, outcome={"passed": 1})
+    assert path.stat().st_mtime_ns == before
+    assert "stored" not in out.str()
+    path.write_bytes(b"damaged")
+    run(project, outcome={"failed": 1}).fnmatch_lines(["*test_mine-test_policy.mcap*"])
+    run(project, UPDATE, outcome={"passed": 1}).fnmatch_lines(["*1 recordings stored*"])
+    run(project, outcome={"passed": 1})
+
+
+def test_policies_as_classes_and_objects(project):
+    project.makepyfile(
+        test_mine="""
+        import pytest
+        from mine import Policy
+
+        @pytest.mark.parametrize("policy", [Policy, Policy()], ids=["class", "object"])
+        def test_policy(recording, policy):
+            run = recording(scenario="quick", policy=policy, steps=4)
+            assert run.column("score", "n_burnt_out").tolist() == [0] * 5
+            assert run.header.policy == "mine:Policy"
+        """
+    )
+    run(project, UPDATE, outcome={"passed": 2})
+    run(project, outcome={"passed": 2})
+    change_policy(project, "EASIEST")
+    run(project, outcome={"failed": 2})
+
+
+def test_goldens_of_tests_can_be_checked_by_the_command_too(project):
+    project.makepyfile(test_mine=ONE)
+    run(project, UPDATE, outcome={"passed": 1})
+    (path,) = find_goldens(project.path / "recordings")
+    assert check_golden(path).result == "same"
+
+
+def test_options(project):
+    """Overrides, tolerances, and what is ignored, reach the run, the comparison and the golden."""
+    test = """
+        def test_policy(recording):
+            run = recording(
+                scenario="quick", policy="mine:Policy", steps=4, seed={seed},
+                overrides={{"brigades.n": 3, "choices": "simultaneous"}},
+                tolerances={{"energy": 1e-6}}, ignore={ignore},
+            )
+            assert len(run.city.brigade_tank_litres) == 3
+        """
+    everything = [
+        "draws",
+        "observations",
+        "decisions",
+        "brigades",
+        "buildings",
+        "civilians",
+        "rewards",
+        "score",
+        "events",
+    ]
+    project.makepyfile(test_mine=test.format(seed=1, ignore=[]))
+    run(project, UPDATE, outcome={"passed": 1})
+    log = open_log(project.path / "recordings" / "test_mine-test_policy.mcap")
+    order = order_of(log.header)
+    assert order.settings == {"brigades.n": "3", "choices": "simultaneous"}
+    assert order.tolerances == {"energy": 1e-6}
+    project.makepyfile(test_mine=test.format(seed=2, ignore=[]))
+    run(project, outcome={"failed": 1}).fnmatch_lines(["step 0, draw: the runs had other luck*"])
+    project.makepyfile(test_mine=test.format(seed=2, ignore=everything))
+    run(project, outcome={"passed": 1})
+
+
+def test_two_recordings_in_a_test_need_names(project):
+    project.makepyfile(
+        test_mine="""
+        def test_named(recording):
+            recording(scenario="quick", policy="mine:Policy", steps=2)
+            recording(scenario="quick", policy="mine:Policy", steps=3, name="longer")
+
+        def test_nameless(recording):
+            recording(scenario="quick", policy="mine:Policy", steps=2)
+            recording(scenario="quick", policy="mine:Policy", steps=3)
+        """
+    )
+    out = run(project, UPDATE, outcome={"passed": 1, "failed": 1})
+    out.fnmatch_lines(["recording: a second one in a test needs a name of its own*"])
+    names = [path.stem for path in find_goldens(project.path / "recordings")]
+    assert names == ["test_mine-test_named", "test_mine-test_named-longer", "test_mine-test_nameless"]
+
+
+def test_the_folder_is_a_setting(project):
+    project.makeini("[pytest]\nfireworld_recordings = kept/golden\n")
+    project.mkpydir("inner")
+    (project.path / "inner" / "test_mine.py").write_text(ONE)
+    run(project, UPDATE, outcome={"passed": 1})
+    assert [path.stem for path in find_goldens(project.path / "inner" / "kept" / "golden")] == ["test_mine-test_policy"]
+
+
+@pytest.mark.parametrize(
+    ("call", "complaint"),
+    [
+        ('scenario="quack", policy="mine:Policy"', "scenario: expected the name of a scenario*"),
+        ('scenario="quick", policy="mine:Nobody"', "--policy: mine: expected a class of that name*"),
+        ('scenario="quick", policy=3', "policy: expected a policy with a method decide*"),
+        ('scenario="quick", policy=type("P", (), {"__init__": lambda self: 1 / 0})', "policy: *: cannot be made: *"),
+        ('scenario="quick", policy="mine:Policy", overrides={"brigades.m": 1}', "*brigades.m*"),
+        ('scenario="quick", policy="mine:Policy", steps=2, ignore=["nothing"]', "ignore: expected a field*"),
+        ('scenario="quick", policy="mine:Failing", steps=2', "policy mine:Failing: step 1, brigade 0: KeyError*"),
+    ],
+)
+def test_mistakes_fail_in_a_line(project, call, complaint):
+    failing = POLICY + "\nclass Failing:\n    def decide(self, observation):\n        return {}['a']\n"
+    project.makepyfile(mine=failing, test_mine=ONE.partition("    rec")[0] + f"    recording({call})\n")
+    (project.path / "recordings").mkdir()
+    good = carry_out(prepare_golden(Order(scenario="quick", policy="random", steps=2), project.path))
+    store_golden(project.path / "recordings" / "test_mine-test_policy.mcap", good)
+    out = run(project, outcome={"failed": 1})
+    out.fnmatch_lines([complaint])
+    assert "pytest_plugin.py" not in out.str()
+
+
+def test_names_of_goldens(project):
+    items = project.getitems(
+        """
+        import pytest
+
+        class TestTeam:
+            def test_it(self): ...
+
+        @pytest.mark.parametrize("word", ["a-b", "a/b", "a b", "x" * 500])
+        def test_word(word): ...
+        """
+    )
+    first, *names = [golden_name(item).partition("-")[2] for item in items]
+    assert first == "TestTeam.test_it"
+    assert golden_name(items[0], "second").endswith("TestTeam.test_it-second")
+    assert names[0] == "test_word-a-b"
+    assert [name[:-6] for name in names[1:3]] == ["test_word-a_b-", "test_word-a_b-"]
+    assert len({*names}) == 4
+    assert max(map(len, names)) < NAME_MAX + 10
+
+
+def test_with_workers(project):
+    """Goldens are stored by workers, which are processes of their own, and told of by the one that people see."""
+    project.makepyfile(
+        test_mine="""
+        import pytest
+
+        @pytest.mark.parametrize("seed", range(2))
+        def test_policy(recording, seed):
+            recording(scenario="quick", policy="mine:Policy", steps=2, seed=seed)
+        """
+    )
+    words = (sys.executable, "-m", "pytest", "-n", "1")
+    first = subprocess.run([*words, UPDATE], cwd=project.path, capture_output=True, text=True, check=False)
+    assert first.returncode == 0, first.stdout
+    assert "fireworld: 2 recordings stored" in first.stdout
+    assert len(find_goldens(project.path / "recordings")) == 2
+
+
+def test_it_imports_nothing_before_a_test_asks():
+    script = (
+        "import sys, pytest; before = {*sys.modules}; import fireworld.pytest_plugin; print(*{*sys.modules} - before)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert set(done.stdout.split()) == {"fireworld", "fireworld.pytest_plugin"}
+
+
+def test_pytest_finds_it(pytestconfig):
+    """Installed with fireworld, not only imported by these tests."""
+    assert pytestconfig.pluginmanager.get_plugin("fireworld").__name__ == "fireworld.pytest_plugin"

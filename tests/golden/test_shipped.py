@@ -1,0 +1,71 @@
+"""The project's own goldens: the same as ever, small, readable, and one for every kind of scenario."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+
+import pytest
+
+from fireworld.cli.golden_text import golden_text
+from fireworld.cli.goldens import check_golden, find_goldens, text_path
+from fireworld.golden import kind_of, order_of, recorded_scenario
+from fireworld.records import EVENT_KINDS
+from fireworld.scenario import load_scenario, scenario_names
+from recorder.reader import open_log
+from tests.docs.pages import ROOT
+
+FOLDER = ROOT / "recordings" / "golden"
+GOLDENS = find_goldens(FOLDER)
+SIZE_MAX_BYTES = 1_500_000
+GIT = shutil.which("git")
+
+
+@pytest.fixture(scope="module")
+def grounds():
+    """Cities that several goldens share."""
+    return {}
+
+
+@pytest.mark.parametrize("path", GOLDENS, ids=lambda path: path.stem)
+def test_the_run_is_what_it_was(path, grounds):
+    """If the change is meant: `fireworld golden update --reason "..."`."""
+    checked = check_golden(path, grounds=grounds)
+    assert checked.result == "same", checked.sentence
+
+
+def test_every_kind_of_scenario_has_one():
+    kinds = {kind_of(recorded_scenario(open_log(path).header)) for path in GOLDENS}
+    missing = {kind_of(scenario): scenario.name for scenario in map(load_scenario, scenario_names())}
+    missing = {kind: name for kind, name in missing.items() if kind not in kinds}
+    assert not missing, "try `fireworld golden add NAME --policy POLICY --steps 15` for one of each"
+
+
+@pytest.mark.parametrize("path", GOLDENS, ids=lambda path: path.stem)
+def test_it_runs_a_shipped_scenario(path):
+    """By name, so that a change of a scenario, or of the parameters it starts from, is noticed too."""
+    assert order_of(open_log(path).header).scenario in scenario_names()
+
+
+@pytest.mark.parametrize("path", GOLDENS, ids=lambda path: path.stem)
+def test_its_text_is_current(path):
+    assert text_path(path).read_text(encoding="utf-8") == golden_text(open_log(path)), "try `fireworld golden update`"
+
+
+def test_they_are_small():
+    assert sum(path.stat().st_size for path in FOLDER.iterdir()) < SIZE_MAX_BYTES
+
+
+def test_they_hold_fires_that_go_well_and_badly():
+    texts = "".join(text_path(path).read_text(encoding="utf-8") for path in GOLDENS)
+    happened = set(re.findall(r"[a-z]+(?:-[a-z]+)*(?= \d)", texts))
+    assert set(EVENT_KINDS) - happened <= {"brigade-hurt", "brigade-died"}
+
+
+@pytest.mark.skipif(GIT is None or not (ROOT / ".git").exists(), reason="not a checkout")
+def test_git_does_not_ignore_them():
+    done = subprocess.run(
+        [GIT, "check-ignore", *GOLDENS, *map(text_path, GOLDENS)], cwd=ROOT, capture_output=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (1, b"")
