@@ -42,6 +42,8 @@ class Size:
 
     n_trainings: int = 20
     """Of the methods that claims are made about."""
+    n_rivals: int = 8
+    """Of those that they are compared with, where one training is like another."""
     n_trials: int = 3
     """Of the others."""
     search: Search = SEARCH
@@ -54,6 +56,7 @@ class Size:
 FULL: Final = Size()
 QUICK: Final = Size(
     n_trainings=2,
+    n_rivals=2,
     n_trials=1,
     search=Search(n_generations=5, n_candidates=16, n_best=4, n_fires=8, n_steps_max=100),
     n_episodes_max=3,
@@ -85,7 +88,7 @@ def contestants(size: Size, fires: Fires, folder: Path, grounds: dict[str, Groun
     """
     workshop = Workshop(size, folder, grounds)
     rules = [*ACTIONS, "each-another", "random", "chief"]
-    n, few = size.n_trainings, size.n_trials
+    n, some, few = size.n_trainings, size.n_rivals, size.n_trials
     return [
         *(Contestant(rule, "rule", 1, lambda _, __, rule=rule: BUILT_IN[rule]()) for rule in rules),  # type: ignore[misc]
         Contestant(
@@ -104,9 +107,12 @@ def contestants(size: Size, fires: Fires, folder: Path, grounds: dict[str, Groun
         Contestant("linear-270", LINEAR_WORDS.format(270), few, workshop.linear(cooperation=False)),
         Contestant("linear-4320", LINEAR_WORDS.format(4320), few, workshop.linear(cooperation=True)),
         Contestant(
-            "named-alone", "search, the paper's actions, nobody sees the others", n, workshop.ranking("named", "alone")
+            "named-alone",
+            "search, the paper's actions, nobody sees the others",
+            some,
+            workshop.ranking("named", "alone"),
         ),
-        Contestant("named-cooperative", "search, the paper's actions", n, workshop.ranking("named", "cooperative")),
+        Contestant("named-cooperative", "search, the paper's actions", some, workshop.ranking("named", "cooperative")),
         Contestant("own-alone", "search, own targets, nobody sees the others", n, workshop.ranking("own", "alone")),
         Contestant(
             "own-cooperative", "search, own targets: how `best` was made", n, workshop.ranking("own", "cooperative")

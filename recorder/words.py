@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from fireworld.records import (
+    ACTION_NAMES,
     ACTIONS,
     ACTIVITIES,
     EVENT_KINDS,
@@ -29,7 +30,7 @@ NAMES: Final[Mapping[str, tuple[str, ...]]] = {
     "/observations.distance_from_center": LEVELS,
     "/observations.distance_from_civilian": LEVELS,
     "/observations.volume": VOLUMES,
-    "/decisions.action": ACTIONS,
+    "/decisions.action": ACTION_NAMES,
     "/brigades.activity": ACTIVITIES,
     "/buildings.fieryness": FIERYNESS,
     "/events.kind": EVENT_KINDS,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 from xml.etree import ElementTree as Xml
 
+from fireworld.cli.junit import report
 from fireworld.errors import one_line
 from fireworld.evaluation.findings import spread
 from fireworld.evaluation.paired import METRICS, N_SEEDS_ENOUGH, Judgement, Metric, Pairing, Side, over_all
@@ -140,19 +141,7 @@ def as_json(found: Comparison, *, gated: bool) -> dict[str, Any]:
 def junit(found: Comparison) -> bytes:
     """Return the comparison as JUnit XML: one case a metric and scenario; only the gate's, over all, can fail."""
     cases = [_case(found, pairing) for pairing in found.pairings]
-    counts = {
-        "tests": str(len(cases)),
-        "failures": str(sum(case.find("failure") is not None for case in cases)),
-        "errors": str(sum(case.find("error") is not None for case in cases)),
-        "skipped": "0",
-    }
-    root = Xml.Element("testsuites", {"name": "fireworld compare", **counts})
-    name = one_line(f"{found.policies[1]} against {found.policies[0]}")
-    suite = Xml.SubElement(root, "testsuite", {"name": name, **counts})
-    suite.extend(cases)
-    Xml.indent(root)
-    text: bytes = Xml.tostring(root, encoding="utf-8", xml_declaration=True)
-    return text + b"\n"
+    return report("fireworld compare", one_line(f"{found.policies[1]} against {found.policies[0]}"), cases)
 
 
 def _case(found: Comparison, pairing: Pairing) -> Xml.Element:

@@ -6,8 +6,9 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, SubElement
 
+from fireworld.cli.junit import clean, report
 from fireworld.records import STEP_TOPICS, Snapshot
 
 if TYPE_CHECKING:
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
 COMMIT: Final = "/commit"
 LENGTH: Final = "length"
 """The case of steps that only one run has."""
-_FORBIDDEN: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-"""Characters that XML cannot hold; a file's name can."""
 
 
 def junit_xml(difference: Difference, rules: Rules, *, paths: tuple[Path, Path]) -> bytes:
@@ -34,22 +33,8 @@ def junit_xml(difference: Difference, rules: Rules, *, paths: tuple[Path, Path])
     """
     class_name = ".".join(["fireworld", "diff", *_words(paths[0])])
     cases = [_case(name, class_name, difference, rules) for name in _names()]
-    counts = {
-        "tests": str(len(cases)),
-        "failures": str(sum(case.find("failure") is not None for case in cases)),
-        "errors": "0",
-        "skipped": str(sum(case.find("skipped") is not None for case in cases)),
-    }
-    root = Element("testsuites", {"name": "fireworld diff", **counts})
-    suite = SubElement(root, "testsuite", {"name": _clean(f"{paths[0]} and {paths[1]}"), **counts})
-    if difference.header:
-        properties = SubElement(suite, "properties")
-        for key, (a, b) in difference.header.items():
-            SubElement(properties, "property", {"name": key, "value": _clean(f"{b}, was {a}")})
-    suite.extend(cases)
-    indent(root)
-    text: bytes = tostring(root, encoding="utf-8", xml_declaration=True)
-    return text + b"\n"
+    properties = {key: f"{b}, was {a}" for key, (a, b) in difference.header.items()}
+    return report("fireworld diff", f"{paths[0]} and {paths[1]}", cases, properties)
 
 
 def _names() -> Iterator[str]:
@@ -62,8 +47,8 @@ def _case(name: str, class_name: str, difference: Difference, rules: Rules) -> E
     failure = _failure(name, difference)
     if failure is not None:
         sentence, details = failure
-        message = {"message": _clean(sentence), "type": "difference"}
-        SubElement(case, "failure", message).text = _clean(f"{sentence}\n{details}")
+        message = {"message": clean(sentence), "type": "difference"}
+        SubElement(case, "failure", message).text = clean(f"{sentence}\n{details}")
     elif not _is_compared(name, rules):
         SubElement(case, "skipped", {"message": "left out by --ignore or --tolerance"})
     return case
@@ -94,7 +79,3 @@ def _words(path: Path) -> list[str]:
     """Return the parts of a path as words of a class name, which dots separate."""
     parts = [re.sub(r"[^\w-]+", "_", part) for part in path.with_suffix("").parts]
     return [part for part in parts if part.strip("_")]
-
-
-def _clean(text: str) -> str:
-    return _FORBIDDEN.sub("?", text)

@@ -58,8 +58,8 @@ def check(
 
     Exit code: 0 all the same, 1 one is different, 2 one cannot be run or compared, or there is none.
     """
+    from fireworld.cli.golden_junit import junit_xml
     from fireworld.cli.goldens import find_goldens, make_golden_folder, store_recording
-    from fireworld.cli.junit import junit_xml
     from fireworld.cli.report_folder import write_file
     from fireworld.policy.npz import check_free
 

@@ -1,40 +1,40 @@
-"""JUnit's XML, which CI systems show: the results of checking golden recordings."""
+"""JUnit XML, which CI servers show: the frame around the test cases of `diff`, `golden` and `compare`."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+import re
+from collections.abc import Mapping, Sequence
+from typing import Final
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-if TYPE_CHECKING:
-    from fireworld.cli.goldens import Checked
+_FORBIDDEN: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""Characters that XML cannot hold; a file's name can."""
+_COUNTED: Final = {"failures": "failure", "errors": "error", "skipped": "skipped"}
 
 
-def junit_xml(results: Sequence[Checked]) -> bytes:
-    """Write results as a suite of test cases: a difference is a failure, what cannot be run an error."""
-    from fireworld.cli.goldens import changes
+def report(command: str, name: str, cases: Sequence[Element], properties: Mapping[str, str] | None = None) -> bytes:
+    """Return a report of one suite.
 
-    outcomes = [checked.result for checked in results]
-    counts = {
-        "tests": len(outcomes),
-        "failures": outcomes.count("different"),
-        "errors": outcomes.count("cannot"),
-        "skipped": 0,
-    }
-    suites = Element("testsuites")
-    suite = SubElement(suites, "testsuite", {"name": "fireworld golden"} | {key: str(n) for key, n in counts.items()})
-    for checked in results:
-        case = SubElement(suite, "testcase", {"classname": "golden", "name": _clean(checked.name)})
-        if checked.result != "same":
-            kind = "error" if checked.difference is None else "failure"
-            fault = SubElement(case, kind, {"message": _clean(checked.sentence), "type": checked.result})
-            lines = changes(checked.difference) if checked.difference is not None else ()
-            fault.text = "\n".join(map(_clean, (checked.sentence, *lines)))
-    indent(suites)
-    text: str = tostring(suites, encoding="unicode")
-    return f'<?xml version="1.0" encoding="utf-8"?>\n{text}\n'.encode()
+    Args:
+        command: what made it.
+        name: of the suite.
+        cases: `testcase` elements; what they hold is counted.
+        properties: of the suite, by name.
+    """
+    counts = {"tests": str(len(cases))}
+    counts |= {plural: str(sum(case.find(kind) is not None for case in cases)) for plural, kind in _COUNTED.items()}
+    root = Element("testsuites", {"name": command, **counts})
+    suite = SubElement(root, "testsuite", {"name": clean(name), **counts})
+    if properties:
+        listed = SubElement(suite, "properties")
+        for key, value in properties.items():
+            SubElement(listed, "property", {"name": key, "value": clean(value)})
+    suite.extend(cases)
+    indent(root)
+    text: bytes = tostring(root, encoding="utf-8", xml_declaration=True)
+    return text + b"\n"
 
 
-def _clean(line: str) -> str:
-    """Replace what XML cannot hold; the name of a file may have anything in it."""
-    return "".join(character if character.isprintable() else "?" for character in line)
+def clean(text: str) -> str:
+    """Replace what XML cannot hold."""
+    return _FORBIDDEN.sub("?", text)

@@ -21,7 +21,7 @@ FIRST = np.int64(0)
 
 
 @kernel
-def run_episode(  # noqa: C901, PLR0912 - handing all arrays to a function of its own costs more than the loop
+def run_episode(  # noqa: C901, PLR0912, PLR0915 - handing all arrays to functions of its own costs more than the loop
     city: CityTables,
     world: WorldArrays,
     constants: Constants,

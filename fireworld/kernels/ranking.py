@@ -26,6 +26,8 @@ OWN_TARGET = N_ACTIONS
 """The action of a brigade that names a building by itself."""
 DEGREES, METERS_100, METERS_50_SQUARE, METERS_MOST = 500.0, 1e5, 2.5e9, 3.0
 """Units of the features: degrees; lengths in mm; the longest distance told apart, in hundreds of metres."""
+WATER_HEAT_LEAST = 1e-6
+"""So that water that takes no heat needs very many steps, not infinitely many."""
 
 
 @inner
@@ -40,13 +42,17 @@ def describe_building(
     power: int,
     out: Array,
 ) -> None:
-    """Write the features of a burning building that are the same for every brigade; docs/model.md lists them.
+    """Write the features of a burning building that are the same for every brigade; MODEL 7.
 
     Only arithmetic and roots: they give the same bits on every machine.
 
     Args:
         b: the building.
-        buildings, links, geometry, fire, sites: of the city and the moment.
+        buildings: the city's.
+        links: radiation between them.
+        geometry: their sizes.
+        fire: heat, fuel, water and codes of the moment.
+        sites: how far each burning building is from a civilian.
         fire_constants: heat that water takes.
         power: litres that a brigade sprays in a step.
         out: (7,) float64, written.
@@ -67,7 +73,7 @@ def describe_building(
     out[4] = 3.0 * exposure
     out[5] = 5.0 * kindling
     heat = fire.energy[b] - buildings.ignition_point[b] * capacity
-    litres = heat / fire_constants.water_heat_burning - fire.water[b]
+    litres = heat / max(fire_constants.water_heat_burning, WATER_HEAT_LEAST) - fire.water[b]
     out[6] = np.sqrt(max(litres, 0.0) / max(power, 1))
 
 
@@ -90,7 +96,8 @@ def value_of_target(
         known: (b,) what the brigades go for, -1 nothing.
         weights: (17,) of the ranking.
         described: (7,) features of the building.
-        brigades, geometry: of the moment.
+        brigades: the team, with what each went for in the last step.
+        geometry: where the buildings are.
         range_square: of the pumps, mm^2.
     """
     value = 0.0
@@ -152,7 +159,14 @@ def rank(
         weights: (17,) of the ranking.
         described: (n, 7) float64, scratch.
         described_at: (n,) int64, scratch: the step that a row of it is of; -1 at first.
-        brigades, buildings, links, geometry, fire, sites, fire_constants, brigade_constants: of the moment.
+        brigades: the team.
+        buildings: the city's.
+        links: radiation between them.
+        geometry: where they are and how big.
+        fire: of the moment.
+        sites: fire sites of the moment.
+        fire_constants: heat that water takes.
+        brigade_constants: litres that a brigade sprays in a step, and how far.
         values: (5,) float64, written: of the four targets, without the weights of the actions where it may name its
             own, and of the one chosen.
     """

@@ -21,7 +21,7 @@ def parse_team_file(content: bytes, *, source: str) -> Team | Ranking:
         TrainingError: it is not a team file, of another format, or makes no sense.
     """
     header, _ = parse_arrays(content, source=source)
-    if header.get("format") == ranking.FORMAT:
+    if str(header.get("format")).startswith(ranking.FORMAT.partition("/")[0]):
         return parse_ranking(content, source=source)[0]
     return parse_team(content, source=source)[0]
 

@@ -47,6 +47,11 @@ class KernelPolicy:
     """(rankings, 17) float64, weights."""
     _ready: PolicyTables | None = field(default=None, init=False, repr=False, compare=False)
 
+    def __post_init__(self) -> None:
+        """Refuse what the compiled episode and single steps would not do alike."""
+        if self.commit > 1 and {RANK_NAMED, RANK_ALL} & set(self.kinds):
+            raise ValueError("a ranking chooses in every step: commit must be 1")
+
     def for_brigades(self, n_brigades: int) -> PolicyTables:
         """Spread the policy over a team."""
         turn = np.arange(n_brigades) % len(self.kinds)

@@ -114,7 +114,8 @@ def compare_rankings(a: Ranking, b: Ranking) -> RankingDifference:
         TrainingError: they have another number of rows.
     """
     if len(a.weights) != len(b.weights):
-        raise TrainingError(expected("B", "weights", f"{len(a.weights)} rows, as in A", f"{len(b.weights)} rows"))
+        wanted = f"as many rows as in A, {len(a.weights)}"
+        raise TrainingError(expected("B", "weights", wanted, f"{len(b.weights)} of them"))
     changed = []
     for row, (of_a, of_b) in enumerate(zip(a.weights.tolist(), b.weights.tolist(), strict=True)):
         found = [

@@ -179,7 +179,7 @@ class World:
             target = -1
             if can_choose(brigade, brigades, self.arrays.sites):
                 last = Decision(int(before[brigade]), target=int(target_before[brigade]))
-                if keeps is not None and self._burns(last) and keeps(brigade, last.action, self.step_number):
+                if keeps is not None and self._can_keep(brigade, last) and keeps(brigade, last.action, self.step_number):
                     decisions[brigade] = last
                 else:
                     decisions[brigade] = self._ask(policy, brigade, features[brigade], int(states[brigade]), known)
@@ -187,9 +187,12 @@ class World:
             brigades.action[brigade], brigades.target[brigade] = decisions[brigade].action, target
         return Choices(features=features, state_index=states, decisions=tuple(decisions))
 
-    def _burns(self, last: Decision) -> bool:
-        """Tell whether a last choice can still be kept: a target of one's own only while it burns."""
-        return last.action != Action.OWN_TARGET or bool(1 <= self.arrays.fire.fieryness[last.target] <= 3)
+    def _can_keep(self, brigade: int, last: Decision) -> bool:
+        """Tell whether a last choice can be kept: a target of one's own only while it burns in the brigade's site."""
+        if last.action != Action.OWN_TARGET:
+            return True
+        arrays, burns = self.arrays, 1 <= self.arrays.fire.fieryness[last.target] <= 3
+        return bool(burns and arrays.sites.label[last.target] == arrays.brigades.site[brigade])
 
     def _target(self, brigade: int, decision: Decision) -> int:
         if decision.action == Action.OWN_TARGET and decision.target is not None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fireworld.errors import PolicyError
-from fireworld.policy.kernel import from_tables
+from fireworld.policy.kernel import from_rankings, from_tables
 from fireworld.policy.names import BUILT_IN, load_policy
 from fireworld.policy.protocol import Action, Decision
 from fireworld.testing import PolicyConformance
@@ -28,6 +28,16 @@ class TestExploringTable(PolicyConformance):
     def make_policy(self):
         tables = np.random.default_rng(1).normal(size=(2, 4320, 4))
         return from_tables(tables, epsilon=0.5)
+
+
+@pytest.mark.parametrize("own_targets", [False, True])
+class TestRanking(PolicyConformance):
+    @pytest.fixture(autouse=True)
+    def _kind(self, own_targets):
+        self.own_targets = own_targets
+
+    def make_policy(self):
+        return from_rankings(np.random.default_rng(1).normal(size=(2, 17)), own_targets=self.own_targets)
 
 
 class AlwaysNear:

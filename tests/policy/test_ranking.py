@@ -1,4 +1,4 @@
-"""Rankings: followed step by step and in whole episodes, kept in files, recorded and replayed."""
+"""Rankings: followed step by step and in whole episodes, recorded and replayed; and targets of a policy's own."""
 
 from __future__ import annotations
 
@@ -7,15 +7,12 @@ import json
 import numpy as np
 import pytest
 
-from fireworld.errors import TrainingError
 from fireworld.kernels.choice import RANK_ALL, RANK_NAMED
 from fireworld.kernels.ranking import N_TARGET_FEATURES, N_WEIGHTS
-from fireworld.policy.files import load_team_file, parse_team_file
 from fireworld.policy.kernel import from_rankings
-from fireworld.policy.names import load_policy, note_on_team
+from fireworld.policy.names import load_policy
 from fireworld.policy.protocol import Action, Decision
-from fireworld.policy.ranking import FORMAT, WEIGHTS, Ranking, parse_ranking, save_ranking
-from fireworld.policy.team import Team, save_team
+from fireworld.policy.ranking import WEIGHTS, Ranking, save_ranking
 from fireworld.records import MemoryRecording
 from fireworld.replay import RecordedPolicy
 from fireworld.world.observer import Observer
@@ -30,9 +27,6 @@ NAMES = [weight.name for weight in WEIGHTS]
 def make_ranking(n_rows=2, *, own_targets=True, **provenance):
     weights = np.random.default_rng(8).normal(size=(n_rows, N_WEIGHTS))
     return Ranking(weights, own_targets, provenance)
-
-
-# Followed
 
 
 @pytest.mark.parametrize(("own_targets", "kind"), [(False, RANK_NAMED), (True, RANK_ALL)])
@@ -112,145 +106,6 @@ def test_the_digest_tells_rankings_apart():
     assert rankings[0].policy().digest == policies[0].digest
 
 
-# Files
-
-
-@pytest.mark.parametrize("own_targets", [False, True])
-def test_written_and_read_again(tmp_path, own_targets):
-    ranking = make_ranking(own_targets=own_targets, seed=4, method={"name": "search"})
-    for name in ("a.npz", "b.npz"):
-        save_ranking(ranking, tmp_path / name)
-    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
-    read = load_team_file(tmp_path / "a.npz")
-    np.testing.assert_array_equal(read.weights, ranking.weights)
-    assert read.weights.dtype == np.float64
-    assert (read.own_targets, read.digest, read.provenance) == (
-        own_targets,
-        ranking.digest,
-        {"seed": 4, "method": {"name": "search"}},
-    )
-    with np.load(tmp_path / "a.npz") as opened:
-        np.testing.assert_array_equal(opened["weights"], ranking.weights)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.npz", "b.npz"]
-
-
-def test_it_may_hold_more_arrays(tmp_path):
-    save_ranking(make_ranking(), tmp_path / "a.npz", extra={"spread": np.ones(17)})
-    ranking, more = parse_ranking((tmp_path / "a.npz").read_bytes(), source="a")
-    assert list(more) == ["spread"]
-    assert ranking.digest == make_ranking().digest
-
-
-def test_it_is_a_policy_by_its_path(tmp_path):
-    path = tmp_path / "mine.npz"
-    save_ranking(make_ranking(3), path)
-    named = load_policy(str(path))
-    assert (named.name, named.trained_choices) == ("mine.npz", "")
-    assert named.attachments == {"policy.npz": path.read_bytes()}
-    assert named.digest == make_ranking(3).policy().digest
-    assert note_on_team(named, 3) == ""
-    assert "mine.npz: 3 " in note_on_team(named, 4)
-    save_ranking(make_ranking(1), path, force=True)
-    assert note_on_team(load_policy(str(path)), 4) == "", "one row is for all"
-
-
-def test_team_files_of_tables_are_read_too(tmp_path):
-    save_team(Team(np.zeros((1, 270, 4)), np.zeros((1, 270, 4), dtype=np.int64)), tmp_path / "a.npz")
-    assert isinstance(load_team_file(tmp_path / "a.npz"), Team)
-
-
-def write(path, *, weights=None, left_out=(), **header):
-    """Write the file of a ranking with something else in it."""
-    told = {"format": FORMAT, "weights": NAMES, "own_targets": True, **header}
-    told = {key: value for key, value in told.items() if key not in left_out}
-    arrays = {
-        "header": np.frombuffer(json.dumps(told).encode(), dtype=np.uint8),
-        "weights": make_ranking().weights if weights is None else weights,
-    }
-    np.savez(path, **{name: array for name, array in arrays.items() if f"array {name}" not in left_out})
-
-
-def with_number(number):
-    weights = make_ranking().weights
-    weights[1, 3] = number
-    return weights
-
-
-SHAPE = r"weights: expected float64 weights of shape \(brigades, 17\), got "
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"format": 7}, "format: expected fireworld-.*, got 7$"),
-        ({"left_out": ("format",)}, "format: expected fireworld-.*, got None$"),
-        ({"weights": np.zeros((2, 16))}, SHAPE + r"float64 \(2, 16\)"),
-        ({"weights": np.zeros(17)}, SHAPE + r"float64 \(17,\)"),
-        ({"weights": np.zeros((0, 17))}, SHAPE + r"float64 \(0, 17\)"),
-        ({"weights": np.zeros((2, 17), dtype=np.float32)}, SHAPE + r"float32 \(2, 17\)"),
-        ({"weights": np.zeros((2, 17), dtype=np.int64)}, SHAPE + r"int64 \(2, 17\)"),
-        ({"weights": np.array([{}])}, "ValueError: Object arrays cannot be loaded"),
-        ({"weights": with_number(np.nan)}, r"weights\[1, 3\]: expected a finite number, got nan$"),
-        ({"weights": with_number(-np.inf)}, r"weights\[1, 3\]: expected a finite number, got -inf$"),
-        ({"left_out": ("weights",)}, "weights: expected temperature, volume, .*, got 'None'$"),
-        ({"left_out": ("own_targets",)}, "own_targets: expected true or false, got None$"),
-        ({"own_targets": 1}, "own_targets: expected true or false, got 1$"),
-        ({"left_out": ("array weights",)}, "expected a team file, got no weights in it$"),
-        ({"left_out": ("array header",)}, "expected a team file, got no header in it$"),
-    ],
-)
-def test_what_is_wrong_with_a_file(tmp_path, changes, message):
-    write(tmp_path / "bad.npz", **changes)
-    for read in (
-        lambda: parse_team_file((tmp_path / "bad.npz").read_bytes(), source="bad"),
-        lambda: parse_ranking((tmp_path / "bad.npz").read_bytes(), source="bad"),
-        lambda: load_policy(str(tmp_path / "bad.npz")),
-    ):
-        with pytest.raises(TrainingError, match=message) as caught:
-            read()
-        assert "bad" in str(caught.value).partition(":")[0]
-        assert "\n" not in str(caught.value)
-
-
-def test_a_file_of_a_later_format(tmp_path):
-    write(tmp_path / "bad.npz", format="fireworld-ranking/2")
-    message = r"^bad: format: expected fireworld-ranking/1, got 'fireworld-ranking/2'; made by a later fireworld\?$"
-    with pytest.raises(TrainingError, match=message):
-        parse_ranking((tmp_path / "bad.npz").read_bytes(), source="bad")
-    with pytest.raises(TrainingError, match="got 'fireworld-ranking/2'"):
-        load_policy(str(tmp_path / "bad.npz"))
-
-
-@pytest.mark.parametrize("names", [NAMES[:-1], NAMES[::-1], [*NAMES, "smell"], "temperature", {"temperature": 1}])
-def test_weights_of_something_else_are_refused(tmp_path, names):
-    told = {"format": FORMAT, "weights": names, "own_targets": True}
-    header = np.frombuffer(json.dumps(told).encode(), dtype=np.uint8)
-    np.savez(tmp_path / "bad.npz", header=header, array=0, weights=make_ranking().weights)
-    with pytest.raises(TrainingError, match="bad.npz: weights: expected temperature, volume, fuel_left, "):
-        load_team_file(tmp_path / "bad.npz")
-
-
-def test_damaged_files(tmp_path):
-    save_ranking(make_ranking(), tmp_path / "a.npz")
-    good = (tmp_path / "a.npz").read_bytes()
-    with pytest.raises(TrainingError, match=r"a: expected a team file \(.npz\), got BadZipFile"):
-        parse_team_file(good[: len(good) // 2], source="a")
-    n_refused = 0
-    for place in range(40, len(good) - 40, 23):
-        bad = bytearray(good)
-        bad[place] ^= 0x5A
-        try:
-            read = parse_team_file(bytes(bad), source="a")
-        except TrainingError:
-            n_refused += 1
-        else:
-            assert read.digest == make_ranking().digest, "damaged where nothing is told"
-    assert n_refused > 20
-
-
-# Recorded
-
-
 @pytest.fixture
 def here(tmp_path, monkeypatch):
     """The current folder, with a file of each kind of ranking."""
@@ -305,9 +160,6 @@ def test_what_is_written_is_what_was_recorded(here, fireworld):  # noqa: F811 - 
         assert told.decisions.action.tolist() == read.decisions.action.tolist()
     assert len(records[0].decisions.target_value) == 0
     assert len(records[9].decisions.target_value) == 2
-
-
-# Policies of a user's own that name targets
 
 
 class Stubborn:
@@ -383,11 +235,6 @@ def test_what_the_others_go_for_is_seen(in_turn, known):
     assert policy.known == known
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="World keeps an own target that burns in another site than the brigade's since the site split; a replay, "
-    "which asks for every decision, cannot name it, and takes the action 0 instead",
-)
 def test_a_kept_target_is_replayed_after_its_site_split():
     def walk(policy):
         world = chain_world()

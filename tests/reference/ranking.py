@@ -121,12 +121,10 @@ def exposed_shares(
     b: Array, tables: fire.FireTables, state: fire.FireState, temperature: Float64Array
 ) -> tuple[Float64Array, Float64Array]:
     """(k,) twice: share of each one's radiation that falls on what never burned; counted by how warm that is."""
-    can_catch = tables.inflammable & np.isin(state.fieryness, (UNBURNT, WATER_DAMAGED))
-    warmth = np.minimum(temperature / tables.ignition_point, 1.0)
-    exposure, kindling = np.zeros(len(b)), np.zeros(len(b))
-    for k, building in enumerate(b.tolist()):
-        first, end = np.searchsorted(tables.link_from, (building, building + 1))
-        to, share = tables.link_to[first:end], tables.link_share[first:end]
-        exposure[k] = share[can_catch[to]].sum()
-        kindling[k] = (share * warmth[to])[can_catch[to]].sum()
-    return exposure, kindling
+    first, end = (np.searchsorted(tables.link_from, b, side=side) for side in ("left", "right"))
+    link = np.concatenate([np.arange(one, other) for one, other in zip(first.tolist(), end.tolist(), strict=True)])
+    of, to = np.repeat(np.arange(len(b)), end - first), tables.link_to[link]
+    can_catch = tables.inflammable[to] & np.isin(state.fieryness[to], (UNBURNT, WATER_DAMAGED))
+    share = tables.link_share[link] * can_catch
+    warmth = np.minimum(temperature[to] / tables.ignition_point[to], 1.0)
+    return np.bincount(of, share, minlength=len(b)), np.bincount(of, share * warmth, minlength=len(b))

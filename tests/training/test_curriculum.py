@@ -68,7 +68,9 @@ def test_each_group_of_values_is_a_scenario(stage_of):
 
 
 def test_each_group_with_every_combination(stage_of):
-    scenarios = stage_of("each: [{brigades.n: 3}, {brigades.n: 5, steps: 1}], vary: {steps: [7, 8], civilians.n: [1, 2]}")
+    scenarios = stage_of(
+        "each: [{brigades.n: 3}, {brigades.n: 5, steps: 1}], vary: {steps: [7, 8], civilians.n: [1, 2]}"
+    )
     told = [(one.brigades.n, one.steps, one.civilians.n) for one in scenarios]
     assert told == [(n, *rest) for n in (3, 5) for rest in ((7, 1), (7, 2), (8, 1), (8, 2))]
     assert [one.name for one in scenarios] == [f"a-{k}" for k in range(1, 9)]

@@ -182,15 +182,27 @@ def test_one_generation_by_hand(make, monkeypatch):
     assert report.score_best - report.score_mean == pytest.approx(best[:, 3].mean() - candidates[:, 3].mean())
 
 
+class Fires:
+    """Notes which fires are fought, instead of fighting them."""
+
+    def __init__(self, searcher, monkeypatch):
+        self.fought = []
+        monkeypatch.setattr(searcher, "_fight", self)
+
+    def __call__(self, weights, fire):
+        self.fought.append(fire)
+        return 0.0
+
+
 def test_all_candidates_meet_the_same_fires_drawn_anew_and_never_twice(make, monkeypatch):
-    searcher, fought = make(n_generations=20, n_candidates=2, n_best=1), []
-    monkeypatch.setattr(searcher, "_fight", lambda weights, fire: float(fought.append(fire) or 0))
+    searcher = make(n_generations=20, n_candidates=2, n_best=1)
+    fought = Fires(searcher, monkeypatch).fought
     list(searcher.run(n_threads=1, stop=Event()))
     generations = [fought[k : k + 4] for k in range(0, 80, 4)]
     assert all(fires[:2] == fires[2:] and fires[0] != fires[1] for fires in generations)
     assert {tuple(sorted(fires[:2])) for fires in generations} == {(0, 1), (0, 2), (1, 2)}
-    many, fought = make(n_fires=99, n_generations=1, n_candidates=1, n_best=1), []
-    monkeypatch.setattr(many, "_fight", lambda weights, fire: float(fought.append(fire) or 0))
+    many = make(n_fires=99, n_generations=1, n_candidates=1, n_best=1)
+    fought = Fires(many, monkeypatch).fought
     list(many.run(n_threads=1, stop=Event()))
     assert sorted(fought) == [0, 1, 2], "no more than there are"
 

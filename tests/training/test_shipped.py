@@ -9,11 +9,14 @@ import pytest
 
 from benchmarks.shipped import COMMANDS
 from fireworld.errors import PolicyError
+from fireworld.policy.files import load_team_file
 from fireworld.policy.names import load_policy
 from fireworld.policy.shipped import team_names, team_path
 from fireworld.policy.team import Team, load_team, save_team
 from fireworld.training.curriculum import load_curriculum
 from fireworld.training.method import PAPER
+from fireworld.training.search import Search, Searcher
+from fireworld.training.searches import IDENTITY
 from fireworld.training.trainer import Trainer
 from recorder.reader import open_log
 
@@ -25,7 +28,15 @@ CURRICULA = {
 
 
 def test_the_papers_teams_are_there():
-    assert set(SHAPES) == set(COMMANDS) <= set(team_names())
+    assert {*SHAPES, "best"} == set(COMMANDS) <= set(team_names())
+
+
+def test_the_best_comes_from_the_shipped_curriculum():
+    ranking = load_team_file(team_path("best"))
+    wanted = Searcher(load_curriculum("contested"), Search(), seed=1, grounds={}).ranking().provenance
+    assert {key: ranking.provenance[key] for key in IDENTITY} == {key: wanted[key] for key in IDENTITY}
+    assert ranking.provenance["generations_done"] == Search().n_generations
+    assert ranking.own_targets
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -41,7 +52,7 @@ def test_a_team_comes_from_the_shipped_curriculum(name):
     assert team_path(name).stat().st_size < 300_000
 
 
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("name", COMMANDS)
 def test_by_its_name(name):
     named = load_policy(name)
     assert named.name == name
