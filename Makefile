@@ -4,10 +4,11 @@ WORKERS ?= 2
 FUZZ_SECONDS ?= 60
 BIN := .venv/bin
 DEMO := recordings/demo
+PICTURE := recordings/picture-
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help install demo test check-format check-lint check-types check-imports check-tests format docs fuzz bench check-teams clean
+.PHONY: help install demo test check-format check-lint check-types check-imports check-tests format docs pictures fuzz bench check-teams clean
 
 help:  ## List these targets.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -56,6 +57,17 @@ docs: install  ## Renew what is made from the code in docs/, and the transcripts
 	$(BIN)/python -m fireworld.cli.reference
 	$(BIN)/python -m tests.docs.transcripts
 
+pictures: install  ## Draw the pictures of the docs again, from runs made again.
+	mkdir -p docs/pictures recordings
+	$(BIN)/fireworld run default --policy chief --seed 1 --record $(PICTURE)default.mcap --force
+	$(BIN)/fireworld run test-1 --policy paper-noncooperative --seed 1 --record $(PICTURE)alone.mcap --force
+	$(BIN)/fireworld run test-1 --policy paper-cooperative --seed 1 --record $(PICTURE)together.mcap --force
+	$(BIN)/fireworld render $(PICTURE)default.mcap -o docs/pictures/still.png --step 38 --force
+	$(BIN)/fireworld render $(PICTURE)default.mcap -o docs/pictures/strip.png --steps 0,30,60,last --force
+	$(BIN)/fireworld render $(PICTURE)default.mcap -o docs/pictures/film.gif --force
+	$(BIN)/fireworld render $(PICTURE)alone.mcap $(PICTURE)together.mcap -o docs/pictures/pair.png --step 60 --force
+	$(BIN)/fireworld render $(PICTURE)alone.mcap $(PICTURE)together.mcap -o docs/pictures/before-after.png --steps 0,last --force
+
 fuzz: install  ## Try odd and altered files on all readers for FUZZ_SECONDS (60).
 	$(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS)
 
@@ -67,5 +79,5 @@ check-teams: install  ## Train the teams that come with fireworld again; they mu
 
 clean:  ## Remove what the other targets made, .venv too.
 	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist build
-	rm -f $(DEMO).mcap $(DEMO).mcap.partial $(DEMO).rrd
+	rm -f $(DEMO).mcap $(DEMO).mcap.partial $(DEMO).rrd $(PICTURE)*.mcap
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

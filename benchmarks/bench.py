@@ -20,6 +20,7 @@ SECTIONS: Final = {
     "city": "city_rows",
     "log": "log_rows",
     "view": "view_rows",
+    "pictures": "render_rows",
     "compare": "compare_rows",
     "start-up": "start_rows",
 }

@@ -16,9 +16,9 @@ from typing import Final
 
 import click
 
-from fireworld.policy.shipped import team_path
 from fireworld.policy.files import load_team_file
 from fireworld.policy.ranking import Ranking
+from fireworld.policy.shipped import team_path
 from fireworld.policy.team import Team
 
 COMMANDS: Final[Mapping[str, tuple[str, ...]]] = {

@@ -1,4 +1,4 @@
-"""Rows of the viewer: turning a log into a Rerun file."""
+"""Rows of the viewer: turning logs into Rerun files, one run and two, and sending a run step by step."""
 
 from __future__ import annotations
 
@@ -6,31 +6,70 @@ import importlib.util
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Final
 
 from benchmarks.fires import city_of
 from benchmarks.runs import new_world, write_log
 from benchmarks.timing import Contender, Row, compare
+from fireworld.records import MemoryRecording
 from recorder.reader import open_log
 from viewer.app import save
+from viewer.selection import select_steps
+
+N_STEPS: Final = 300
 
 
 def rows(*, quick: bool) -> Iterator[Row]:
     """Yield the rows of the viewer; none where Rerun is not installed."""
     if importlib.util.find_spec("rerun") is None:
         return
-    size, n_steps, seconds = (100, 50, 0.3) if quick else (1000, 300, 3.0)
+    seconds, sizes = (0.3, (100,)) if quick else (3.0, (1000, 4000))
     with tempfile.TemporaryDirectory() as name:
-        log_path, view_path = Path(name, "run.mcap"), Path(name, "run.rrd")
-        write_log(log_path, new_world(size, n_steps))
+        for size in sizes:
+            log_path = Path(name, f"run-{size}.mcap")
+            write_log(log_path, new_world(size, 50 if quick else N_STEPS))
+            yield _to_file("log to Rerun file", log_path, size, n_runs=1, seconds=seconds)
+            if size == sizes[0]:
+                yield _to_file("two logs to one Rerun file", log_path, size, n_runs=2, seconds=seconds)
+                yield _by_steps(log_path, size, seconds=seconds)
 
-        def convert(_: None) -> None:
-            save([open_log(log_path)], view_path, force=True)
 
-        def read_only(_: None) -> int:
-            return sum(1 for _ in open_log(log_path))
+def _to_file(what: str, log_path: Path, size: int, *, n_runs: int, seconds: float) -> Row:
+    view_path = log_path.with_suffix(".rrd")
 
-        convert(None)
-        n_steps = len(open_log(log_path))
-        label = f"{city_of(size).n_buildings} buildings, {n_steps} steps, {view_path.stat().st_size / 1e6:.1f} MB"
-        ours, baseline = Contender("view --save", convert), Contender("reading the log", read_only)
-        yield compare("view", "log to Rerun file", label, ours, baseline, seconds=seconds)
+    def convert(_: None) -> None:
+        save([select_steps(open_log(log_path)) for _ in range(n_runs)], view_path, force=True)
+
+    def read_only(_: None) -> int:
+        return n_runs * sum(1 for _ in open_log(log_path))
+
+    convert(None)
+    label = _label(log_path, size) + f", {view_path.stat().st_size / 1e6:.1f} MB"
+    ours, baseline = Contender("view --save", convert), Contender("reading the log", read_only)
+    return compare("view", what, label, ours, baseline, seconds=seconds)
+
+
+def _by_steps(log_path: Path, size: int, *, seconds: float) -> Row:
+    """Send a run step by step, as a live view does, beside all steps at once."""
+    import rerun
+
+    from viewer.mapping import Feed
+
+    whole = select_steps(open_log(log_path))
+    parts = [MemoryRecording(whole.header, whole.city, [record]) for record in whole]
+
+    def send(recordings: list[MemoryRecording]) -> None:
+        stream = rerun.RecordingStream("benchmark", send_properties=False)
+        memory = stream.memory_recording()
+        feed = Feed(stream, whole.city)
+        for recording in recordings:
+            feed.take(recording)
+        memory.drain_as_bytes()
+
+    ours = Contender("Feed.take for each step", lambda _: send(parts))
+    baseline = Contender("for all steps at once", lambda _: send([whole]))
+    return compare("view", "a run sent step by step", _label(log_path, size), ours, baseline, seconds=seconds)
+
+
+def _label(log_path: Path, size: int) -> str:
+    return f"{city_of(size).n_buildings} buildings, {len(open_log(log_path))} steps"

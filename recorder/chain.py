@@ -11,13 +11,15 @@ from recorder.schema import Commit
 
 UNCHAINED: Final = frozenset({Snapshot.topic, Commit.topic})
 """Topics whose messages `Chain.add` does not take: derived state, and the commit itself."""
+SCENE_PREFIX: Final = "/scene/"
+"""What the topics begin with that show a step to other tools: derived from it, not chained, any number in a step."""
 
 
 class Chain:
     """Hashes of a run as its messages come by.
 
     h_0 = sha256(format name, /city); h_t = sha256(h_(t-1), then topic, zero byte, length as 8 little-endian bytes
-    and bytes of every message of step t but /snapshot, and at last of its /commit without the hash).
+    and bytes of every message of step t but /snapshot and /scene/..., and at last of its /commit without the hash).
     """
 
     def __init__(self, city: Buffer) -> None:
@@ -25,8 +27,8 @@ class Chain:
         self._next = hashlib.sha256(self.hash)
 
     def add(self, topic: str, data: Buffer) -> None:
-        """Take in a message of the step under way; those of UNCHAINED topics are left out."""
-        if topic not in UNCHAINED:
+        """Take in a message of the step under way; those of UNCHAINED topics and of the scene are left out."""
+        if topic not in UNCHAINED and not topic.startswith(SCENE_PREFIX):
             self._update(topic, data)
 
     def commit(self, *, step: int, terminated: bool, truncated: bool) -> Commit:

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from fireworld.errors import LogError
 from fireworld.records import PHASES
+from recorder.chain import SCENE_PREFIX
 from recorder.codec import walk
 from recorder.schema import TOPICS, Field, Message, NamedArray, message_of
 from recorder.writer import Channel
@@ -20,6 +21,7 @@ _SCALARS: Final[Mapping[int, str]] = {
 _REPEATED: Final = 3
 _OF_ARRAYS: Final = {item.number: item for item in message_of(NamedArray).fields}
 """Of a snapshot's arrays, the only message inside another that there is."""
+_OF_SCENE: Final = "Drawn by other tools; derived from the step, and no part of the digest."
 _KNOWN: Final = {record_type.topic: message_of(record_type) for record_type in TOPICS}
 
 
@@ -71,7 +73,7 @@ def describe(channels: Iterable[Channel]) -> list[TopicWords]:
                 message=channel.schema_name,
                 known=known is not None,
                 phase=PHASES.get(channel.topic, ""),
-                doc=known.doc if known else "",
+                doc=known.doc if known else _OF_SCENE if channel.topic.startswith(SCENE_PREFIX) else "",
                 fields=fields,
             )
         )
@@ -81,9 +83,11 @@ def describe(channels: Iterable[Channel]) -> list[TopicWords]:
 def _fields(channel: Channel, known: Message | None) -> Iterator[FieldWords]:
     """Read a FileDescriptorSet: file = 1, in it message_type = 4."""
     ours = {item.number: item for item in known.fields} if known else {}
-    for file in _parts(channel.schema, 1):
-        for message in _parts(file, 4):
-            yield from _message_fields(message, ours)
+    messages = [message for file in _parts(channel.schema, 1) for message in _parts(file, 4)]
+    name = channel.schema_name.rpartition(".")[2]
+    own = [message for message in messages if _name(message) == name]  # a set may hold what the message is made of, too
+    for message in own or messages:
+        yield from _message_fields(message, ours)
 
 
 def _message_fields(message: Any, ours: Mapping[int, Field], prefix: str = "") -> Iterator[FieldWords]:

@@ -14,7 +14,7 @@ from mcap.opcode import Opcode
 from fireworld.errors import LogError, expected
 from fireworld.records import STEP_SECONDS, CityRecord, RunHeader, Snapshot
 from recorder import container
-from recorder.chain import Chain
+from recorder.chain import SCENE_PREFIX, Chain
 from recorder.codec import decode
 from recorder.container import Channel, Fields, Record, Schema, TruncatedError
 from recorder.header import METADATA_NAME, PROFILE, ForeignError, check_format, from_metadata
@@ -71,7 +71,7 @@ class Scan:
         good = f"good up to step {self.steps[-1]}" if self.steps else "no step is good"
         return f"{self.state}: {self.fault}; {good}"
 
-    def add(self, commit: Commit, start: Start, sizes: Mapping[str, int]) -> None:
+    def add(self, commit: Commit, start: Start, sizes: Mapping[str, TopicSize]) -> None:
         """Take in a step whose hash fits."""
         if not 0 <= commit.step <= _STEP_MAX:
             raise LogError(f"a step has the number {commit.step}")
@@ -80,10 +80,10 @@ class Scan:
         self.hash = commit.hash
         self.steps.append(commit.step)
         self.starts.append(start)
-        for topic, n_bytes in sizes.items():
+        for topic, found in sizes.items():
             size = self.topics.setdefault(topic, TopicSize())
-            size.n_messages += 1
-            size.n_bytes += n_bytes
+            size.n_messages += found.n_messages
+            size.n_bytes += found.n_bytes
             if topic == Snapshot.topic:
                 self.snapshots.append(commit.step)
 
@@ -148,12 +148,14 @@ def _follow(found: Scan, chain: Chain, stream_of_messages: Iterator[tuple[str, m
         LogError: the first fault; what was found before it is good.
     """
     start: Start | None = None
-    sizes: dict[str, int] = {}
+    sizes: dict[str, TopicSize] = {}
     for topic, payload, place in stream_of_messages:
         start = start or place
-        if topic in sizes:
+        if topic in sizes and not topic.startswith(SCENE_PREFIX):
             raise LogError(f"a step holds {topic} twice")
-        sizes[topic] = len(payload)
+        size = sizes.setdefault(topic, TopicSize())
+        size.n_messages += 1
+        size.n_bytes += len(payload)
         if topic != Commit.topic:
             chain.add(topic, payload)
             continue

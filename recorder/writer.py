@@ -5,10 +5,10 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Final, NamedTuple, Self
+from typing import Final, NamedTuple, Protocol, Self
 
 from mcap.writer import Writer
 
@@ -34,6 +34,19 @@ class Channel(NamedTuple):
     topic: str
     schema_name: str
     schema: bytes
+
+
+class Scene(Protocol):
+    """What a log holds besides, for tools that draw its steps: topics below /scene/, derived from the records."""
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        """The topics, in fixed order."""
+        ...
+
+    def messages(self, record: StepRecord) -> Sequence[tuple[str, bytes]]:
+        """Encode what is to be drawn of a step; steps come in rising order."""
+        ...
 
 
 def own_channels() -> list[Channel]:
@@ -185,20 +198,30 @@ class LogWriter:
         header: what identifies the run.
         city: the city it runs in.
         force: replace an existing log.
+        scene: what to write besides, for other tools.
 
     Raises:
         OutputError: the log exists, its folder does not, or it cannot be written.
     """
 
-    def __init__(self, path: Path | str, header: RunHeader, city: CityRecord, *, force: bool = False) -> None:
+    def __init__(
+        self,
+        path: Path | str,
+        header: RunHeader,
+        city: CityRecord,
+        *,
+        force: bool = False,
+        scene: Scene | None = None,
+    ) -> None:
         encoded_city = encode(city)
         self._chain = Chain(encoded_city)
+        self._scene = scene
         self._last_step = -1
         self._file = StepFile(
             Path(path),
             metadata=to_metadata(header),
             attachments=header.attachments,
-            channels=own_channels(),
+            channels=[*own_channels(), *(scene.channels if scene is not None else ())],
             city=encoded_city,
             force=force,
         )
@@ -221,6 +244,8 @@ class LogWriter:
             self._chain.add(topic, data)
         if record.snapshot is not None:
             messages.append((Snapshot.topic, encode_snapshot(record.snapshot.arrays)))
+        if self._scene is not None:
+            messages.extend(self._scene.messages(record))
         commit = self._chain.commit(step=record.step, terminated=record.terminated, truncated=record.truncated)
         messages.append((Commit.topic, encode(commit)))
         self._file.commit(record.step, messages)

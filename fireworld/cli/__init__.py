@@ -20,13 +20,15 @@ COMMANDS: Final = {
     "info": "Say what a recording holds and how far it is good.",
     "compare": "Compare two policies on the same luck, with a verdict.",
     "diff": "Compare two recordings step by step.",
-    "fork": "Go on from a step of a recording with another decision or policy.",
-    "explain": "Say which decisions make the difference between two recordings.",
+    "fork": "Go on otherwise from a step of a recording.",
+    "explain": "Say which decisions made one run better than another.",
     "verify": "Replay a recording and compare every step.",
     "export": "Write a recording as tables for data tools.",
     "golden": "Run kept recordings again and compare.",
     "recover": "Rescue the committed steps of a damaged recording.",
     "view": "Open recordings in Rerun.",
+    "render": "Draw recordings: pictures, strips, films.",
+    "report": "Write a recording, or two, as an HTML page.",
     "conformance": "Check the fire model against traces of another simulator.",
 }
 

@@ -67,9 +67,7 @@ def _show_schema(log: Log | None, *, as_json: bool) -> None:
     click.echo(FORMAT)
     for topic in topics:
         phase = f" Phase: {topic.phase}." if topic.phase else ""
-        click.echo(
-            f"\n{one_line(topic.topic)}  {topic.doc if topic.known else 'Not known to this version; skipped.'}{phase}"
-        )
+        click.echo(f"\n{one_line(topic.topic)}  {topic.doc or 'Not known to this version; skipped.'}{phase}")
         rows = [("no.", "field", "type", "shape", "unit", "meaning")]
         rows += [
             (str(item.number), item.name, item.type, item.shape and f"({item.shape},)", item.unit, item.doc)

@@ -12,13 +12,16 @@ import click
 from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.interrupt import gentle_interrupt
+from fireworld.cli.live import find_screen, view_options, watched_run
 from fireworld.policy.shipped import team_names
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from fireworld.records import StepRecord
+    from fireworld.records import CityRecord, RunHeader, StepRecord
     from fireworld.runs import Run
+    from recorder.writer import Scene
+    from viewer.live import Screen
 
 POLICIES_HELP: Final = (
     "easiest, nearest-to-civilian, nearest-to-center, nearest-to-me, each-another, random, chief, "
@@ -29,13 +32,17 @@ POLICIES_HELP: Final = (
 
 @click.command()
 @click.argument("scenario", default="default")
-@click.option("--policy", default="chief", show_default=True, help=POLICIES_HELP)
+@click.option("--policy", default="best", show_default=True, help=POLICIES_HELP)
 @click.option("--seed", default=1, show_default=True, type=click.IntRange(0, 2**32 - 1), help="Seed of all luck.")
 @click.option("--steps", type=click.IntRange(min=1), help="Stop after this step.  [default: the scenario's]")
 @click.option(
     "--record", "output", metavar="FILE.mcap", type=click.Path(path_type=Path), help="Record every step to a file."
 )
 @click.option("--force", is_flag=True, help="Replace an existing recording.")
+@click.option(
+    "--scene", type=click.Choice(["foxglove"]), help="Add to the recording what Foxglove, Lichtblick and Rerun draw."
+)
+@view_options
 @click.option("--set", "settings", metavar="KEY=VALUE", multiple=True, help="Set a key of the scenario; repeatable.")
 @click.option("--json", "as_json", is_flag=True, help="Write the outcome as JSON.")
 @click.pass_context
@@ -48,6 +55,9 @@ def command(
     steps: int | None,
     output: Path | None,
     force: bool,
+    scene: str | None,
+    view: bool,
+    view_url: str | None,
     settings: tuple[str, ...],
     as_json: bool,
 ) -> None:
@@ -58,11 +68,15 @@ def command(
     fireworld run test-1 --policy easiest --seed 3   another fire, policy and luck
     fireworld run quick --set brigades.n=4           with a changed scenario
     fireworld run --record out.mcap                  and every step recorded
+    fireworld run --view                             and shown while it runs
 
     Exit code: 0 run, 2 could not run, 130 interrupted (the recording keeps every step done).
     """  # noqa: D301 - click wants the character
     if force and output is None:
         raise click.UsageError("--force goes with --record.")
+    if scene is not None and output is None:
+        raise click.UsageError("--scene goes with --record.")
+    screen = find_screen(view=view, url=view_url)
     announce_compilation()
     from fireworld.policy.names import load_policy, note_on_team
     from fireworld.runs import prepare_run
@@ -75,7 +89,7 @@ def command(
     if note:
         click.echo(note, err=True)
     run = prepare_run(build_stage(chosen), named, seed=seed, n_steps_max=steps)
-    last, digest = carry_out(run, output=output, force=force, quiet=as_json)
+    last, digest = carry_out(run, output=output, force=force, quiet=as_json, foxglove=scene is not None, screen=screen)
     outcome = outcome_of(run, last, digest=digest, output=output)
     if as_json:
         click.echo(json.dumps(outcome, indent=2))
@@ -84,8 +98,24 @@ def command(
     context.exit(INTERRUPTED if outcome["ended"] == "interrupted" else 0)
 
 
-def carry_out(run: Run, *, output: Path | None, force: bool, quiet: bool) -> tuple[StepRecord, str]:
+def carry_out(
+    run: Run,
+    *,
+    output: Path | None,
+    force: bool,
+    quiet: bool,
+    foxglove: bool = False,
+    screen: Screen | None = None,
+) -> tuple[StepRecord, str]:
     """Let a run happen, recorded if there is an output; return its last record and its digest.
+
+    Args:
+        run: the run.
+        output: the recording to make.
+        force: replace an existing one.
+        quiet: show no progress.
+        foxglove: add to the recording what Foxglove draws.
+        screen: where to show the run while it happens.
 
     Raises:
         PolicyError: the policy failed; the steps before are in the partial recording.
@@ -101,12 +131,16 @@ def carry_out(run: Run, *, output: Path | None, force: bool, quiet: bool) -> tup
         with ExitStack() as stack:
             interrupted = stack.enter_context(gentle_interrupt())
             if output is not None:
-                sink: LogWriter | Digest = stack.enter_context(LogWriter(output, run.header, run.city, force=force))
+                scene = make_scene(run.header, run.city) if foxglove else None
+                writer = LogWriter(output, run.header, run.city, force=force, scene=scene)
+                sink: LogWriter | Digest = stack.enter_context(writer)
             else:
                 sink = Digest(run.city)
             write = sink.write if isinstance(sink, LogWriter) else sink.add
+            show = stack.enter_context(watched_run(screen, run.header, run.city))
             for record in _with_progress(run, quiet=quiet):
                 write(record)
+                show(record)
                 last = record
                 if interrupted.is_set():
                     break
@@ -120,6 +154,13 @@ def carry_out(run: Run, *, output: Path | None, force: bool, quiet: bool) -> tup
         raise SystemExit(INTERRUPTED) from error
     assert last is not None  # noqa: S101 - a run yields its start before anything else
     return last, sink.digest
+
+
+def make_scene(header: RunHeader, city: CityRecord) -> Scene:
+    """Make what is recorded besides for Foxglove."""
+    from fireworld.cli.scene import FoxgloveScene
+
+    return FoxgloveScene(header, city)
 
 
 def _with_progress(run: Run, *, quiet: bool) -> Iterator[StepRecord]:

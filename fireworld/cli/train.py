@@ -14,6 +14,7 @@ import click
 from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.interrupt import gentle_interrupt
+from fireworld.cli.live import find_screen, view_options, watched_training
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -64,6 +65,7 @@ class Report(Protocol):
 @click.option("--log", metavar="F.csv", type=click.Path(path_type=Path), help="Write a line for every episode.")
 @click.option("--resume", is_flag=True, help="Go on from the checkpoint of an interrupted training.")
 @click.option("--force", is_flag=True, help="Replace existing files, checkpoints too.")
+@view_options
 @click.pass_context
 def command(
     context: click.Context,
@@ -79,6 +81,8 @@ def command(
     log: Path | None,
     resume: bool,
     force: bool,
+    view: bool,
+    view_url: str | None,
 ) -> None:
     """Train a team in CURRICULUM (a shipped name or a YAML file) and write its team file.
 
@@ -89,6 +93,7 @@ def command(
     fireworld train -o alone.npz --stages alone          without cooperation: 270 states
     fireworld train -o team.npz --set alpha=0.1 --seed 7
     fireworld train -o best.npz --method search          a ranking of targets
+    fireworld train -o team.npz --view                   curves while it learns, a fire after every stage
     fireworld run test-2 --policy team.npz               let it fight a fire
 
     The same seed gives the same team. Ctrl-C keeps a checkpoint, TEAM.npz.checkpoint, from which --resume goes on bit
@@ -104,6 +109,9 @@ def command(
         raise click.UsageError("-o and --log name the same file.")
     if seed + repetitions - 1 > SEED_MAX:
         raise click.UsageError(f"--repetitions: expected seeds up to {SEED_MAX}, got up to {seed + repetitions - 1}.")
+    if method == "search" and (view or view_url is not None):
+        raise click.UsageError("--view: a search has no episodes to show; its generations are written.")
+    screen = find_screen(view=view, url=view_url)
     announce_compilation()
     from fireworld.scenario import split_settings
     from fireworld.training.curriculum import load_curriculum
@@ -144,8 +152,13 @@ def command(
     ]
     _begin(trainings, resume=resume)
     n_jobs = min(jobs or os.cpu_count() or 1, repetitions)
-    with gentle_interrupt() as interrupted, _progress(trainings) as report:
-        train_all(trainings, n_jobs=n_jobs, stop=interrupted, report=report)
+    with gentle_interrupt() as interrupted, _progress(trainings) as report, watched_training(screen) as show:
+
+        def report_and_show(training: Training, episode: EpisodeReport, /) -> None:
+            report(training, episode)
+            show(training, episode)
+
+        train_all(trainings, n_jobs=n_jobs, stop=interrupted, report=report_and_show)
     for training in trainings:
         _show(training)
     context.exit(0 if all(training.team is not None for training in trainings) else INTERRUPTED)

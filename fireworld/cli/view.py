@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,7 @@ import click
 
 if TYPE_CHECKING:
     from fireworld.records import Recording
+    from viewer.outcome import Outcome
 
 
 def _building_ids(context: click.Context, parameter: click.Parameter, value: str | None) -> tuple[int, ...]:
@@ -59,13 +61,14 @@ def command(
     from viewer.selection import select_steps
 
     recordings = [select_steps(_open(path), first=first, last=last, every=every) for path in logs]
+    outcome = _outcome(logs, recordings)
     if output is not None:
-        app.save(recordings, output, focus=focus, force=force)
+        app.save(recordings, output, focus=focus, outcome=outcome, force=force)
         click.echo(f"wrote {output}; open it with `rerun {output}`")
     elif web:
-        app.serve(recordings, focus=focus, port=port or app.WEB_PORT, announce=_announce)
+        app.serve(recordings, focus=focus, outcome=outcome, port=port or app.WEB_PORT, announce=_announce)
     else:
-        app.show(recordings, focus=focus)
+        app.show(recordings, focus=focus, outcome=outcome)
 
 
 def _open(path: Path) -> Recording:
@@ -76,6 +79,29 @@ def _open(path: Path) -> Recording:
     if log.damage is not None:
         click.echo(f"{path}: {log.damage}; showing {len(log.steps)} committed steps", err=True)
     return log
+
+
+def _outcome(logs: Sequence[Path], recordings: Sequence[Recording]) -> Outcome:
+    """Work out what the runs came to, and where two first differ, in the steps that are shown."""
+    from fireworld.cli.difference_text import totals_rows
+    from recorder.diff import Difference, compare
+    from recorder.totals import totals_of
+    from viewer.comparison import check_same_city
+    from viewer.outcome import Outcome
+
+    heads = [path.name for path in logs]
+    if len(recordings) == 1:
+        totals = totals_of(recordings[0])
+        alone = Difference(None, (totals, totals), {}, totals.n_steps, {})
+        return Outcome(heads=heads, rows=[(label, value) for label, value, _ in totals_rows(alone)])
+    first_run, second_run = recordings
+    check_same_city(first_run.city, second_run.city)
+    difference = compare(first_run, second_run)
+    rows, first = list(totals_rows(difference)), difference.first
+    if first is None:
+        return Outcome(heads=heads, rows=rows)
+    step = int(first_run.steps[0]) if first.step is None else first.step
+    return Outcome(heads=heads, rows=rows, first_step=step, first_sentence=first.sentence)
 
 
 def _announce(address: str) -> None:

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from fireworld.errors import OutputError, TrainingError, expected
-from fireworld.kernels.arrays import Array
+from fireworld.records import Array
 
 SUFFIX: Final = ".npz"
 FIXED_TIME: Final = (1980, 1, 1, 0, 0, 0)

@@ -5,16 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from fireworld.policy.npz import SUFFIX
-
 _FOLDER: Final = Path(__file__).parents[1] / "teams"
+_SUFFIX: Final = ".npz"
 
 
 def team_names() -> list[str]:
     """Name the teams."""
-    return sorted(path.stem for path in _FOLDER.glob(f"*{SUFFIX}"))
+    return sorted(path.stem for path in _FOLDER.glob(f"*{_SUFFIX}"))
 
 
 def team_path(name: str) -> Path:
     """Return the file of a team."""
-    return _FOLDER / f"{name}{SUFFIX}"
+    return _FOLDER / f"{name}{_SUFFIX}"

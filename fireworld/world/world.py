@@ -171,7 +171,7 @@ class World:
         before, target_before = brigades.action.copy(), brigades.target.copy()
         in_turn = self.constants.observation.in_turn
         shown, known = (brigades.action, brigades.target) if in_turn else (before, target_before)
-        keeps = getattr(policy, "keeps", None)
+        keeps, step = getattr(policy, "keeps", None), self.step_number
         for brigade in range(self.n_brigades):
             states[brigade] = observe(
                 brigade, shown, brigades, self.arrays.sites, self.constants.observation, features[brigade]
@@ -179,7 +179,7 @@ class World:
             target = -1
             if can_choose(brigade, brigades, self.arrays.sites):
                 last = Decision(int(before[brigade]), target=int(target_before[brigade]))
-                if keeps is not None and self._can_keep(brigade, last) and keeps(brigade, last.action, self.step_number):
+                if keeps is not None and self._can_keep(brigade, last) and keeps(brigade, last.action, step):
                     decisions[brigade] = last
                 else:
                     decisions[brigade] = self._ask(policy, brigade, features[brigade], int(states[brigade]), known)

@@ -86,7 +86,7 @@ def test_a_scenario_of_ones_own_in_a_city_of_ones_own(here, fireworld):
     (here / "city.json").unlink()
     (here / "mine.yaml").unlink()
     assert fireworld("verify", "a.mcap").code == 0
-    assert set(open_log(here / "a.mcap").header.attachments) == {"scenario.yaml", "city.json"}
+    assert set(open_log(here / "a.mcap").header.attachments) == {"scenario.yaml", "city.json", "policy.npz"}
 
 
 def test_a_recording_knows_nothing_of_where_it_was_made(here, fireworld, monkeypatch):

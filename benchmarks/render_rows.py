@@ -1,0 +1,56 @@
+"""Rows of pictures without a viewer: films of a fire in a city of the default scenario's size, and a report."""
+
+from __future__ import annotations
+
+import importlib.util
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from benchmarks.runs import new_world, write_log
+from benchmarks.timing import Contender, Row, compare, measure
+from recorder.reader import Log, open_log
+from viewer.film import FILMS, Reel, save_film
+from viewer.moments import Moment, moments_between
+from viewer.output import plain_style
+
+
+def rows(*, quick: bool) -> Iterator[Row]:
+    """Yield the rows of pictures; none where matplotlib is not installed."""
+    if importlib.util.find_spec("matplotlib") is None:
+        return
+    size, n_steps, seconds = (100, 20, 0.3) if quick else (624, 300, 3.0)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_log(folder / "run.mcap", new_world(size, n_steps))
+        log = open_log(folder / "run.mcap")
+        moments = moments_between([log])
+        city = f"{len(log.city.building_id)} buildings, {len(moments)} steps"
+
+        def blitted(_: None) -> None:
+            reel = Reel([log], moments)
+            for index in range(len(reel)):
+                reel.frame(index)
+
+        def anew(_: None) -> None:
+            for moment in moments[:: len(moments) // 10]:
+                Reel([log], [moment]).frame(0)
+
+        with plain_style():
+            ours = Contender("the city once", blitted, parts=len(moments))
+            baseline = Contender("a figure each", anew, parts=len(moments[:: len(moments) // 10]))
+            yield compare("pictures", "a frame of a film", city, ours, baseline, seconds=seconds)
+            for ending in FILMS:
+                if ending == ".gif" or importlib.util.find_spec("av") is not None:
+                    yield measure_film(log, moments, folder / f"film{ending}", size=city, seconds=seconds)
+
+
+def measure_film(log: Log, moments: Sequence[Moment], path: Path, *, size: str, seconds: float) -> Row:
+    """Measure the writing of a film from a log that is read."""
+
+    def write(_: None) -> None:
+        save_film([log], moments, path)
+
+    write(None)
+    label = f"{size}, {path.stat().st_size / 1e6:.1f} MB"
+    return measure("pictures", "film", label, Contender(f"render {path.suffix}", write), seconds=seconds)

@@ -1,0 +1,295 @@
+"""A live view shows what happens and changes nothing: not the run, not its length, not its end."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+from threading import Event
+
+import numpy as np
+import pytest
+
+from fireworld.errors import ViewError
+from tests.cli.conftest import here  # noqa: F401 - a folder with policies in it
+from tests.command_line import call
+from tests.training.conftest import SHORT_WORDS, TINY
+from tests.viewer import rrd
+from viewer import app, courier, live
+from viewer.courier import Courier
+
+SHORT = ("run", "quick", "--steps", 9, "--json")
+TRAIN = ("train", "tiny.yaml", *SHORT_WORDS, "--stages", "alone", "-o")
+DYING = (sys.executable, "-S", "-c", "import os; os.read(0, 1)")
+NOTE = "view: the viewer is closed; the run goes on without it\n"
+
+
+@pytest.fixture
+def fireworld(monkeypatch):
+    return partial(call, monkeypatch)
+
+
+@pytest.fixture
+def window(monkeypatch, tmp_path):
+    """Instead of a window: Rerun's own program, which writes what it is fed to a file."""
+    path = tmp_path / "seen.rrd"
+    monkeypatch.setattr(live, "own_window", lambda: to_file(path))
+    return path
+
+
+def to_file(path: Path) -> live.Screen:
+    return live.Screen((str(app.viewer_executable()), "-", "--save", str(path)), stays=False)
+
+
+class Pipe:
+    """A pipe of the tests: it takes everything, or nothing before it is let go, or is broken."""
+
+    def __init__(self, *, blocked: bool = False, broken: bool = False) -> None:
+        self.content = b""
+        self.go = Event()
+        self.broken = broken
+        self.finished: bool | None = None
+        if not blocked:
+            self.go.set()
+
+    def write(self, content: bytes) -> int:
+        self.go.wait()
+        if self.broken:
+            raise BrokenPipeError
+        piece = content[:3]
+        self.content += piece
+        return len(piece)
+
+    def close(self, *, finished: bool) -> bool:
+        self.finished = finished
+        return finished
+
+
+def carry(pipe: Pipe, items, **changes) -> tuple[Courier[int], list[str]]:
+    told: list[str] = []
+    words = {"n_waiting_max": 100, "tell": told.append} | changes
+    carrier: Courier[int] = Courier(lambda batch: "".join(f"{one} " for one in batch).encode(), pipe, **words)
+    for item in items:
+        carrier.put(item)
+    return carrier, told
+
+
+def test_a_courier_brings_everything_in_order():
+    pipe = Pipe()
+    carrier, told = carry(pipe, range(50))
+    carrier.close()
+    assert pipe.content.decode().split() == [str(number) for number in range(50)]
+    assert (pipe.finished, told) == (True, [])
+
+
+def test_who_hands_over_never_waits_and_a_slow_viewer_misses_some_evenly():
+    pipe = Pipe(blocked=True)
+    carrier, told = carry(pipe, range(10_000))  # would never end if it waited
+    pipe.go.set()
+    carrier.close()
+    seen = [int(number) for number in pipe.content.decode().split()]
+    assert seen == sorted(seen)
+    assert seen[-1] == 9999
+    assert len(seen) == 10_000 - carrier.n_left_out < 300
+    assert told == [f"view: it is slower than the run; {carrier.n_left_out} steps are left out in it"]
+
+
+def test_a_closed_viewer_is_told_of_once():
+    pipe = Pipe(broken=True)
+    carrier, told = carry(pipe, range(5))
+    carrier._thread.join()
+    for item in range(5):
+        carrier.put(item)
+    carrier.close()
+    assert told == [NOTE.strip()]
+    assert carrier._waiting == []
+
+
+def test_a_viewer_that_hangs_does_not_keep_the_end(monkeypatch):
+    monkeypatch.setattr(courier, "PATIENCE_SECONDS", 0.02)
+    pipe = Pipe(blocked=True)
+    carrier, told = carry(pipe, range(5))
+    carrier.close()
+    assert pipe.finished is False
+    assert told == ["view: the viewer has not taken the end of it"]
+    pipe.go.set()
+    carrier._thread.join()
+    assert len(told) == 1
+
+
+def failing_encoder(batch) -> bytes:
+    raise ZeroDivisionError("division by zero")
+
+
+def test_a_mistake_in_the_view_does_not_stop_the_run():
+    told: list[str] = []
+    carrier: Courier[int] = Courier(failing_encoder, Pipe(), n_waiting_max=10, tell=told.append)
+    carrier.put(1)
+    carrier.close()
+    assert told == ["view: ZeroDivisionError: division by zero; the run goes on without it"]
+
+
+def test_step_by_step_shows_what_a_recording_shows(small, tmp_path: Path):
+    app.save([small], tmp_path / "whole.rrd")
+    drawing = live.RunDrawing(small.header, small.city)
+    records = list(small)
+    content = b"".join(drawing.encode(batch) for batch in ([records[0]], [records[1]], records[2:7], records[7:]))
+    pipe = to_file(tmp_path / "live.rrd").open()
+    while content:
+        content = content[pipe.write(content) :]
+    pipe.close(finished=True)
+    whole, seen = rrd.read(tmp_path / "whole.rrd"), rrd.read(tmp_path / "live.rrd")
+    steps = small.steps.tolist()
+    for path, component in (
+        ("/city/buildings", "Mesh3D:vertex_colors"),
+        ("/city/handles", "Building:temperature"),
+        ("/team/brigades", "Points3D:positions"),
+        ("/civilians", "Points3D:colors"),
+        ("/plots/score", "Scalars:scalars"),
+    ):
+        shown = rrd.at_every_step(seen[path][component], steps)
+        assert np.array_equal(np.array(shown), np.array(rrd.at_every_step(whole[path][component], steps))), path
+    texts = [[(step, row.as_py()) for step, row in one["/log/events"]["TextLog:text"]] for one in (seen, whole)]
+    assert texts[0] == texts[1] != []
+
+
+def test_a_watched_run_is_the_same_run(here, fireworld, window):  # noqa: F811
+    alone = json.loads(fireworld(*SHORT, "--record", "alone.mcap").out)
+    done = fireworld(*SHORT, "--record", "seen.mcap", "--view")
+    assert (done.code, done.err) == (0, "")
+    assert json.loads(done.out) == alone | {"recording": "seen.mcap"}
+    assert (here / "seen.mcap").read_bytes() == (here / "alone.mcap").read_bytes()
+    assert json.loads(fireworld(*SHORT, "--view").out)["digest"] == alone["digest"]
+    scores = rrd.read(window)["/plots/score"]["Scalars:scalars"]
+    assert sorted(step for step, _ in scores) == sorted([*range(10)])
+
+
+def test_a_viewer_closed_in_mid_run(here, fireworld, monkeypatch):  # noqa: F811
+    alone = json.loads(fireworld(*SHORT).out)
+    monkeypatch.setattr(live, "own_window", lambda: live.Screen(DYING, stays=True))
+    done = fireworld(*SHORT, "--view", "--record", "a.mcap")
+    assert (done.code, done.err) == (0, NOTE)
+    assert json.loads(done.out)["digest"] == alone["digest"]
+    assert fireworld("verify", "a.mcap").code == 0
+
+
+KILLER = """
+import os, signal
+from fireworld.policy.protocol import Action, Decision
+class Killer:
+    def decide(self, observation):
+        if (observation.step, observation.brigade) == (5, 0):
+            os.kill(int(os.environ["SERVER"]), signal.SIGKILL)
+        return Decision(Action.NEAREST_TO_ME)
+"""
+
+
+def test_a_server_that_dies_in_mid_run(here, fireworld, monkeypatch):  # noqa: F811
+    (here / "killing.py").write_text(KILLER)
+    port = app.free_port()
+    words = [str(app.viewer_executable()), "--serve-grpc", "--bind", app.LOCALHOST, "--port", str(port)]
+    with subprocess.Popen(words, env=app.viewer_environment(os.environ), stderr=subprocess.DEVNULL) as server:
+        try:
+            url = f"rerun+http://{app.LOCALHOST}:{port}/proxy"
+            until_it_listens(url)
+            monkeypatch.setenv("SERVER", str(server.pid))
+            monkeypatch.setattr(courier, "PATIENCE_SECONDS", 0.5)
+            done = fireworld(*SHORT, "--policy", "killing:Killer", "--view-url", url)
+            assert server.wait() == -signal.SIGKILL
+        finally:
+            server.kill()
+    assert done.code == 0
+    assert done.err in {"", NOTE, "view: the viewer has not taken the end of it\n"}  # by what was on its way just then
+    assert json.loads(done.out)["steps"] == 9
+
+
+def until_it_listens(url: str) -> None:
+    for _ in range(200):
+        try:
+            live.running_viewer(url)
+        except ViewError:
+            Event().wait(0.05)
+        else:
+            return
+    raise AssertionError(url)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--view",), "fireworld: --view: no display here; try --view-url of a viewer that runs, or "),
+        (("--view-url", "http://127.0.0.1:1/x"), "fireworld: --view-url: expected an address of this machine like "),
+        (("--view-url", "rerun+http://127.0.0.1:x/proxy"), "expected an address of this machine like "),
+        (("--view-url", "rerun+http://example.org:9876/proxy"), "tunnel to another machine with ssh -L"),
+        (
+            ("--view-url", "rerun+http://127.0.0.1:1/proxy"),
+            "expected a viewer that listens, got 'rerun+http://127.0.0.1:1/",
+        ),
+    ],
+)
+@pytest.mark.parametrize("command", [("run", "quick", "--record", "a.mcap"), ("train", "-o", "a.npz")])
+def test_no_view_no_run(here, fireworld, monkeypatch, command, words, message):  # noqa: F811
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    done = fireworld(*command, *words)
+    assert (done.code, done.out, done.err.count("\n")) == (2, "", 1)
+    assert message in done.err
+    assert [path.name for path in here.iterdir() if path.suffix != ".py"] == []
+
+
+def test_without_rerun(here, fireworld, monkeypatch):  # noqa: F811
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    done = fireworld(*SHORT, "--view")
+    assert done.code == 2
+    assert done.err == "fireworld: view: Rerun is not installed; try pip install 'fireworld[view]'\n"
+
+
+@pytest.mark.parametrize("words", [("run", "quick"), ("train", "-o", "a.npz")])
+def test_both_at_once(here, fireworld, words):  # noqa: F811
+    done = fireworld(*words, "--view", "--view-url", "rerun+http://127.0.0.1:9876/proxy")
+    assert done.code == 2
+    assert "--view and --view-url exclude each other." in done.err
+
+
+def test_a_search_is_not_shown(here, fireworld):  # noqa: F811
+    done = fireworld("train", "-o", "a.npz", "--method", "search", "--view")
+    assert done.code == 2
+    assert "--view: a search has no episodes to show" in done.err
+
+
+def test_a_watched_training_is_the_same_training(here, fireworld, window):  # noqa: F811
+    (here / "tiny.yaml").write_text(TINY)
+    assert fireworld(*TRAIN, "alone.npz").code == 0
+    done = fireworld(*TRAIN, "seen.npz", "--log", "seen.csv", "--view")
+    assert (done.code, "view" in done.err) == (0, False)
+    assert (here / "seen.npz").read_bytes() == (here / "alone.npz").read_bytes()
+    lines = [line.split(",") for line in (here / "seen.csv").read_text().splitlines()]
+    column = lines[0].index("total_reward")
+    seen = read_all(window)
+    returns = [row.as_py()[0] for _, row in seen["/return/seed\\ 1"]["Scalars:scalars"]]
+    assert returns == [float(line[column]) for line in lines[1:]]
+    notes = [row.as_py()[0] for _, row in seen["/log"]["TextLog:text"]]
+    assert [note.split(": ")[1] for note in notes] == ["alone-1", "alone-2"]
+    assert len(seen["/city/buildings"]["Mesh3D:vertex_positions"]) == 1  # one stage, one fire
+    assert seen["/plots/score"]["Scalars:scalars"]
+
+
+def read_all(path: Path) -> dict[str, rrd.Rows]:
+    """Read a file of several recordings, on whatever timeline."""
+    from collections import defaultdict
+
+    from rerun.chunk import RrdReader
+
+    found: dict[str, rrd.Rows] = defaultdict(lambda: defaultdict(list))
+    reader = RrdReader(path)
+    for store in reader.recordings():
+        for chunk in reader.stream(store=store):
+            batch = chunk.to_record_batch()
+            for name in batch.schema.names:
+                if "RowId" not in name and name not in chunk.timeline_names:
+                    found[chunk.entity_path][name].extend((None, row) for row in batch.column(name))
+    return found
