@@ -1,4 +1,4 @@
-"""Rows of pictures without a viewer: films of a fire in a city of the default scenario's size, and a report."""
+"""Rows of pictures without a viewer: the frames of a film, and films."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def rows(*, quick: bool) -> Iterator[Row]:
     """Yield the rows of pictures; none where matplotlib is not installed."""
     if importlib.util.find_spec("matplotlib") is None:
         return
-    size, n_steps, seconds = (100, 20, 0.3) if quick else (624, 300, 3.0)
+    size, n_steps, seconds = (100, 20, 0.3) if quick else (1000, 300, 3.0)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write_log(folder / "run.mcap", new_world(size, n_steps))

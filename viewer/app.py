@@ -17,6 +17,8 @@ from typing import Final
 
 from fireworld.errors import OutputError, ViewError, expected
 from fireworld.records import Recording
+from viewer.outcome import Outcome
+from viewer.output import written_beside
 
 RERUN_MINOR: Final = "0.41."
 INSTALL_HINT: Final = "try pip install 'fireworld[view]'"
@@ -25,14 +27,22 @@ WEB_PORT: Final = 9090
 APPLICATION_ID: Final = "fireworld"
 
 
-def save(recordings: Sequence[Recording], path: Path, *, focus: Sequence[int] = (), force: bool = False) -> None:
+def save(
+    recordings: Sequence[Recording],
+    path: Path,
+    *,
+    focus: Sequence[int] = (),
+    force: bool = False,
+    outcome: Outcome | None = None,
+) -> None:
     """Write one recording, or two side by side, as a Rerun file; an unfinished file never bears the final name.
 
     Args:
         recordings: one, or two of the same city.
         path: the .rrd file.
-        focus: ids of buildings whose temperatures are plotted.
+        focus: ids of buildings whose temperatures are plotted; if there are none, those that burn first.
         force: replace an existing file.
+        outcome: what the runs came to, and where two first differ; left out of the view if not given.
 
     Raises:
         OutputError: the file exists or cannot be written.
@@ -42,33 +52,28 @@ def save(recordings: Sequence[Recording], path: Path, *, focus: Sequence[int] = 
         raise OutputError(f"{path}: exists already; try --force")
     if not path.parent.is_dir():
         raise OutputError(f"{path}: its folder does not exist")
-    content = _rrd(recordings, focus)
-    partial = path.with_name(path.name + ".partial")
-    try:
+    content = _rrd(recordings, focus, outcome)
+    with written_beside(path) as partial:
         partial.write_bytes(content)
-        partial.replace(path)
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from None
-    finally:
-        partial.unlink(missing_ok=True)
 
 
-def show(recordings: Sequence[Recording], *, focus: Sequence[int] = ()) -> None:
-    """Open recordings in Rerun's own window and return when it is closed.
+def show(recordings: Sequence[Recording], *, focus: Sequence[int] = (), outcome: Outcome | None = None) -> None:
+    """Open recordings in Rerun's own window and return when it is closed; the arguments are those of `save`.
 
     Raises:
         ViewError: there is no display, or no viewer.
     """
     _import_rerun()
     if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise ViewError("view: no display here; try --save FILE.rrd, or --web")
-    _run_viewer(recordings, focus, ["--port", str(free_port()), "--hide-welcome-screen"])
+        raise ViewError("view: no display here; try --save FILE.rrd, --web, or `fireworld render` for pictures")
+    _run_viewer(recordings, focus, outcome, ["--port", str(free_port()), "--hide-welcome-screen"])
 
 
 def serve(
     recordings: Sequence[Recording],
     *,
     focus: Sequence[int] = (),
+    outcome: Outcome | None = None,
     port: int = WEB_PORT,
     announce: Callable[[str], None],
 ) -> None:
@@ -76,7 +81,8 @@ def serve(
 
     Args:
         recordings: one, or two of the same city.
-        focus: ids of buildings whose temperatures are plotted.
+        focus: as `save` has it.
+        outcome: as `save` has it.
         port: of the page.
         announce: told the address of the page.
 
@@ -89,7 +95,7 @@ def serve(
     data_port = free_port()
     announce(f"http://{LOCALHOST}:{port}?url=rerun%2Bhttp%3A%2F%2F{LOCALHOST}%3A{data_port}%2Fproxy")
     ports = ["--web-viewer-port", str(port), "--port", str(data_port)]
-    _run_viewer(recordings, focus, ["--serve-web", *ports])
+    _run_viewer(recordings, focus, outcome, ["--serve-web", *ports])
 
 
 def viewer_executable() -> Path:
@@ -120,13 +126,14 @@ def free_port() -> int:
         return port
 
 
-def _rrd(recordings: Sequence[Recording], focus: Sequence[int]) -> bytes:
+def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome | None) -> bytes:
     """Make the Rerun file of one recording, or of two of the same city, in memory.
 
     Rerun can write files too, in a thread of its own that tells nobody when the disk is full.
     """
     rerun = _import_rerun()
-    from viewer import blueprint, comparison, legend, mapping
+    from viewer import blueprint, comparison, legend, mapping, plots
+    from viewer.outcome import log_outcome
 
     comparing = len(recordings) > 1
     if comparing:
@@ -140,13 +147,17 @@ def _rrd(recordings: Sequence[Recording], focus: Sequence[int]) -> bytes:
     with warnings.catch_warnings():
         # Rerun warns of data it cannot take and goes on; a view that lacks something is worse than none.
         warnings.simplefilter("error", rerun.error_utils.RerunWarning)
-        stream.send_blueprint((blueprint.pair if comparing else blueprint.single)(*recordings, focus=bool(focus)))
+        plotted = focus or plots.first_burning(recordings[0])
+        lay_out = blueprint.pair if comparing else blueprint.single
+        stream.send_blueprint(lay_out(*recordings, focus=bool(plotted), outcome=outcome))
         stream.send_recording_name(" | ".join(map(blueprint.title, recordings)))
         legend.log_legend(stream, comparing=comparing)
+        if outcome is not None:
+            log_outcome(stream, outcome)
         if comparing:
-            comparison.log_comparison(stream, *recordings, focus=focus)
+            comparison.log_comparison(stream, *recordings, focus=plotted, outcome=outcome)
         else:
-            mapping.log_recording(stream, *recordings, focus=focus)
+            mapping.log_recording(stream, *recordings, focus=plotted)
     content: bytes = memory.drain_as_bytes()
     return content
 
@@ -161,24 +172,31 @@ def _identity(recordings: Sequence[Recording]) -> str:
     return digest.hexdigest()[:32]
 
 
-def _run_viewer(recordings: Sequence[Recording], focus: Sequence[int], options: list[str]) -> None:
+def _run_viewer(
+    recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome | None, options: list[str]
+) -> None:
     """Run Rerun's viewer on recordings until it ends or we are told to stop; it never outlives us."""
     with tempfile.TemporaryDirectory(prefix="fireworld-") as folder:
         path = Path(folder) / "view.rrd"
-        save(recordings, path, focus=focus)
+        save(recordings, path, focus=focus, outcome=outcome)
         command = [str(viewer_executable()), "--bind", LOCALHOST, *options, str(path)]
         before = signal.signal(signal.SIGTERM, _stop)
-        viewer = subprocess.Popen(command, env=viewer_environment(os.environ))  # noqa: S603 - our own command
-        try:
-            status = viewer.wait()
-        except KeyboardInterrupt:
-            status = 0
-        finally:
-            signal.signal(signal.SIGTERM, before)
-            viewer.terminate()
-            viewer.wait()
+        with (Path(folder) / "said").open("w+", encoding="utf-8", errors="replace") as said:
+            viewer = subprocess.Popen(command, env=viewer_environment(os.environ), stderr=said)  # noqa: S603 - our own
+            try:
+                status = viewer.wait()
+            except KeyboardInterrupt:
+                status = 0
+            finally:
+                signal.signal(signal.SIGTERM, before)
+                viewer.terminate()
+                viewer.wait()
+            said.seek(0)
+            reason = " ".join(said.read().split())
     if status:
-        raise ViewError(f"view: Rerun's viewer ended with code {status}; try --save FILE.rrd, or --web")
+        why = f": {reason.rpartition(': ')[2][-120:]}" if reason else ""
+        hint = "try --save FILE.rrd, --web, or `fireworld render`"
+        raise ViewError(f"view: Rerun's viewer ended with code {status}{why}; {hint}")
 
 
 def _stop(number: int, frame: object) -> None:

@@ -10,14 +10,18 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fireworld.records import Recording
+from fireworld.records import SNAPSHOT_EVERY_STEPS, Recording
 from viewer import colors
-from viewer.legend import LEGEND_PATH
+from viewer.comparison import MARK_PATH
+from viewer.legend import HELP_PATH, LEGEND_PATH, bounds
 from viewer.mapping import city_box_m
-from viewer.plots import COUNTS
+from viewer.outcome import OUTCOME_PATH, Outcome
+from viewer.plots import has_choice_values
 from viewer.stage import TIMELINE
 
 STEPS_PER_SECOND: Final = 8.0
+LAYERS: Final = ("city", "team", "civilians", "fire")
+"""Entity paths of what is on a map; the air has a map of its own."""
 _MARGIN_M: Final = 45.0
 _FOUGHT_BUILDINGS: Final = 60
 _LEAST_DISTANCE_M: Final = 100.0
@@ -32,6 +36,8 @@ class Camera:
 
     eye_m: tuple[float, float, float]
     target_m: tuple[float, float, float]
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    """What is up in the picture."""
 
 
 def frame_fire(recordings: Sequence[Recording], *, aspect: float) -> Camera:
@@ -61,6 +67,21 @@ def frame_fire(recordings: Sequence[Recording], *, aspect: float) -> Camera:
     return Camera(eye_m=(x_m, y_m - far_m * south, far_m * up), target_m=(x_m, y_m, 0.0))
 
 
+def frame_from_above(low: tuple[float, float], high: tuple[float, float], *, aspect: float) -> Camera:
+    """Look straight down on a box given by its south-west and north-east corners in metres, north up.
+
+    Args:
+        low: south-west corner.
+        high: north-east corner.
+        aspect: width of the view by its height.
+    """
+    slope = math.tan(math.radians(_FIELD_OF_VIEW_DEGREES / 2))
+    half_width_m, half_depth_m = (high[0] - low[0]) / 2, (high[1] - low[1]) / 2
+    far_m = 1.08 * max(half_width_m / (slope * aspect), half_depth_m / slope, _LEAST_DISTANCE_M)
+    x_m, y_m = (low[0] + high[0]) / 2, (low[1] + high[1]) / 2
+    return Camera(eye_m=(x_m, y_m, far_m), target_m=(x_m, y_m, 0.0), up=(0.0, 1.0, 0.0))
+
+
 def _fought_buildings(fieryness: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """Buildings that burned, (n,), up to the step at which more than _FOUGHT_BUILDINGS had. (k, n) codes."""
     touched = np.logical_or.accumulate(fieryness != 0, axis=0)
@@ -69,53 +90,124 @@ def _fought_buildings(fieryness: NDArray[np.uint8]) -> NDArray[np.bool_]:
     return found
 
 
-def single(recording: Recording, *, focus: bool) -> Any:
-    """Lay out one recording: the map, the lanes and the legend on the left; curves and the log on the right."""
+def single(recording: Recording, *, focus: bool, outcome: Outcome | None = None) -> Any:
+    """Lay out one recording: the map, the lanes and the legend on the left; curves and the log on the right.
+
+    Args:
+        recording: what is shown.
+        focus: whether temperatures are plotted.
+        outcome: there is a page of it if it is given.
+    """
     import rerun.blueprint as rrb
 
+    log = rrb.Tabs(text_view("Events and choices", ["+ /log/**"]), *pages(outcome), active_tab=0)
     left = rrb.Vertical(
-        map_view("Fire and brigades", "", frame_fire([recording], aspect=1.8)),
-        rrb.Horizontal(lanes("What the brigades do", ""), legend_view(), column_shares=[1, 1]),
+        maps("Fire and brigades", "", [recording], aspect=1.8),
+        rrb.Horizontal(lane_views("", ""), log, column_shares=[1, 1.4]),
         row_shares=[2.6, 1],
     )
-    curves: list[Any] = [plot_view("Temperature of the focus", "/plots/focus")] if focus else []
-    curves += [plot_view("Buildings", "/plots/buildings"), plot_view("Score", "/plots/score")]
-    more = rrb.Tabs(plot_view("Water in tanks (l)", "/plots/tanks"), plot_view("Reward by terms", "/plots/reward"))
-    log = rrb.Tabs(text_view("Events and choices", ["+ /log/**"]), help_view())
-    right = rrb.Vertical(*curves, more, log, row_shares=[1.0] * len(curves) + [1.0, 1.5])
+    rows = [plot_view("Buildings", ["/plots/buildings"]), *plot_tabs("", [""], recording, focus=focus), legend_view()]
+    right = rrb.Vertical(*rows, row_shares=[1.0] * (len(rows) - 1) + [1.45])
     return blueprint(rrb.Horizontal(left, right, column_shares=[2.1, 1]))
 
 
-def pair(first: Recording, second: Recording, *, focus: bool) -> Any:
-    """Lay out two recordings of one city: both maps and their difference side by side, curves of both below."""
+def pair(first: Recording, second: Recording, *, focus: bool, outcome: Outcome | None = None) -> Any:
+    """Lay out two recordings of one city: both maps and their difference side by side, curves of both below.
+
+    Args:
+        first: called A.
+        second: called B.
+        focus: whether temperatures are plotted.
+        outcome: there is a page of it, and the first difference is marked, if it is given.
+    """
     import rerun.blueprint as rrb
 
-    camera = frame_fire([first, second], aspect=1.25)
-    maps = rrb.Horizontal(
-        map_view(f"A: {title(first)}", "/a", camera),
-        map_view(f"B: {title(second)}", "/b", camera),
-        map_view("Difference: red where B is worse", "/diff", camera),
+    both = [first, second]
+    row_of_maps = rrb.Horizontal(
+        maps(f"A: {title(first)}", "/a", both, aspect=1.25),
+        maps(f"B: {title(second)}", "/b", both, aspect=1.25),
+        map_view("Difference: red where B is worse", "/diff", frame_fire(both, aspect=1.25)),
     )
-    top = max(float(np.max(one.column("/score", name))) for one in (first, second) for name in COUNTS)
+    mark = [MARK_PATH] if outcome is not None and outcome.first_step is not None else []
     curves = [
-        plot_view("Burning, extinguished, burnt out: A", "/a/plots/buildings", top=top),
-        plot_view("Burning, extinguished, burnt out: B", "/b/plots/buildings", top=top),
-        plot_view("Buildings that differ", "/diff/plots/buildings"),
+        plot_view("Buildings: A and B", ["/a/plots/buildings", "/b/plots/buildings", *mark]),
+        *plot_tabs(": A and B", ["/a", "/b"], *both, focus=focus)[:1],
+        plot_view("Buildings that differ", ["/diff/plots/buildings", *mark]),
     ]
+    said = [f"+ {MARK_PATH.replace('plots', 'log')}"] if mark else []
     details = [
         rrb.Tabs(
-            text_view("Events and choices: A", ["+ /a/log/**"]),
-            lanes("What the brigades do: A", "/a"),
-            *([plot_view("Temperature of the focus: A", "/a/plots/focus")] if focus else []),
-        ),
-        rrb.Tabs(
-            text_view("Events and choices: B", ["+ /b/log/**"]),
-            lanes("What the brigades do: B", "/b"),
-            *([plot_view("Temperature of the focus: B", "/b/plots/focus")] if focus else []),
-        ),
-        rrb.Tabs(legend_view(comparing=True), plot_view("Score: A and B", "/diff/plots/score"), help_view()),
+            text_view(f"Events and choices: {name}", [f"+ {prefix}/log/**", *said]),
+            *lane_views(f": {name}", prefix).contents,
+            plot_view(f"Water in tanks (l): {name}", [f"{prefix}/plots/tanks"]),
+            active_tab=0,
+        )
+        for name, prefix in (("A", "/a"), ("B", "/b"))
     ]
-    return blueprint(rrb.Vertical(maps, rrb.Horizontal(*curves), rrb.Horizontal(*details), row_shares=[2.0, 1.0, 1.0]))
+    *outcome_page, help_page = pages(outcome)
+    curves += outcome_page
+    details.append(rrb.Tabs(legend_view(comparing=True), help_page, active_tab=0))
+    rows = [row_of_maps, rrb.Horizontal(*curves), rrb.Horizontal(*details)]
+    shares = [2.0, 1.1, 1.1]
+    if outcome is not None:
+        rows.insert(1, rrb.StateTimelineView(name="Are A and B the same?", origin="/diff/agreement"))
+        shares.insert(1, 0.45)
+    begin = None if outcome is None else outcome.first_step
+    last = max(int(one.steps[-1]) for one in both)
+    return blueprint(rrb.Vertical(*rows, row_shares=shares), marked=None if begin is None else (begin, last))
+
+
+def maps(name: str, prefix: str, recordings: Sequence[Recording], *, aspect: float) -> Any:
+    """The map of one run in three ways: at an angle, from straight above, and with the heat of the air."""
+    import rerun.blueprint as rrb
+
+    low, high = city_box_m(recordings[0].city, margin_m=0.0)
+    above = frame_from_above(low, high, aspect=aspect)
+    return rrb.Tabs(
+        map_view(name, prefix, frame_fire(recordings, aspect=aspect)),
+        map_view("From above", prefix, above),
+        map_view(f"Air (every {SNAPSHOT_EVERY_STEPS} steps)", prefix, above, layers=("city", "air")),
+        active_tab=0,
+    )
+
+
+def plot_tabs(suffix: str, prefixes: Sequence[str], *recordings: Recording, focus: bool) -> list[Any]:
+    """Curves of one or two runs, in tabs: outcome and temperatures, then water and values of choices."""
+    import rerun.blueprint as rrb
+
+    def curves(name: str, plot: str, corner: str) -> Any:
+        return plot_view(f"{name}{suffix}", [f"{prefix}/plots/{plot}" for prefix in prefixes], corner=corner)
+
+    single_run = len(prefixes) == 1
+    heat = [curves("Degrees above ambient", "focus", "RightTop")] if focus else []
+    outcome = [curves("Score", "score", "LeftBottom"), curves("Reward by terms", "reward", "LeftBottom")]
+    outcome += [curves("Reward, stacked", "reward_stacked", "LeftBottom")] if single_run else []
+    weighed = [f"{prefix}/plots/{plot}/**" for prefix in prefixes for plot in ("values", "values_best")]
+    values = plot_view(f"Values of choices{suffix}", weighed, corner="RightBottom")
+    chosen = [values] if any(map(has_choice_values, recordings)) else []
+    water = [curves("Water in tanks (l)", "tanks", "RightTop")] if single_run else []
+    if not single_run:
+        return [rrb.Tabs(*outcome, *heat, *chosen, active_tab=0)]
+    return [*heat, rrb.Tabs(*outcome, active_tab=0), rrb.Tabs(*water, *chosen, active_tab=0)]
+
+
+def lane_views(suffix: str, prefix: str) -> Any:
+    """What the brigades do and which action they follow, in tabs."""
+    import rerun.blueprint as rrb
+
+    return rrb.Tabs(
+        rrb.StateTimelineView(name=f"What the brigades do{suffix}", origin=f"{prefix}/activity"),
+        rrb.StateTimelineView(name=f"What they chose{suffix}", origin=f"{prefix}/action"),
+        active_tab=0,
+    )
+
+
+def pages(outcome: Outcome | None) -> list[Any]:
+    """The pages of text: the outcome, if there is one, and the help."""
+    import rerun.blueprint as rrb
+
+    found = [] if outcome is None else [rrb.TextDocumentView(name="Outcome", origin=OUTCOME_PATH)]
+    return [*found, rrb.TextDocumentView(name="How to read this", origin=HELP_PATH)]
 
 
 def title(recording: Recording) -> str:
@@ -128,49 +220,49 @@ def title(recording: Recording) -> str:
     return "".join(letter if letter.isprintable() and ord(letter) < 256 else "?" for letter in text)
 
 
-def blueprint(root: Any) -> Any:
-    """Wrap a layout: only the time panel is open, and it plays the steps at a pace that can be followed."""
-    import rerun.blueprint as rrb
+def blueprint(root: Any, *, marked: tuple[int, int] | None = None) -> Any:
+    """Wrap a layout: only the time panel is open, and it plays the steps at a pace that can be followed.
 
+    Args:
+        root: the layout.
+        marked: first and last of the steps that are marked on the time panel.
+    """
+    import rerun.blueprint as rrb
+    from rerun.encodings import AbsoluteTimeRange
+
+    selection = None if marked is None else AbsoluteTimeRange(*marked)
+    time = rrb.TimePanel(
+        state="collapsed", timeline=TIMELINE, fps=STEPS_PER_SECOND, play_state="paused", time_selection=selection
+    )
     return rrb.Blueprint(
-        root,
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, fps=STEPS_PER_SECOND, play_state="paused"),
-        rrb.BlueprintPanel(state="collapsed"),
-        rrb.SelectionPanel(state="collapsed"),
+        root, time, rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"), auto_views=False
     )
 
 
-def map_view(name: str, prefix: str, camera: Camera) -> Any:
+def map_view(name: str, prefix: str, camera: Camera, *, layers: Sequence[str] = LAYERS) -> Any:
     """A 3D view of one recording's map. The meshes let clicks through to the handles on the roofs."""
     import rerun.blueprint as rrb
 
     inert = rrb.EntityBehavior(interactive=False)
-    layers = ("city", "team", "civilians", "fire")
+    eye = rrb.EyeControls3D(position=camera.eye_m, look_target=camera.target_m, eye_up=camera.up)
     return rrb.Spatial3DView(
         name=name,
         origin=prefix or "/",
         contents=[f"+ {prefix}/{layer}/**" for layer in layers],
         background=colors.BACKGROUND_RGB,
         line_grid=False,
-        eye_controls=rrb.EyeControls3D(position=camera.eye_m, look_target=camera.target_m, eye_up=(0.0, 0.0, 1.0)),
+        eye_controls=eye,
         overrides={f"{prefix}/city/{mesh}": inert for mesh in ("buildings", "ground", "streets")},
     )
 
 
-def plot_view(name: str, origin: str, *, top: float | None = None) -> Any:
-    """A view of one plot; from 0 to a top, where plots are to be compared."""
+def plot_view(name: str, paths: Sequence[str], *, corner: str = "LeftTop") -> Any:
+    """A view of the curves at some paths, all on one scale; the legend is in the corner where they seldom come."""
     import rerun.blueprint as rrb
 
-    scale = None if top is None else rrb.ScalarAxis(range=(0.0, max(top, 1.0)))
-    legend = rrb.PlotLegend(rrb.Corner2D.LeftTop)
-    return rrb.TimeSeriesView(name=name, origin=origin, plot_legend=legend, axis_y=scale)
-
-
-def lanes(name: str, prefix: str) -> Any:
-    """A view of what the brigades do."""
-    import rerun.blueprint as rrb
-
-    return rrb.StateTimelineView(name=name, origin=f"{prefix}/activity")
+    legend = rrb.PlotLegend(rrb.Corner2D[corner])
+    contents = [f"+ {path}" for path in paths]
+    return rrb.TimeSeriesView(name=name, origin="/", contents=contents, plot_legend=legend)
 
 
 def text_view(name: str, contents: list[str]) -> Any:
@@ -185,14 +277,10 @@ def legend_view(*, comparing: bool = False) -> Any:
     """A view of the legend; it has a row more where two runs are compared."""
     import rerun.blueprint as rrb
 
-    bounds = rrb.VisualBounds2D(x_range=(-1.4, 13.0), y_range=(-0.4, 5.9 if comparing else 4.9))
+    x_range, y_range = bounds(comparing=comparing)
     return rrb.Spatial2DView(
-        name="Legend", origin=LEGEND_PATH, background=colors.LEGEND_BACKGROUND_RGB, visual_bounds=bounds
+        name="Legend",
+        origin=LEGEND_PATH,
+        background=colors.LEGEND_BACKGROUND_RGB,
+        visual_bounds=rrb.VisualBounds2D(x_range=x_range, y_range=y_range),
     )
-
-
-def help_view() -> Any:
-    """A view of the help text."""
-    import rerun.blueprint as rrb
-
-    return rrb.TextDocumentView(name="How to read this", origin="/help")

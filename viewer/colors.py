@@ -51,6 +51,21 @@ ACTIVITY_RGB: Final[tuple[Rgb, ...]] = (
 )
 """By index into records.ACTIVITIES."""
 
+ACTION_RGB: Final[tuple[Rgb, ...]] = (
+    (96, 170, 120),  # easiest
+    (230, 150, 190),  # nearest-to-civilian
+    (210, 180, 90),  # nearest-to-center
+    (120, 160, 220),  # nearest-to-me
+    (180, 130, 220),  # own-target
+)
+"""By index into records.ACTION_NAMES."""
+NO_CHOICE_RGB: Final[Rgb] = (70, 74, 80)
+
+MARK_RGB: Final[Rgb] = (255, 196, 0)
+
+AIR_RGB: Final[tuple[Rgb, ...]] = ((96, 20, 150), (232, 64, 160), (255, 236, 246))
+"""From warm to hot air: shades that no building has."""
+
 BRIGADE_RGB: Final[tuple[Rgb, ...]] = (
     (79, 147, 255),
     (255, 160, 60),
@@ -87,6 +102,12 @@ def packed_table(colors: Sequence[Rgb]) -> UInt32Array:
     Rerun is given packed colors only: it guesses at lists, and takes three numbers for one color.
     """
     return np.array([packed(rgb) for rgb in colors], dtype=np.uint32)
+
+
+def lighter(rgb: Rgb) -> Rgb:
+    """Mix a color half and half with white: the same thing in the second of two runs."""
+    red, green, blue = ((part + 255) // 2 for part in rgb)
+    return red, green, blue
 
 
 def single(rgb: Rgb) -> UInt32Array:

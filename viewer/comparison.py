@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,8 @@ from fireworld.errors import ViewError, expected
 from fireworld.records import CityRecord, Recording
 from viewer import colors, mapping
 from viewer.city_mesh import SHADES_PERCENT, build_mesh
+from viewer.lanes import log_lane
+from viewer.outcome import Outcome
 from viewer.plots import log_plot
 from viewer.stage import Stage, values
 
@@ -21,12 +23,22 @@ if TYPE_CHECKING:
 DAMAGE_ORDER: Final = (0, 4, 5, 1, 6, 2, 7, 3, 8)
 """Fieryness codes from the least damage to the most: by the official score's factors; 8 comes after 3, both count 0."""
 
+MARK_PATH: Final = "/diff/plots/first_difference"
+AGREEMENT: Final = ("the same", "buildings the same, something else not", "buildings differ")
+"""What the lane of two runs says of a step."""
+
+_AGREEMENT_RGB: Final = (colors.HEALTHY_RGB, colors.MARK_RGB, colors.WORSE_RGB)
 _DAMAGE: Final = np.argsort(np.array(DAMAGE_ORDER)).astype(np.int8)  # code to its place in the order
 _DIFFERENCE_COLORS: Final = colors.shaded_table(colors.DIFFERENCE_RGB, SHADES_PERCENT)
 
 
 def log_comparison(
-    stream: rerun.RecordingStream, first: Recording, second: Recording, *, focus: Sequence[int] = ()
+    stream: rerun.RecordingStream,
+    first: Recording,
+    second: Recording,
+    *,
+    focus: Sequence[int] = (),
+    outcome: Outcome | None = None,
 ) -> None:
     """Send two runs and their difference to one Rerun stream, on one `step` timeline.
 
@@ -35,14 +47,15 @@ def log_comparison(
         first: shown below /a.
         second: shown below /b.
         focus: ids of buildings whose temperatures are plotted.
+        outcome: where they first differ is marked, if it is told.
 
     Raises:
         ViewError: the runs are of different cities, or have no steps in common.
     """
     check_same_city(first.city, second.city)
     steps, rows_a, rows_b = common_steps(first.steps, second.steps)
-    mapping.log_recording(stream, first, prefix="/a", focus=focus)
-    mapping.log_recording(stream, second, prefix="/b", focus=focus)
+    mapping.log_recording(stream, first, prefix="/a", name="A", focus=focus)
+    mapping.log_recording(stream, second, prefix="/b", name="B", focus=focus)
 
     stage = Stage(stream, "/diff", steps)
     mesh = build_mesh(first.city)
@@ -59,8 +72,33 @@ def log_comparison(
 
     counts = np.column_stack([np.count_nonzero(change == sign, axis=1) for sign in (1, -1)]).astype(np.float64)
     log_plot(stage, "plots/buildings", counts, ("worse in B", "better in B"), (colors.WORSE_RGB, colors.BETTER_RGB))
-    scores = np.column_stack([_scores(first, rows_a), _scores(second, rows_b)])
-    log_plot(stage, "plots/score", scores, ("A", "B"), colors.BRIGADE_RGB[:2])
+    if outcome is not None:
+        _mark_first_difference(stage, outcome, np.any(change != 0, axis=1))
+
+
+def _mark_first_difference(stage: Stage, outcome: Outcome, buildings_differ: NDArray[np.bool_]) -> None:
+    """Send a lane that says from where the runs differ, a mark in the plots and a line in the log."""
+    import rerun
+
+    differs = np.zeros(len(stage.steps), dtype=np.int64)
+    if outcome.first_step is not None:
+        differs[stage.steps >= outcome.first_step] = 1
+        differs[buildings_differ] = 2
+    log_lane(stage, "agreement", differs, AGREEMENT, _AGREEMENT_RGB)
+    if outcome.first_step is None:
+        return
+    at = np.array([outcome.first_step], dtype=np.int64)
+    style = rerun.SeriesPoints(
+        names=[f"first difference, step {outcome.first_step}"],
+        colors=colors.single(colors.MARK_RGB),
+        markers="diamond",
+        marker_sizes=[6.0],
+    )
+    stage.static("plots/first_difference", style)
+    stage.rows("plots/first_difference", rerun.Scalars.columns(scalars=[0.0]), steps=at)
+    said = f"first difference: {outcome.first_sentence}"
+    line = rerun.TextLog.columns(text=[said], level=["ERROR"], color=colors.single(colors.MARK_RGB))
+    stage.rows("log/first_difference", line, steps=at)
 
 
 def difference(fieryness_a: NDArray[np.uint8], fieryness_b: NDArray[np.uint8]) -> NDArray[np.int8]:
@@ -97,9 +135,6 @@ def check_same_city(first: CityRecord, second: CityRecord) -> None:
     for name in ("building_id", "outline_ptr", "outline_x_m", "outline_y_m", "floors"):
         if not np.array_equal(getattr(first, name), getattr(second, name)):
             cities = f"{first.name!r} with {len(first.building_id)} buildings"
-            others = f"{second.name!r} with {len(second.building_id)}; {name} differs"
-            raise ViewError(expected("view", "", "two recordings of one city", f"{cities} and {others}"))
-
-
-def _scores(recording: Recording, rows: NDArray[np.intp]) -> NDArray[Any]:
-    return np.asarray(recording.column("/score", "score"), dtype=np.float64)[rows]
+            others = f"{second.name!r} with {len(second.building_id)}"
+            hint = f"{name} differs; try to view them one by one"
+            raise ViewError(expected("view", "", "two recordings of one city", f"{cities} and {others}", hint))

@@ -7,8 +7,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fireworld.records import ACTIVITIES, Recording
+from fireworld.records import ACTIONS, ACTIVITIES, Recording
 from viewer import colors
+from viewer.choices import choices_of, per_brigade
 from viewer.city_mesh import CityMesh
 from viewer.stage import Stage, values
 
@@ -26,11 +27,10 @@ _QUEUE_M: Final = 8.0
 _JET_POINTS: Final = 9
 
 
-def log_brigades(stage: Stage, recording: Recording, mesh: CityMesh) -> None:
+def log_brigades(stage: Stage, recording: Recording) -> None:
     """Draw each brigade as a ball in the color of its activity, with a gauge of its tank and a label."""
     import rerun
 
-    del mesh
     position = brigade_positions_m(recording)
     k, n = position.shape[:2]
     if n == 0:
@@ -38,7 +38,8 @@ def log_brigades(stage: Stage, recording: Recording, mesh: CityMesh) -> None:
     width = np.full(k, n)
     tank = recording.column("/brigades", "tank_litres")
     activity = recording.column("/brigades", "activity")
-    labels = [f"{index} · {litres} l" for row in tank.tolist() for index, litres in enumerate(row)]
+    named_so = "" if stage.name else "brigade "  # there is less room beside another map
+    labels = [f"{named_so}{index} · {litres} l" for row in tank.tolist() for index, litres in enumerate(row)]
     ball = rerun.Points3D.columns(
         positions=position.reshape(-1, 3),
         colors=colors.packed_table(colors.ACTIVITY_RGB)[activity].reshape(-1),
@@ -47,11 +48,16 @@ def log_brigades(stage: Stage, recording: Recording, mesh: CityMesh) -> None:
     named = position.copy()
     named[..., 2] += rise
     names = rerun.Points3D.columns(positions=named.reshape(-1, 3), labels=labels)
-    numbers = {
+    chosen = choices_of(recording)
+    numbers: dict[str, NDArray[Any]] = {
         "tank_litres": tank,
         "sprayed_litres": recording.column("/brigades", "sprayed_litres"),
         "hp": recording.column("/brigades", "hp"),
         "activity": activity,
+        "action": chosen.action,
+        "target": chosen.target,
+        "value": chosen.chosen,
+        **{f"value_{name.replace('-', '_')}": chosen.values[..., index] for index, name in enumerate(ACTIONS)},
     }
     stage.static("team/brigades", rerun.Points3D.from_fields(radii=[_BRIGADE_RADIUS_M]))
     stage.rows("team/brigades", ball.partition(width), values("Brigade", numbers))
@@ -91,7 +97,7 @@ def log_water(stage: Stage, recording: Recording, mesh: CityMesh) -> None:
     """Draw a jet from each brigade that sprays, and a thin line from each that drives, to the target."""
     activity = recording.column("/brigades", "activity")
     sprayed = recording.column("/brigades", "sprayed_litres")
-    target = targets(recording)
+    target = per_brigade(recording, "target", missing=-1)
     position = brigade_positions_m(recording)
     jets = (target >= 0) & (sprayed > 0)
     drives = (target >= 0) & (activity == DRIVING)
@@ -101,15 +107,6 @@ def log_water(stage: Stage, recording: Recording, mesh: CityMesh) -> None:
     ):
         start, end = position[shown], mesh.roof_xyz_m[target[shown]]
         _log_strips(stage, path, _arcs(start, end, rise_m), shown.sum(axis=1), radius_m=radius_m, rgb=rgb)
-
-
-def targets(recording: Recording) -> NDArray[np.int64]:
-    """Building that each brigade's choice names, (k, n_brigades), -1 where there is none or nothing was chosen."""
-    n_brigades = len(recording.city.brigade_tank_litres)
-    found = np.full((len(recording.steps), n_brigades), -1, dtype=np.int64)
-    for row, target in zip(found, recording.ragged("/decisions", "target"), strict=True):
-        row[: len(target)] = target
-    return found
 
 
 def log_civilians(stage: Stage, recording: Recording, mesh: CityMesh) -> None:
@@ -123,7 +120,8 @@ def log_civilians(stage: Stage, recording: Recording, mesh: CityMesh) -> None:
     inside = np.asarray(city.civilian_building)
     height = np.where(inside >= 0, mesh.roof_xyz_m[inside, 2] + 3.0, 2.0)
     position = np.column_stack([city.civilian_x_m, city.civilian_y_m, height])
-    stage.static("civilians", rerun.Points3D(position, radii=[2.6]))
+    if not stage.has("civilians"):
+        stage.static("civilians", rerun.Points3D(position, radii=[2.6]))
     hp = recording.column("/civilians", "hp")
     health = colors.packed_array(colors.health_rgb(hp, np.asarray(city.civilian_hp)))
     look = rerun.Points3D.columns(colors=health.reshape(-1))
@@ -137,7 +135,7 @@ def log_sites(stage: Stage, recording: Recording) -> None:
     topic = "/observations"
     ids, sides = recording.ragged(topic, "site_id"), recording.ragged(topic, "site_free_sides")
     count = np.array([len(row) for row in ids])
-    if not count.any():
+    if not count.any() and not stage.has("fire/sites"):
         return
     west, south, east, north = (
         np.concatenate([np.asarray(row, dtype=np.float32) for row in recording.ragged(topic, f"site_{side}_m")])
@@ -169,10 +167,10 @@ def log_sites(stage: Stage, recording: Recording) -> None:
 def _log_strips(
     stage: Stage, path: str, strips: NDArray[np.float32], per_step: NDArray[Any], *, radius_m: float, rgb: colors.Rgb
 ) -> None:
-    """Send line strips, (strips, points, 3), `per_step` of them for each step; nothing if there are none."""
+    """Send line strips, (strips, points, 3), `per_step` of them for each step; nothing if there never were any."""
     import rerun
 
-    if len(strips) == 0:
+    if len(strips) == 0 and not stage.has(path):
         return
     stage.static(path, rerun.LineStrips3D.from_fields(radii=[radius_m], colors=colors.single(rgb)))
     stage.rows(path, rerun.LineStrips3D.columns(strips=strips).partition(per_step))

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 LEGEND_PATH: Final = "/legend"
 HELP_PATH: Final = "/help"
 
-_COLUMN_WIDTH: Final = 2.9
+_COLUMN_WIDTH: Final = {False: 2.9, True: 4.1}
+"""By whether two runs are compared: then there is a row more in the same place, and less room for the names."""
 
 HELP: Final = """\
 # How to read this
@@ -24,15 +25,22 @@ a roof, or click it and open the panel on the right (the button at the top right
 fuel, water and fieryness at this step.
 
 **Brigades** are balls, colored by what they do. The blue bar above a brigade is the water in its tank; the label is
-its number and the litres. A blue arc is water on its way to the target; a thin white one leads to the target that a
-brigade drives to. Brigades on one spot are drawn side by side.
+its name and the litres. A blue arc is water on its way to the target; a thin white one leads to the target that a
+brigade drives to. Brigades on one spot are drawn side by side. Click a ball to read what it chose, and by which values.
 
 **Civilians** are small dots above roofs: green when well, white when hurt, magenta when dying, black when dead.
 
 **Fire sites** are thin boxes, as the brigades saw them before the step; a pink side is one over which the fire can
 still spread.
 
-The slider below moves through the steps, one simulated minute each; the space bar plays them.
+**Air**: a recording holds the heat of the air only every 50 steps. The third tab of the map shows the last one that
+there was, and says of which step it is. From purple over pink to white it gets hotter.
+
+**The log** tells what happened, and each choice that is new: what a brigade goes for, the value (Q) of that beside the
+best other action's, and the state that it saw. A rule has no values.
+
+The slider below moves through the steps, one simulated minute each; the space bar plays them. With two recordings the
+marked part of the slider begins where they first differ.
 """
 
 
@@ -51,6 +59,7 @@ def entries(*, comparing: bool) -> list[list[tuple[str, colors.Rgb]]]:
             ("civilian, hurt", colors.HURT_RGB),
             ("civilian, dying", colors.DYING_RGB),
             ("civilian, dead", colors.DEAD_RGB),
+            ("hot air", colors.AIR_RGB[1]),
         ],
     ]
     if comparing:
@@ -58,12 +67,19 @@ def entries(*, comparing: bool) -> list[list[tuple[str, colors.Rgb]]]:
     return rows
 
 
+def bounds(*, comparing: bool) -> tuple[tuple[float, float], tuple[float, float]]:
+    """What of the legend's plane is to be seen: its range in x and in y."""
+    rows = entries(comparing=comparing)
+    width = _COLUMN_WIDTH[comparing]
+    return (-width / 2, width * (max(map(len, rows)) - 0.5)), (-0.4, len(rows) - 0.1)
+
+
 def log_legend(stream: rerun.RecordingStream, *, comparing: bool) -> None:
     """Send the legend, as dots in rows with their names below them, and the page of help."""
     import rerun
 
     rows = entries(comparing=comparing)
-    place = [(_COLUMN_WIDTH * x, float(y)) for y, row in enumerate(rows) for x in range(len(row))]
+    place = [(_COLUMN_WIDTH[comparing] * x, float(y)) for y, row in enumerate(rows) for x in range(len(row))]
     named = [entry for row in rows for entry in row]
     dots = rerun.Points2D(
         place, colors=colors.packed_table([rgb for _, rgb in named]), radii=rerun.Radius.ui_points(6.0)

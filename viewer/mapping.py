@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fireworld.errors import ViewError, expected
 from fireworld.records import MATERIALS, CityRecord, Recording
-from viewer import colors, crews, plots, telling
+from viewer import air, colors, crews, lanes, plots, telling
 from viewer.city_mesh import SHADES_PERCENT, CityMesh, build_mesh
 from viewer.stage import Stage, values
 
@@ -23,33 +23,64 @@ _REFUGE: Final = len(colors.FIERYNESS_RGB)
 _BUILDING_COLORS: Final = colors.shaded_table((*colors.FIERYNESS_RGB, colors.REFUGE_RGB), SHADES_PERCENT)
 
 
-def log_recording(
-    stream: rerun.RecordingStream, recording: Recording, *, prefix: str = "", focus: Sequence[int] = ()
-) -> None:
-    """Send everything that a recording holds to a Rerun stream, below one entity path.
+class Feed:
+    """Puts one run on a Rerun stream: the city at once, then its steps as they come, one by one or all together.
 
     Args:
         stream: where to; its log time and log tick are left out of everything sent.
-        recording: what to show.
+        city: where the run takes place.
         prefix: entity path to put it below, "" or like "/a".
+        name: what the run is called beside another, "" where it is alone.
         focus: ids of buildings whose temperatures are plotted.
 
     Raises:
         ViewError: a focus that the city has no building for.
     """
-    focus_index = building_indices(recording.city, focus)
-    stage = Stage(stream, prefix, recording.steps)
-    stage.static("", _coordinates())
-    mesh = build_mesh(recording.city)
-    log_city(stage, recording.city)
-    log_buildings(stage, recording, mesh)
-    crews.log_brigades(stage, recording, mesh)
-    crews.log_water(stage, recording, mesh)
-    crews.log_civilians(stage, recording, mesh)
-    crews.log_sites(stage, recording)
-    plots.log_plots(stage, recording, focus_index)
-    plots.log_activities(stage, recording)
-    telling.log_text(stage, recording)
+
+    def __init__(
+        self,
+        stream: rerun.RecordingStream,
+        city: CityRecord,
+        *,
+        prefix: str = "",
+        name: str = "",
+        focus: Sequence[int] = (),
+    ) -> None:
+        self._focus_index = building_indices(city, focus)
+        self._stage = Stage(stream, prefix, np.zeros(0, dtype=np.int64), name=name)
+        self._mesh = build_mesh(city)
+        self._stage.static("", _coordinates())
+        log_city(self._stage, city)
+        log_handles(self._stage, city, self._mesh)
+
+    def take(self, recording: Recording) -> None:
+        """Send the steps of a recording of this city: the first ones of the run, or those after the ones sent before.
+
+        Args:
+            recording: as many steps as there are to send; a MemoryRecording of one record will do.
+        """
+        stage, mesh = self._stage, self._mesh
+        stage.steps = recording.steps
+        log_buildings(stage, recording, mesh)
+        air.log_air(stage, recording, height_m=float(mesh.roof_xyz_m[:, 2].max(initial=0.0)) + air.ABOVE_ROOFS_M)
+        crews.log_brigades(stage, recording)
+        crews.log_water(stage, recording, mesh)
+        crews.log_civilians(stage, recording, mesh)
+        crews.log_sites(stage, recording)
+        plots.log_plots(stage, recording, self._focus_index)
+        lanes.log_lanes(stage, recording)
+        telling.log_text(stage, recording)
+
+
+def log_recording(
+    stream: rerun.RecordingStream, recording: Recording, *, prefix: str = "", name: str = "", focus: Sequence[int] = ()
+) -> None:
+    """Send everything that a recording holds to a Rerun stream; the arguments are those of `Feed`.
+
+    Raises:
+        ViewError: a focus that the city has no building for.
+    """
+    Feed(stream, recording.city, prefix=prefix, name=name, focus=focus).take(recording)
 
 
 def building_indices(city: CityRecord, focus: Sequence[int]) -> list[int]:
@@ -96,12 +127,11 @@ def log_city(stage: Stage, city: CityRecord) -> None:
 
 
 def log_buildings(stage: Stage, recording: Recording, mesh: CityMesh) -> None:
-    """Color the city by fieryness, and put a handle with the numbers of its building on every roof."""
+    """Color the city by fieryness, and give the handle on every roof the numbers of its building."""
     city = recording.city
     fieryness = recording.column("/buildings", "fieryness")
     log_mesh(stage, mesh, shown_codes(city, fieryness), _BUILDING_COLORS)
 
-    log_handles(stage, city, mesh)
     columns = {name: recording.column("/buildings", name) for name in ("temperature", "fuel_share", "water_litres")}
     columns["fieryness"] = fieryness
     for block in stage.blocks(13 * len(city.building_id)):
@@ -147,7 +177,7 @@ def log_mesh(
     import rerun
 
     stage.static(path, rerun.Mesh3D(vertex_positions=mesh.vertex_xyz_m, triangle_indices=mesh.triangle))
-    changed = np.flatnonzero(np.concatenate([[True], np.any(codes[1:] != codes[:-1], axis=1)]))
+    changed = stage.changed(path, codes)
     entry = codes.astype(np.intp) * table.shape[1]
     flat = table.reshape(-1)
     n_vertices = len(mesh.vertex_building)

@@ -23,5 +23,6 @@ def select_steps(
     if not kept:
         held = f"steps {steps[0]} to {steps[-1]}" if len(steps) else "no step at all"
         wanted = f"steps of the recording, which holds {held}"
-        raise ViewError(expected("view", "--from and --to", wanted, f"steps {low} to {high}"))
+        asked = f"steps {low} to {high}" if last is not None or low <= high else f"steps from {low} on"
+        raise ViewError(expected("view", "--from and --to", wanted, asked))
     return MemoryRecording(recording.header, recording.city, [one for one in recording if one.step in kept])

@@ -17,20 +17,55 @@ CHUNK_BYTES: Final = 1 << 20
 
 
 class Stage:
-    """Sends static things and whole columns to a Rerun stream, all below one entity path."""
+    """Sends static things and whole columns to a Rerun stream, all below one entity path.
 
-    def __init__(self, stream: rerun.RecordingStream, prefix: str, steps: NDArray[np.int64]) -> None:
+    Steps may come in several parts, one after another: what is static is sent once, and what is told only where it
+    changes is compared with the last step of the part before.
+
+    Args:
+        stream: where to.
+        prefix: entity path, "" or like "/a".
+        steps: (k,) steps of the first part.
+        name: what this run is called beside another, "" where it is alone.
+    """
+
+    def __init__(self, stream: rerun.RecordingStream, prefix: str, steps: NDArray[np.int64], *, name: str = "") -> None:
         self.stream = stream
         self.prefix = prefix
         self.steps = steps
+        self.name = name
+        self._sent: set[str] = set()
+        self._last: dict[str, NDArray[Any]] = {}
 
     def path(self, path: str) -> str:
         """Full entity path of a layer."""
         return f"{self.prefix}/{path}"
 
     def static(self, path: str, *archetypes: Any) -> None:
-        """Log what does not change in the run."""
-        self.stream.log(self.path(path), *archetypes, static=True)
+        """Log what does not change in the run; only the first time for each path."""
+        if path not in self._sent:
+            self._sent.add(path)
+            self.stream.log(self.path(path), *archetypes, static=True)
+
+    def has(self, path: str) -> bool:
+        """Whether anything static was sent to a path."""
+        return path in self._sent
+
+    def changed(self, path: str, numbers: NDArray[Any]) -> NDArray[np.int64]:
+        """Return the rows of (k, w) numbers that differ from the row before, over all parts; the very first counts.
+
+        Args:
+            path: what the numbers are of; one call for each part.
+            numbers: of the steps of this part.
+        """
+        if len(numbers) == 0:
+            return np.zeros(0, dtype=np.int64)
+        last = self._last.get(path)
+        differs = np.ones(len(numbers), dtype=bool)
+        differs[1:] = np.any(numbers[1:] != numbers[:-1], axis=1)
+        differs[0] = last is None or not np.array_equal(last, numbers[0])
+        self._last[path] = numbers[-1].copy()
+        return np.flatnonzero(differs)
 
     def rows(self, path: str, *columns: Any, steps: Sequence[int] | NDArray[np.int64] | None = None) -> None:
         """Send columns of one row for each step of the recording, or for each of the steps given.
@@ -55,15 +90,24 @@ class Stage:
 
 
 def values(archetype: str, columns: Mapping[str, NDArray[Any]]) -> Any:
-    """Columns of plain numbers under names of our own, shown when an instance is selected.
+    """Columns of plain numbers under names of our own, shown when an instance is selected; NaN becomes nothing.
 
     Args:
         archetype: heading the numbers are shown under.
         columns: name to (rows, width) numbers.
     """
-    import pyarrow
     import rerun
 
     rows, width = next(iter(columns.values())).shape
-    flat = {name: pyarrow.array(np.ascontiguousarray(numbers).reshape(-1)) for name, numbers in columns.items()}
+    flat = {name: _arrow(np.ascontiguousarray(numbers).reshape(-1)) for name, numbers in columns.items()}
     return rerun.DynamicArchetype.columns(archetype, components=flat).partition(np.full(rows, width))
+
+
+def _arrow(numbers: NDArray[Any]) -> Any:
+    """Make an Arrow array of (k,) numbers; NaN becomes null, with 0 below it: Rerun compares what lies below, too."""
+    import pyarrow
+
+    missing = np.isnan(numbers) if numbers.dtype.kind == "f" else np.zeros(0, dtype=bool)
+    if not missing.any():
+        return pyarrow.array(numbers)
+    return pyarrow.array(np.where(missing, numbers.dtype.type(0), numbers), mask=missing)

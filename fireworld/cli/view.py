@@ -29,7 +29,12 @@ def _building_ids(context: click.Context, parameter: click.Parameter, value: str
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 @click.option("--web", is_flag=True, help="Serve the view to browsers on this machine.")
 @click.option("--port", type=click.IntRange(1, 65535), help="Port of the page that --web serves.  [default: 9090]")
-@click.option("--focus", callback=_building_ids, metavar="IDS", help="Plot these buildings' temperatures.")
+@click.option(
+    "--focus",
+    callback=_building_ids,
+    metavar="IDS",
+    help="Plot these buildings' temperatures.  [default: those that burn first]",
+)
 @click.option("--from", "first", type=click.IntRange(min=0), metavar="N", help="First step to show.")
 @click.option("--to", "last", type=click.IntRange(min=0), metavar="N", help="Last step to show.")
 @click.option("--every", type=click.IntRange(min=1), default=1, metavar="N", help="Show every N-th step.")
@@ -47,8 +52,18 @@ def command(
 ) -> None:
     """Open one recording in Rerun, or two of the same city side by side.
 
-    A recording that was cut off or damaged is shown as far as it is good.
-    """
+    Shows the city and its fire, what the brigades do and why, curves, the outcome; of two recordings also where they
+    first differ and which buildings then do. A recording that was cut off or damaged is shown as far as it is good.
+
+    \b
+    fireworld view out.mcap                        a window
+    fireworld view golden.mcap out.mcap            two runs, one time cursor
+    fireworld view out.mcap --focus 369,42         with the temperatures of two buildings
+    fireworld view out.mcap --save out.rrd         no screen here: a file, for `rerun out.rrd`
+    fireworld view long.mcap --from 100 --every 5  part of a long run
+
+    Exit code: 0 shown or saved, 2 could not (no display, no Rerun, not a recording, two cities).
+    """  # noqa: D301 - click wants the character
     if len(logs) > 2:
         raise click.UsageError(f"Expected one or two recordings, got {len(logs)}.")
     if web and output is not None:

@@ -21,7 +21,7 @@ from recorder.writer import LogWriter
 
 N_STEPS = 40
 """Last step of what the children record."""
-RUN = ("run", "quick", "--steps", str(N_STEPS), "--record")
+RUN = ("run", "quick", "--policy", "chief", "--steps", str(N_STEPS), "--record")
 
 
 def count_safe_steps(counter: mmap.mmap) -> None:

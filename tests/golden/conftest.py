@@ -72,6 +72,8 @@ def project(_warm, pytester, monkeypatch):
     """A folder with a policy, in which a pytest of its own runs in this process."""
     monkeypatch.setenv("XDG_CACHE_HOME", CACHE)  # pytester moves the home folder, where compiled kernels are kept
     monkeypatch.setenv("PYTEST_ADDOPTS", PLAIN)
+    for name in ("mine", "my_policy"):
+        monkeypatch.delitem(sys.modules, name, raising=False)  # another test's policy of that name
     pytester.makepyfile(mine=POLICY)
     pytester.syspathinsert()
     return pytester

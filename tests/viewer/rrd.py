@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 from collections import defaultdict
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -15,17 +16,17 @@ from viewer import app
 Rows = dict[str, list[tuple[int | None, Any]]]
 
 
-def read(path: Path) -> dict[str, Rows]:
+def read(path: Path, *, timelines: Collection[str] = ("step",)) -> dict[str, Rows]:
     """Entity path to component to (step, list of values) in order; step None is static."""
     from rerun.chunk import RrdReader
 
     found: dict[str, Rows] = defaultdict(lambda: defaultdict(list))
     for chunk in RrdReader(path).stream():
         batch = chunk.to_record_batch()
-        assert set(chunk.timeline_names) <= {"step"}
+        assert set(chunk.timeline_names) <= set(timelines)
         steps = [None] * chunk.num_rows if chunk.is_static else batch.column("step").to_pylist()
         for name in batch.schema.names:
-            if name == "step" or "RowId" in name:
+            if name in timelines or "RowId" in name:
                 continue
             found[chunk.entity_path][name].extend(zip(steps, batch.column(name), strict=True))
     for rows in found.values():

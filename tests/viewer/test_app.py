@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import socket
 import subprocess
@@ -16,12 +17,14 @@ from fireworld.errors import OutputError, ViewError
 from tests.viewer import rrd
 from tests.viewer.conftest import make_recording
 from viewer import app
-from viewer.blueprint import frame_fire, title
+from viewer.blueprint import frame_fire, frame_from_above, title
+from viewer.outcome import Outcome
 
 
 def test_rerun_verifies_what_is_saved(small, slower, tmp_path: Path):
     app.save([small], tmp_path / "one.rrd", focus=[100])
-    app.save([small, slower], tmp_path / "two.rrd")
+    outcome = Outcome(heads=["a", "b"], rows=[("steps", "41", "31")], first_step=1, first_sentence="step 1")
+    app.save([small, slower], tmp_path / "two.rrd", outcome=outcome)
     done = rrd.rerun_program("rrd", "verify", str(tmp_path / "one.rrd"), str(tmp_path / "two.rrd"))
     assert done.returncode == 0, done.stderr
     assert "2 files verified without error" in done.stdout + done.stderr
@@ -111,8 +114,22 @@ def test_a_missing_rerun_is_named(small, tmp_path: Path, monkeypatch: pytest.Mon
 def test_without_a_display_the_other_ways_are_named(small, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    with pytest.raises(ViewError, match=r"no display here; try --save FILE\.rrd, or --web"):
+    with pytest.raises(ViewError, match=r"no display here; try --save FILE\.rrd, --web, or `fireworld render`"):
         app.show([small])
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs a shell")
+def test_a_viewer_that_cannot_open_its_window_is_one_sentence(
+    small, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+):
+    broken = tmp_path / "rerun"
+    broken.write_text("#!/bin/sh\necho 'Error: at mod.rs:7: no\nVulkan driver' >&2\nexit 3\n")
+    broken.chmod(0o700)
+    monkeypatch.setattr(app, "viewer_executable", lambda: broken)
+    monkeypatch.setenv("DISPLAY", ":0")
+    with pytest.raises(ViewError, match=r"ended with code 3: no Vulkan driver; try --save FILE\.rrd, --web, or `fire"):
+        app.show([small])
+    assert capfd.readouterr() == ("", "")
 
 
 def test_a_taken_port_is_named(small):
@@ -179,6 +196,15 @@ def test_the_camera_looks_at_the_fire_from_the_south(small):
     assert 0 < camera.target_m[0] < 100
     assert camera.eye_m[1] < camera.target_m[1]
     assert camera.eye_m[2] > 50
+
+
+def test_the_map_from_above_shows_the_whole_box_with_north_up():
+    camera = frame_from_above((0.0, 0.0), (300.0, 100.0), aspect=1.5)
+    assert camera.target_m == (150.0, 50.0, 0.0)
+    assert camera.eye_m[:2] == (150.0, 50.0)
+    assert camera.up == (0.0, 1.0, 0.0)
+    half_width = camera.eye_m[2] * math.tan(math.radians(27.5)) * 1.5
+    assert 150.0 < half_width < 170.0
 
 
 def test_names_from_files_keep_letters_that_the_viewer_can_draw(small):

@@ -13,7 +13,9 @@ from click.testing import CliRunner, Result
 from fireworld.cli import root
 from fireworld.errors import FireworldError, OutputError, ViewError
 from fireworld.records import MemoryRecording
+from recorder.diff import compare
 from tests.viewer import rrd
+from tests.viewer.conftest import make_recording
 from viewer import app
 
 reader = pytest.importorskip("recorder.reader")
@@ -45,7 +47,7 @@ def logs(small: MemoryRecording, slower: MemoryRecording, monkeypatch: pytest.Mo
         return known[path.name]
 
     monkeypatch.setattr(reader, "open_log", open_log)
-    return SimpleNamespace(**known)
+    return SimpleNamespace(small=small, slower=slower)
 
 
 def view(*arguments: str) -> Result:
@@ -66,6 +68,32 @@ def test_save_two_side_by_side(logs, tmp_path: Path):
     assert result.exit_code == 0, result.output
     found = rrd.read(tmp_path / "ab.rrd")
     assert {"/a/city/buildings", "/b/city/buildings", "/diff/city/buildings"} <= set(found)
+
+
+def test_the_outcome_and_the_first_difference_are_those_that_diff_tells(logs, tmp_path: Path):
+    assert view("a.mcap", "b.mcap", "--save", str(tmp_path / "ab.rrd")).exit_code == 0
+    found = rrd.read(tmp_path / "ab.rrd")
+    first = compare(logs.small, logs.slower).first
+    assert first is not None
+    (line,) = found["/diff/log/first_difference"]["TextLog:text"]
+    assert (line[0], line[1].as_py()) == (first.step, [f"first difference: {first.sentence}"])
+    page = found["/outcome"]["TextDocument:text"][0][1].as_py()[0]
+    assert "| A: a.mcap | B: b.mcap |" in page
+    assert "| steps | 41 | 31 |" in page
+    assert view("a.mcap", "--save", str(tmp_path / "a.rrd")).exit_code == 0
+    page = rrd.read(tmp_path / "a.rrd")["/outcome"]["TextDocument:text"][0][1].as_py()[0]
+    assert page.startswith("|  | a.mcap |")
+    assert "| score | 5 |" in page
+
+
+def test_two_cities_are_not_compared(logs, monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    other = make_recording(5, 5, 3)
+    known = {"a.mcap": logs.small, "b.mcap": other}
+    monkeypatch.setattr(reader, "open_log", lambda path, **_: OpenedLog(known[path.name], None))
+    result = view("a.mcap", "b.mcap", "--save", str(tmp_path / "ab.rrd"))
+    assert isinstance(result.exception, ViewError)
+    assert str(result.exception).endswith("try to view them one by one")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_damaged_recording_is_shown_as_far_as_it_is_good(logs, tmp_path: Path):
@@ -125,7 +153,8 @@ def test_web_and_window_get_what_they_are_told(logs, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(app, "serve", lambda recordings, **options: calls.append(("serve", len(recordings), options)))
     assert view("a.mcap", "b.mcap").exit_code == 0
     assert view("a.mcap", "--web", "--port", "9191", "--focus", "100").exit_code == 0
-    assert calls[0] == ("show", 2, {"focus": ()})
+    assert calls[0][:2] == ("show", 2)
+    assert calls[0][2]["focus"] == ()
     assert calls[1][:2] == ("serve", 1)
     assert calls[1][2]["port"] == 9191
     assert calls[1][2]["focus"] == (100,)

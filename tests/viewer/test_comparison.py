@@ -14,7 +14,8 @@ from tests.viewer import rrd
 from tests.viewer.conftest import make_recording
 from viewer import app, colors
 from viewer.city_mesh import SHADES_PERCENT, build_mesh
-from viewer.comparison import DAMAGE_ORDER, common_steps, difference
+from viewer.comparison import AGREEMENT, DAMAGE_ORDER, common_steps, difference
+from viewer.outcome import Outcome
 
 SCORE_FACTORS = (1, 0.66, 0.33, 0, 0.9, 0.75, 0.5, 0.25, 0)
 
@@ -62,6 +63,53 @@ def test_the_difference_is_colored_at_every_step(small, slower, tmp_path: Path):
     for side, recording in (("/a", small), ("/b", slower)):
         own = rrd.at_every_step(found[f"{side}/city/handles"]["Building:fieryness"], recording.steps.tolist())
         assert np.array_equal(np.array(own), recording.column("/buildings", "fieryness"))
+
+
+def test_both_runs_are_told_apart_in_one_plot(small, slower, tmp_path: Path):
+    app.save([small, slower], tmp_path / "pair.rrd")
+    found = rrd.read(tmp_path / "pair.rrd")
+    names = [found[f"{side}/plots/buildings"]["SeriesLines:names"][0][1].as_py() for side in ("/a", "/b")]
+    assert [name[0] for name in names] == ["A burning", "B burning"]
+    looks = [found[f"{side}/plots/score"]["SeriesLines:colors"][0][1].as_py() for side in ("/a", "/b")]
+    assert not set(looks[0]) & set(looks[1])
+
+
+def test_the_first_difference_is_marked_and_the_outcome_is_a_page(small, slower, tmp_path: Path):
+    outcome = Outcome(
+        heads=["a.mcap", "b|.mcap"],
+        rows=[("steps", "41", "31"), ("score", "4.9", "5.5")],
+        first_step=2,
+        first_sentence="step 2, fire: building 5 burns",
+    )
+    app.save([small, slower], tmp_path / "pair.rrd", outcome=outcome)
+    found = rrd.read(tmp_path / "pair.rrd")
+    (line,) = found["/diff/log/first_difference"]["TextLog:text"]
+    assert (line[0], line[1].as_py()) == (2, ["first difference: step 2, fire: building 5 burns"])
+    (mark,) = found["/diff/plots/first_difference"]["Scalars:scalars"]
+    assert mark[0] == 2
+    lane = [(step, state.as_py()[0]) for step, state in found["/diff/agreement"]["StateChange:state"]]
+    codes_a, codes_b = (one.column("/buildings", "fieryness") for one in (small, slower))
+    differ = int(np.flatnonzero(np.any(codes_a[:31] != codes_b, axis=1))[0])
+    wanted = [(0, AGREEMENT[0]), (2, AGREEMENT[1])][: 2 if differ > 2 else 1]
+    assert lane[: len(wanted)] == wanted
+    assert (differ, AGREEMENT[2]) in lane
+    page = found["/outcome"]["TextDocument:text"][0][1].as_py()[0]
+    assert page.splitlines() == [
+        "First difference: step 2, fire: building 5 burns.",
+        "",
+        "|  | A: a.mcap | B: b/.mcap |",
+        "| --- | --- | --- |",
+        "| steps | 41 | 31 |",
+        "| score | 4.9 | 5.5 |",
+    ]
+
+
+def test_runs_that_are_the_same_have_no_mark(small, tmp_path: Path):
+    app.save([small, small], tmp_path / "same.rrd", outcome=Outcome(heads=["a", "b"], rows=[]))
+    found = rrd.read(tmp_path / "same.rrd")
+    assert not {"/diff/log/first_difference", "/diff/plots/first_difference"} & set(found)
+    assert [state.as_py() for _, state in found["/diff/agreement"]["StateChange:state"]] == [[AGREEMENT[0]]]
+    assert found["/outcome"]["TextDocument:text"][0][1].as_py()[0].startswith("The runs are the same.")
 
 
 def test_the_same_run_twice_differs_nowhere(small, tmp_path: Path):

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import rerun
 
 from fireworld.errors import ViewError
-from fireworld.records import ACTIVITIES, MemoryRecording
+from fireworld.records import ACTION_NAMES, ACTIVITIES, MemoryRecording
 from tests.viewer import rrd
 from tests.viewer.conftest import make_recording
-from viewer import app, colors, crews
+from viewer import app, colors, crews, mapping
 from viewer.city_mesh import SHADES_PERCENT, build_mesh
-from viewer.plots import COUNTS, REWARDS, SCORES
+from viewer.plots import COUNTS, REWARDS, SCORES, first_burning
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +96,9 @@ def test_brigades_stand_where_they_are_in_the_color_of_what_they_do(small, saved
     shown = np.array(rrd.at_every_step(brigades["Points3D:colors"], steps))
     assert np.array_equal(shown, colors.packed_table(colors.ACTIVITY_RGB)[activity])
     labels = rrd.at_every_step(saved["/team/names"]["Points3D:labels"], steps)
-    assert labels[3].tolist() == [f"{i} · {tank} l" for i, tank in enumerate(list(small)[3].brigades.tank_litres)]
+    assert labels[3].tolist() == [
+        f"brigade {i} · {tank} l" for i, tank in enumerate(list(small)[3].brigades.tank_litres)
+    ]
 
 
 def test_gauges_are_as_high_as_the_tanks_are_full(small, saved):
@@ -150,6 +154,103 @@ def test_lanes_change_where_activities_change(small, saved):
         assert shown == [[ACTIVITIES[record.brigades.activity[brigade]]] for record in small]
 
 
+def test_lanes_tell_the_actions_too(small, saved):
+    for brigade in range(3):
+        lane = saved[f"/action/brigade_{brigade}"]["StateChange:state"]
+        shown = [states.tolist() for states in rrd.at_every_step(lane, small.steps.tolist())]
+        assert shown[0] == ["no choice"]
+        assert shown[1:] == [[ACTION_NAMES[record.decisions.action[brigade]]] for record in list(small)[1:]]
+
+
+def test_the_terms_of_the_reward_are_stacked_up_to_their_sum(small, saved):
+    shown = np.array(rrd.at_every_step(saved["/plots/reward_stacked"]["Scalars:scalars"], small.steps.tolist()))
+    terms = np.column_stack([small.column("/rewards", name) for name in REWARDS[:4]])
+    assert np.array_equal(shown[:, 0], terms[:, 0])
+    assert np.array_equal(shown[:, 3], terms.sum(axis=1))
+
+
+def test_values_of_choices_are_plotted_where_there_are_some(small, saved):
+    for brigade in range(3):
+        chosen, best = (
+            rrd.at_every_step(saved[f"/plots/{plot}/brigade_{brigade}"]["Scalars:scalars"], small.steps.tolist())
+            for plot in ("values", "values_best")
+        )
+        assert chosen[0].tolist() == best[0].tolist() == []  # nobody is asked before the first step
+        for record, own, most in zip(list(small)[1:], chosen[1:], best[1:], strict=True):
+            assert own.tolist() == [4 * brigade + record.decisions.action[brigade]]
+            assert most.tolist() == [4 * brigade + 3]
+
+
+def test_what_a_brigade_chose_is_told_when_it_is_clicked(small, saved):
+    steps = small.steps.tolist()
+    brigades = saved["/team/brigades"]
+    for name in ("action", "target"):
+        shown = np.array(rrd.at_every_step(brigades[f"Brigade:{name}"], steps))
+        assert np.array_equal(shown[1:], [getattr(record.decisions, name) for record in list(small)[1:]])
+    easiest = rrd.at_every_step(brigades["Brigade:value_easiest"], steps)
+    assert easiest[0].tolist() == [None] * 3
+    assert easiest[1].tolist() == [0.0, 4.0, 8.0]
+
+
+def test_the_buildings_that_burn_first_are_plotted_if_none_are_named(small, tmp_path: Path):
+    app.save([small], tmp_path / "run.rrd")
+    (_, names) = rrd.read(tmp_path / "run.rrd")["/plots/focus"]["SeriesLines:names"][0]
+    assert first_burning(small, 4) == [int(name.removeprefix("building ")) for name in names.as_py()]
+    codes = small.column("/buildings", "fieryness")
+    began = np.where(codes.any(axis=0), (codes != 0).argmax(axis=0), 99)
+    chosen = [small.city.building_id.tolist().index(identifier) for identifier in first_burning(small, 4)]
+    assert sorted(began[chosen]) == sorted(began)[:4]
+
+
+def test_steps_sent_one_by_one_show_the_same_as_all_at_once(small, saved, tmp_path: Path):
+    stream = rerun.RecordingStream("test", recording_id="one-by-one", send_properties=False)
+    stream.set_log_time_enabled(False)
+    stream.set_log_tick_enabled(False)
+    memory = stream.memory_recording()
+    feed = mapping.Feed(stream, small.city, focus=[121, 100])
+    for record in small:
+        feed.take(MemoryRecording(small.header, small.city, [record]))
+    (tmp_path / "parts.rrd").write_bytes(memory.drain_as_bytes())
+    found = rrd.read(tmp_path / "parts.rrd")
+    assert set(found) == {path for path in saved if not path.startswith(("/legend", "/help", "/__prop"))}
+    for path, components in found.items():
+        assert set(components) == set(saved[path]), path
+        for name, rows in components.items():
+            whole = saved[path][name]
+            n_before = next(place for place, (_, value) in enumerate(whole) if value.as_py() != [] or path == "/")
+            assert rows == whole[n_before:], (path, name)  # what is not there yet is nothing in both
+
+
+def test_a_fire_that_goes_out_leaves_no_box_when_steps_come_one_by_one(tmp_path: Path):
+    recording = make_recording(4, 4, 2)
+    last = list(recording)[-1]
+    gone = {name: np.zeros(0) for name in ("site_west_m", "site_south_m", "site_east_m", "site_north_m")}
+    out = replace(
+        last,
+        step=3,
+        observations=replace(
+            last.observations, site_id=np.zeros(0, "<i4"), site_free_sides=np.zeros(0, "u1"), **gone,
+            site_n_burning=np.zeros(0, "<i4"),
+        ),
+        brigades=replace(last.brigades, sprayed_litres=np.zeros(3, "<i4")),
+    )  # fmt: skip
+    stream = rerun.RecordingStream("test", recording_id="out", send_properties=False)
+    memory = stream.memory_recording()
+    feed = mapping.Feed(stream, recording.city)
+    for record in [*recording, out]:
+        feed.take(MemoryRecording(recording.header, recording.city, [record]))
+    (tmp_path / "out.rrd").write_bytes(memory.drain_as_bytes())
+    found = rrd.read(tmp_path / "out.rrd", timelines={"step", "log_time", "log_tick"})
+    for path, name in (
+        ("/fire/sites", "Boxes3D:centers"),
+        ("/fire/free_sides", "LineStrips3D:strips"),
+        ("/team/water", "LineStrips3D:strips"),
+    ):
+        steps = [step for step, _ in found[path][name]]
+        assert steps[-1] == 3
+        assert found[path][name][-1][1].as_py() == []
+
+
 def test_the_log_tells_events_and_new_choices(small, saved):
     events = [(step, text.as_py()[0]) for step, text in saved["/log/events"]["TextLog:text"]]
     wanted = sum(len(record.events.kind) for record in small)
@@ -159,22 +260,26 @@ def test_the_log_tells_events_and_new_choices(small, saved):
     assert events[0] == (first.step, f"building {small.city.building_id[first.events.entity[0]]} ignited")
     choices = [(step, text.as_py()[0]) for step, text in saved["/log/decisions"]["TextLog:text"]]
     target = small.city.building_id[list(small)[1].decisions.target]
+    ways = "nearest-to-civilian", "nearest-to-center", "nearest-to-me"
+    state = f"{ways[2]}, state 0: free edges 0, center low, civilian low, volume very-low, others nothing"
     assert choices[:3] == [
-        (1, f"brigade 0: easiest → building {target[0]}"),
-        (1, f"brigade 1: nearest-to-civilian → building {target[1]} (exploring)"),
-        (1, f"brigade 2: nearest-to-center → building {target[2]}"),
+        (1, f"brigade 0: easiest → building {target[0]}, Q 0 against 3 of {state}"),
+        (1, f"brigade 1: {ways[0]} → building {target[1]} (exploring), Q 5 against 7 of {state}"),
+        (1, f"brigade 2: {ways[1]} → building {target[2]}, Q 10 against 11 of {state}"),
     ]
     assert len(choices) < 3 * len(small.steps)
 
 
 def test_the_page_on_the_viewer_names_every_path(saved):
     page = (Path(__file__).parents[2] / "docs" / "viewer.md").read_text(encoding="utf-8")
-    for path in set(saved) - {"/", "/__properties", "/activity/brigade_1", "/activity/brigade_2"}:
+    for path in set(saved) - {"/", "/__properties"}:
+        if path.endswith(("/brigade_1", "/brigade_2")):
+            continue
         assert f"`{path}`" in page, path
 
 
 def test_no_entity_stands_for_a_single_building(saved):
-    assert len(saved) < 35
+    assert len(saved) < 45
 
 
 def test_brigades_on_one_spot_are_drawn_side_by_side():

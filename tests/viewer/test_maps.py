@@ -2,21 +2,37 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
 import pytest
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgba
 
-from fireworld.errors import OutputError
+from fireworld.errors import OutputError, ViewError
+from fireworld.records import FIERYNESS, MemoryRecording
 from viewer import colors, maps
+from viewer.city_map import Crews, MapState, contrasting, state_of
+from viewer.map_legend import LABELS, count_marks
+from viewer.moments import LAST, evenly, moments_at, moments_between
+from viewer.output import plain_style
+
+
+def legend_of(figure):
+    (legend,) = [axes.get_legend() for axes in figure.axes if axes.get_legend() is not None]
+    return [text.get_text() for text in legend.get_texts()]
+
+
+def texts_of(figure):
+    return [text.get_text() for text in figure.texts]
 
 
 def test_buildings_have_the_colors_of_their_codes(small):
     record = list(small)[12]
     figure = maps.draw_map(small.city, fieryness=record.buildings.fieryness)
-    (buildings,) = [item for item in figure.axes[0].collections if isinstance(item, PolyCollection)]
+    buildings = next(item for item in figure.axes[0].collections if isinstance(item, PolyCollection))
     wanted = [np.array(colors.FIERYNESS_RGB[code]) / 255 for code in record.buildings.fieryness.tolist()]
     wanted[-1] = np.array(colors.REFUGE_RGB) / 255
     assert np.allclose(buildings.get_facecolor()[:, :3], wanted)
@@ -27,9 +43,30 @@ def test_buildings_have_the_colors_of_their_codes(small):
 def test_the_legend_counts_what_is_there(small):
     record = list(small)[12]
     figure = maps.draw_map(small.city, fieryness=record.buildings.fieryness, brigades_xy=np.array([[1.0, 2.0]] * 3))
-    entries = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    entries = legend_of(figure)
     assert f"inferno ({np.count_nonzero(record.buildings.fieryness == 3)})" in entries
-    assert {"refuge (1)", "hydrant (1)", "civilian (6)", "brigade (3)"} <= set(entries)
+    assert {"refuge (1)", "hydrant (1)", "civilian well (6)", "brigade (3)"} <= set(entries)
+
+
+def test_people_are_counted_by_the_health_they_have_left(small):
+    hp = np.array([1000, 751, 750, 251, 250, 0])
+    counts = count_marks(small.city, MapState(fieryness=np.zeros(36, np.uint8), civilian_hp=hp))
+    named = {label: n for label, n in counts.items() if label.startswith("civilian")}
+    assert named == {"civilian well": 2, "civilian hurt": 2, "civilian dying": 1, "civilian dead": 1}
+    assert counts["unburnt"] == 35, "a refuge is none of the buildings that burn"
+
+
+def test_brigades_are_counted_by_what_they_do(small):
+    crews = Crews(
+        xy_m=np.zeros((4, 2)), activity=np.array([1, 2, 2, 4]), tank_share=np.ones(4), target=np.array([5, 6, -1, 7])
+    )
+    state = MapState(fieryness=np.zeros(36, np.uint8), civilian_hp=small.city.civilian_hp, crews=crews)
+    counts = count_marks(small.city, state)
+    assert {label: counts[label] for label in counts if label.startswith("brigade")} == {
+        "brigade driving": 1, "brigade spraying": 2, "brigade refilling": 1,
+    }  # fmt: skip
+    assert (counts["water jet"], counts["way to a target"]) == (1, 1), "refilling brigades go for nothing"
+    assert set(counts) <= set(LABELS)
 
 
 def test_civilians_are_colored_by_health(small):
@@ -38,14 +75,132 @@ def test_civilians_are_colored_by_health(small):
     dots = next(item for item in axes.collections if len(item.get_offsets()) == 6)
     assert dots.get_facecolor()[3][:3] == pytest.approx(to_rgba("#0a0a0a")[:3])
     assert dots.get_facecolor()[0][:3] == pytest.approx(np.array(colors.HEALTHY_RGB) / 255)
+    shapes = [len(path.vertices) for path in dots.get_paths()]
+    assert shapes[3] != shapes[0], "the dead have another shape too"
 
 
-def test_the_same_map_gives_the_same_bytes(small, tmp_path: Path):
-    for name in ("one.png", "two.png"):
-        maps.save_figure(maps.draw_map(small.city), tmp_path / name)
-    first = (tmp_path / "one.png").read_bytes()
-    assert first == (tmp_path / "two.png").read_bytes()
-    assert first.startswith(b"\x89PNG")
+def test_a_step_shows_jets_ways_and_tanks(small):
+    record = list(small)[4]
+    record = replace(record, brigades=replace(record.brigades, activity=np.array([1, 2, 4], "u1")))
+    recording = MemoryRecording(small.header, small.city, [record])
+    axes = maps.draw_steps([recording], [4]).axes[0]
+    lines = [item for item in axes.collections if isinstance(item, LineCollection) and item.get_zorder() == 5]
+    ends = {tuple(np.round(line.get_segments()[0][1], 6)) for line in lines if len(line.get_segments())}
+    aims = {
+        (round(float(small.city.center_x_m[k]), 6), round(float(small.city.center_y_m[k]), 6))
+        for k in record.decisions.target[:2].tolist()
+    }
+    assert ends == aims
+    gauge, water = (item for item in axes.collections if isinstance(item, PolyCollection) and item.get_zorder() > 6.5)
+    full, left = (
+        [np.ptp(path.vertices[:, 1]) for path in item.get_paths()] for item in (gauge, water)
+    )  # fmt: skip
+    assert np.array(left) / np.array(full) == pytest.approx(record.brigades.tank_litres / 15000)
+
+
+def test_brigades_on_one_spot_stand_side_by_side(small):
+    axes = maps.draw_map(small.city, brigades_xy=np.array([[30.0, 30.0]] * 3)).axes[0]
+    balls = next(item for item in axes.collections if len(item.get_offsets()) == 3)
+    x, y = np.asarray(balls.get_offsets()).T
+    assert (y == 30.0).all()
+    assert np.diff(x).min() > 0
+
+
+def test_titles_say_what_when_and_how_well(small):
+    figure = maps.draw_steps([small], [12])
+    assert texts_of(figure) == [
+        "grid, easiest, seed 3",
+        f"step 12   score 6.40 of 7   {list(small)[12].score.n_burning} burning, 0 burnt out",
+    ]
+
+
+def test_two_runs_side_by_side_and_one_that_has_ended(small, slower):
+    figure = maps.draw_steps([small, slower], [LAST])
+    assert len([axes for axes in figure.axes if axes.get_title() == ""]) == 2
+    texts = texts_of(figure)
+    assert texts[0] == "A: grid, easiest, seed 3"
+    assert texts[2] == "B: grid, nearest-to-me, seed 3"
+    assert texts[1].startswith("step 40   score")
+    assert texts[3].startswith("step 40 (ended at 30)   score")
+    burnt_out = [np.count_nonzero(list(one)[-1].buildings.fieryness[:-1] == 8) for one in (small, slower)]
+    assert "burnt out ({} | {})".format(*burnt_out) in legend_of(figure)
+
+
+def test_a_strip_has_a_map_for_each_step_and_run(small, slower):
+    assert len(maps.draw_steps([small], [0, 10, 20, 30, 40, LAST]).axes) == 6
+    figure = maps.draw_steps([small, slower], [0, 10, LAST])
+    titles = [text for text in texts_of(figure) if ": step" in text]
+    assert titles == ["A: step 0", "A: step 10", "A: step 40", "B: step 0", "B: step 10", "B: step 40 (ended at 30)"]
+    assert not any("(" in entry for entry in legend_of(figure)), "no counts where there are many maps"
+
+
+def test_names_are_no_formulas_and_fit(small):
+    header = replace(small.header, scenario="$x^2$\n", policy="p" * 300)
+    figure = maps.draw_steps([MemoryRecording(header, small.city, list(small))], [3])
+    figure.canvas.draw()
+    title = figure.texts[0]
+    assert title.get_text().startswith("$x^2$\\n, …ppp")
+    assert title.get_window_extent().x1 <= figure.bbox.x1
+
+
+def test_which_steps_are_shown(small, slower):
+    assert [moment.step for moment in moments_between([small], first=5, last=20, every=4)] == [5, 9, 13, 17, 20]
+    assert [moment.step for moment in moments_at([small], [LAST, 3, 3])] == [40, 3, 3]
+    assert evenly([small], 5) == [0, 10, 20, 30, 40]
+    assert evenly([MemoryRecording(small.header, small.city, list(small)[:2])], 5) == [0, 1]
+    both = moments_at([small, slower], [35])[0]
+    assert [record.step for record in both.records] == [35, 30]
+    with pytest.raises(ViewError, match="expected a step from 0 to 40, got 41"):
+        moments_at([small], [41])
+    with pytest.raises(ViewError, match="expected a recording with steps"):
+        moments_at([MemoryRecording(small.header, small.city, [])], [0])
+
+
+def simulated(rgb, matrix):
+    """CIELAB of a color as somebody without a kind of cones sees it (Machado and others, 2009)."""
+    part = np.array(rgb) / 255
+    linear = np.clip(matrix @ np.where(part <= 0.04045, part / 12.92, ((part + 0.055) / 1.055) ** 2.4), 0, 1)
+    to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+    xyz = to_xyz @ linear / np.array([0.9505, 1.0, 1.089])
+    f = np.where(xyz > 0.008856, np.cbrt(xyz), 7.787 * xyz + 16 / 116)
+    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+
+@pytest.mark.parametrize(
+    "matrix",
+    [
+        np.eye(3),
+        np.array([[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]]),
+        np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]),
+    ],
+    ids=["all cones", "no red", "no green"],
+)
+def test_those_who_do_not_see_red_or_green_can_tell_the_buildings_apart(matrix):
+    seen = [simulated(rgb, matrix) for rgb in (*colors.FIERYNESS_RGB, colors.REFUGE_RGB)]
+    names = (*FIERYNESS, "refuge")
+    apart = {
+        (names[a], names[b]): np.linalg.norm(seen[a] - seen[b]) for a in range(len(seen)) for b in range(a)
+    }  # fmt: skip
+    assert min(apart.values()) > 12.0, min(apart, key=apart.get)
+
+
+def test_letters_can_be_read_on_every_ball():
+    assert [contrasting(rgb) for rgb in ((225, 225, 225), (40, 140, 255), (10, 10, 10))] == [
+        "#333333",
+        "white",
+        "white",
+    ]
+
+
+def test_the_same_map_gives_the_same_bytes_whatever_the_users_settings(small, tmp_path: Path):
+    for ending in ("png", "svg", "pdf"):
+        for name, width in (("one", 1.0), ("two", 5.0)):
+            with mpl.rc_context({"font.size": 8 * width, "axes.linewidth": width}), plain_style():
+                maps.save_figure(maps.draw_steps([small], [7]), tmp_path / f"{name}.{ending}")
+        assert (tmp_path / f"one.{ending}").read_bytes() == (tmp_path / f"two.{ending}").read_bytes()
+    assert (tmp_path / "one.png").read_bytes().startswith(b"\x89PNG")
+    assert b"<svg" in (tmp_path / "one.svg").read_bytes()
+    assert (tmp_path / "one.pdf").read_bytes().startswith(b"%PDF")
 
 
 def test_files_are_not_replaced_unasked_and_never_half_written(small, tmp_path: Path):
@@ -59,4 +214,13 @@ def test_files_are_not_replaced_unasked_and_never_half_written(small, tmp_path: 
     assert path.read_bytes().startswith(b"\x89PNG")
     with pytest.raises(OutputError, match="cannot be written: No such file"):
         maps.save_figure(figure, tmp_path / "nowhere" / "map.png")
+    with pytest.raises(OutputError, match=r"expected a file ending in .png, .svg, .pdf, got '.jpg'"):
+        maps.save_figure(figure, tmp_path / "map.jpg")
     assert [item.name for item in tmp_path.iterdir()] == ["map.png"]
+
+
+def test_a_state_has_what_the_record_says(small):
+    record = next(iter(small))  # nobody was asked yet: there are no targets
+    state = state_of(small.city, record)
+    assert state.crews.target.tolist() == [-1, -1, -1]
+    assert state.crews.tank_share.tolist() == pytest.approx((record.brigades.tank_litres / 15000).tolist())

@@ -1,0 +1,135 @@
+"""`fireworld render`: pictures and films of recordings, without a viewer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from fireworld.cli.opening import open_committed
+
+if TYPE_CHECKING:
+    from fireworld.records import Recording
+
+_LAST: Final = "last"
+_STEPS_MAX: Final = 24
+
+
+@click.command()
+@click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="What to write: a picture (.png, .svg, .pdf) or a film (.gif, .mp4).",
+)
+@click.option("--step", metavar="N", help="Draw this step, or `last`.  [default: last]")
+@click.option("--steps", metavar="N,N,...", help="Draw these steps in a strip, as in 0,60,last.")
+@click.option("--from", "first", type=click.IntRange(min=0), metavar="N", help="First step of a film.")
+@click.option("--to", "last", type=click.IntRange(min=0), metavar="N", help="Last step of a film.")
+@click.option("--every", type=click.IntRange(min=1), metavar="N", help="Only each N-th step of a film.  [default: 1]")
+@click.option("--fps", type=click.FloatRange(0.1, 50.0), metavar="X", help="Steps a second of a film.  [default: 10]")
+@click.option("--force", is_flag=True, help="Replace an existing file.")
+def command(
+    *,
+    logs: tuple[Path, ...],
+    output: Path,
+    step: str | None,
+    steps: str | None,
+    first: int | None,
+    last: int | None,
+    every: int | None,
+    fps: float | None,
+    force: bool,
+) -> None:
+    """Draw LOG, a recording, or two of one city side by side: a picture, a strip of pictures or a film.
+
+    \b
+    fireworld render run.mcap -o still.png --step 120
+    fireworld render run.mcap -o strip.png --steps 0,60,120,last
+    fireworld render run.mcap -o film.gif --every 2 --fps 15
+    fireworld render alone.mcap together.mcap -o film.mp4 --from 10 --to 90
+
+    The ending of the file says what it becomes. A run that ended before the other keeps its last state. A recording
+    that was cut off or damaged is drawn as far as it is good. docs/pictures.md says what is to be seen.
+
+    Exit code: 0 drawn, 2 could not draw, 130 interrupted (no half file is left).
+    """  # noqa: D301 - click wants the character
+    if len(logs) > 2:
+        raise click.UsageError(f"Expected one or two recordings, got {len(logs)}.")
+    from viewer.film import FILMS
+    from viewer.output import STILLS, check_output
+
+    check_output(output, endings=[*STILLS, *FILMS], force=force)
+    if output.suffix.lower() in FILMS:
+        if step is not None or steps is not None:
+            raise click.UsageError(f"--step and --steps go with pictures, not with films ({output.suffix}).")
+        _render_film(logs, output, first=first, last=last, every=every or 1, fps=fps)
+        return
+    if not (first is last is every is fps is None):
+        raise click.UsageError(f"--from, --to, --every and --fps go with films, not with pictures ({output.suffix}).")
+    if step is not None and steps is not None:
+        raise click.UsageError("--step and --steps exclude each other.")
+    chosen = _step_numbers("--steps", steps) if steps is not None else _step_numbers("--step", step or _LAST)
+    if steps is None and len(chosen) > 1:
+        raise click.UsageError(f"--step: expected one step, got {step!r}; several go with --steps.")
+    _render_still(logs, output, chosen, force=force)
+
+
+def _step_numbers(option: str, text: str) -> list[int]:
+    """Turn "0,60,last" into steps."""
+    from viewer.moments import LAST
+
+    words = [word.strip() for word in text.split(",")]
+    if len(words) > _STEPS_MAX:
+        raise click.UsageError(f"{option}: expected at most {_STEPS_MAX} steps, got {len(words)}; a film shows more.")
+    if not all(word == _LAST or (word.isascii() and word.isdigit()) for word in words):
+        raise click.UsageError(f"{option}: expected steps like 0,60,last, got {text!r}.")
+    return [LAST if word == _LAST else int(word) for word in words]
+
+
+def _render_still(paths: Sequence[Path], output: Path, steps: Sequence[int], *, force: bool) -> None:
+    from viewer.maps import draw_steps
+    from viewer.output import plain_style, save_figure
+
+    recordings = [open_committed(path, doing="drawing") for path in paths]
+    with plain_style():
+        save_figure(draw_steps(recordings, steps), output, force=force)
+    click.echo(f"{output}: {len(steps)} step{'s' if len(steps) > 1 else ''}, {_size(output)}")
+
+
+def _render_film(
+    paths: Sequence[Path], output: Path, *, first: int | None, last: int | None, every: int, fps: float | None
+) -> None:
+    from viewer.film import FPS, save_film
+    from viewer.moments import moments_between
+    from viewer.output import plain_style
+
+    recordings: list[Recording] = [open_committed(path, doing="drawing") for path in paths]
+    moments = moments_between(recordings, first=first, last=last, every=every)
+    with plain_style(), _progress(len(moments)) as advance:
+        save_film(recordings, moments, output, fps=fps or FPS, on_frame=advance)
+    span = f"steps {moments[0].step} to {moments[-1].step}"
+    click.echo(f"{output}: {len(moments)} frames, {span}, {_size(output)}")
+
+
+def _size(path: Path) -> str:
+    n_bytes = path.stat().st_size
+    return f"{n_bytes / 1e6:.1f} MB" if n_bytes >= 1_000_000 else f"{n_bytes / 1e3:.0f} kB"
+
+
+@contextmanager
+def _progress(n_frames: int) -> Iterator[Callable[[], object]]:
+    """Show a bar where people watch; yield what is to be called after each frame."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task("film", total=n_frames)
+        yield lambda: progress.advance(task)

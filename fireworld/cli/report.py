@@ -1,0 +1,67 @@
+"""`fireworld report`: a recording, or two, as one HTML page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from fireworld.cli.opening import open_committed
+
+if TYPE_CHECKING:
+    from recorder.reader import Log
+
+_MAPS: Final = 4
+"""Maps in the strip."""
+
+
+@click.command()
+@click.argument("logs", metavar="LOG [LOG_B]", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("-o", "--output", metavar="FILE.html", required=True, type=click.Path(path_type=Path), help="The page.")
+@click.option("--force", is_flag=True, help="Replace an existing file.")
+def command(*, logs: tuple[Path, ...], output: Path, force: bool) -> None:
+    """Write LOG, a recording, or two of one city, as an HTML page that needs no other file.
+
+    \b
+    fireworld report run.mcap -o report.html
+    fireworld report alone.mcap together.mcap -o report.html
+
+    The page has the outcome, maps, curves, what each brigade chose and did, the events of note and how to get the same
+    run again. The same recording gives the same page, to the byte. A recording that was cut off or damaged is told of
+    as far as it is good.
+
+    Exit code: 0 written, 2 could not write, 130 interrupted (nothing is left of it).
+    """  # noqa: D301 - click wants the character
+    if len(logs) > 2:
+        raise click.UsageError(f"Expected one or two recordings, got {len(logs)}.")
+    from fireworld.cli.report_folder import write_file
+    from fireworld.cli.run_page import run_page
+    from viewer.output import check_output
+
+    check_output(output, endings=(".html", ".htm"), force=force)
+    recordings = [open_committed(path, doing="telling of") for path in logs]
+    images = _draw_all(recordings)
+    write_file(output, run_page(recordings, images).encode())
+    click.echo(f"wrote {output}; open it in a browser")
+
+
+def _draw_all(recordings: Sequence[Log]) -> Mapping[str, bytes]:
+    """Draw the pictures of the page, PNG files by name.
+
+    Raises:
+        ViewError: matplotlib is not installed, a recording has no steps, or the cities differ.
+    """
+    from viewer.curves import draw_curves
+    from viewer.maps import draw_steps
+    from viewer.moments import evenly
+    from viewer.output import plain_style, png_bytes
+    from viewer.timeline import draw_timeline
+
+    with plain_style():
+        return {
+            "maps": png_bytes(draw_steps(recordings, evenly(recordings, _MAPS))),
+            "curves": png_bytes(draw_curves(recordings)),
+            "timeline": png_bytes(draw_timeline(recordings)),
+        }

@@ -1,0 +1,57 @@
+"""The air is shown at the steps of snapshots, where it is, in the color of its heat."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fireworld.records import CityRecord, MemoryRecording, Snapshot
+from tests.viewer import rrd
+from tests.viewer.conftest import make_recording
+from viewer import air, app, colors
+
+
+def city_with_air(city: CityRecord) -> CityRecord:
+    return replace(city, air_origin_x_m=10.0, air_origin_y_m=20.0, air_nx=2, air_ny=3)
+
+
+def snapshot(cells: list[list[float]]) -> Snapshot:
+    """A snapshot whose air has a border of one cell, and a padding of three beyond it."""
+    array = np.full((4, 8), 999.0)
+    array[1:3, 1:4] = cells
+    return Snapshot({"fire.air": array})
+
+
+def test_hotter_air_is_paler_and_cold_air_is_clear():
+    pixels = air.air_pixels(np.array([[0.0, 0.9], [air.HOTTEST, 2 * air.HOTTEST], [air.HOTTEST / 4, 5.0]]))
+    assert pixels.shape == (2, 3, 4)  # y, x
+    north, south = pixels
+    assert south[0, 3] == north[0, 3] == 0
+    assert tuple(south[1, :3]) == tuple(north[1, :3]) == colors.AIR_RGB[-1]
+    assert tuple(south[2, :3]) == colors.AIR_RGB[1]  # a quarter of the heat is half of the scale
+    assert 0 < north[2, 3] < south[2, 3] < south[1, 3] < 255
+
+
+def test_the_air_of_a_snapshot_lies_over_the_city_and_bears_its_step(tmp_path: Path):
+    made = make_recording(3, 3, 4)
+    taken = {0: snapshot([[0, 0, 0], [0, 0, 0]]), 3: snapshot([[0, 0, 600], [0, 150, 0]])}
+    steps = [replace(record, snapshot=taken.get(record.step)) for record in made]
+    app.save([MemoryRecording(made.header, city_with_air(made.city), steps)], tmp_path / "air.rrd")
+    found = rrd.read(tmp_path / "air.rrd")
+    heat = found["/air/heat"]
+    assert heat["GridMap:translation"][0][1].as_py()[0][:2] == [10.0, 20.0]
+    assert heat["GridMap:cell_size"][0][1].as_py() == [5.0]
+    assert [step for step, _ in heat["GridMap:data"]] == [0, 3]
+    raw = np.array(heat["GridMap:data"][1][1].as_py()[0], dtype=np.uint8).reshape(3, 2, 4)  # y from the north, x
+    assert tuple(raw[0, 0, :3]) == colors.AIR_RGB[-1]
+    assert tuple(raw[1, 1, :3]) == colors.AIR_RGB[1]
+    assert np.count_nonzero(raw[..., 3]) == 2
+    said = [(step, text.as_py()) for step, text in found["/air/when"]["Points3D:labels"]]
+    assert said == [(0, ["air after step 0: at most 0 degrees"]), (3, ["air after step 3: at most 600 degrees"])]
+
+
+def test_a_recording_without_snapshots_has_no_air(small, tmp_path: Path):
+    app.save([small], tmp_path / "run.rrd")
+    assert not [path for path in rrd.read(tmp_path / "run.rrd") if path.startswith("/air")]

@@ -1,0 +1,70 @@
+"""Recordings of real runs, through the command: what the file shows is what the log holds, at every step."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from recorder.reader import Log, open_log
+from tests import command_line
+from tests.viewer import rrd
+from viewer import colors
+from viewer.air import air_cells, air_pixels
+from viewer.city_mesh import SHADES_PERCENT, build_mesh
+from viewer.plots import COUNTS, REWARDS, SCORES
+
+GOLDEN = Path(__file__).parents[2] / "recordings" / "golden"
+
+
+def saved(monkeypatch: pytest.MonkeyPatch, folder: Path, *names: str) -> tuple[list[Log], dict[str, rrd.Rows]]:
+    """Save golden recordings as a Rerun file; return them and what is in it."""
+    paths = [GOLDEN / f"{name}.mcap" for name in names]
+    done = command_line.call(monkeypatch, "view", *paths, "--save", folder / "view.rrd")
+    assert (done.code, done.err) == (0, "")
+    return [open_log(path) for path in paths], rrd.read(folder / "view.rrd")
+
+
+def assert_shown(log: Log, found: dict[str, rrd.Rows], prefix: str = "") -> None:
+    """Colors of all buildings, their numbers and all curves are the log's."""
+    steps = log.steps.tolist()
+    mesh, fieryness = build_mesh(log.city), log.column("/buildings", "fieryness")
+    table = colors.shaded_table((*colors.FIERYNESS_RGB, colors.REFUGE_RGB), SHADES_PERCENT)
+    wanted = fieryness.copy()
+    wanted[:, log.city.refuge_building] = 9
+    shown = rrd.at_every_step(found[f"{prefix}/city/buildings"]["Mesh3D:vertex_colors"], steps)
+    assert np.array_equal(np.array(shown), table[wanted[:, mesh.vertex_building], mesh.vertex_shade])
+    for name in ("temperature", "fuel_share", "water_litres", "fieryness"):
+        shown = rrd.at_every_step(found[f"{prefix}/city/handles"][f"Building:{name}"], steps)
+        assert np.array_equal(np.array(shown), log.column("/buildings", name))
+    for path, topic, names in (
+        ("score", "/score", SCORES),
+        ("buildings", "/score", COUNTS),
+        ("reward", "/rewards", REWARDS),
+        ("tanks", "/brigades", None),
+    ):
+        shown = rrd.at_every_step(found[f"{prefix}/plots/{path}"]["Scalars:scalars"], steps)
+        columns = [log.column(topic, name) for name in names] if names else log.column(topic, "tank_litres").T
+        assert np.array_equal(np.array(shown), np.column_stack(list(columns)))
+
+
+@pytest.mark.parametrize("name", ["quick", "quick-lost"])
+def test_one_run(name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    (log,), found = saved(monkeypatch, tmp_path, name)
+    assert_shown(log, found)
+    held = [(record.step, record.snapshot.arrays["fire.air"]) for record in log if record.snapshot is not None]
+    assert [step for step, _ in found["/air/heat"]["GridMap:data"]] == [step for step, _ in held] == log.snapshots
+    for (_, array), (_, shown) in zip(held, found["/air/heat"]["GridMap:data"], strict=True):
+        cells = air_cells(log.city, array)
+        assert cells.shape == (log.city.air_nx, log.city.air_ny)
+        assert cells.sum() == array.sum()  # nothing warm lies in the border
+        assert bytes(shown.as_py()[0]) == air_pixels(cells).tobytes()
+    assert any(array.any() for _, array in held)
+
+
+def test_two_runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    (first, second), found = saved(monkeypatch, tmp_path, "quick", "quick-lost")
+    assert_shown(first, found, "/a")
+    assert_shown(second, found, "/b")
+    assert found["/diff/log/first_difference"]["TextLog:text"]
