@@ -33,9 +33,7 @@ OF_BUILDING: Final = (
     Weight("fuel_left", "share of its fuel that is left"),
     Weight("civilian_distance", "way to the nearest civilian not yet reached by fire, in 100 m, 3 at most"),
     Weight("exposure", "share of its radiation that falls on buildings that never burned, times 3"),
-    Weight(
-        "kindling", "radiation on buildings that never burned, each counted by how near ignition it is, times 5"
-    ),
+    Weight("kindling", "radiation on buildings that never burned, each counted by how near ignition it is, times 5"),
     Weight("steps_needed", "root of the steps that one brigade would have to spray it"),
 )
 OF_BRIGADE: Final = (
