@@ -52,13 +52,13 @@ ACTIVITY_RGB: Final[tuple[Rgb, ...]] = (
 """By index into records.ACTIVITIES."""
 
 ACTION_RGB: Final[tuple[Rgb, ...]] = (
-    (96, 170, 120),  # easiest
-    (230, 150, 190),  # nearest-to-civilian
-    (210, 180, 90),  # nearest-to-center
-    (120, 160, 220),  # nearest-to-me
-    (180, 130, 220),  # own-target
+    (86, 180, 233),  # easiest
+    (213, 94, 0),  # nearest-to-civilian
+    (240, 192, 64),  # nearest-to-center
+    (0, 158, 115),  # nearest-to-me
+    (176, 90, 148),  # own-target
 )
-"""By index into records.ACTION_NAMES."""
+"""By index into records.ACTION_NAMES: every eye tells them apart."""
 NO_CHOICE_RGB: Final[Rgb] = (70, 74, 80)
 
 MARK_RGB: Final[Rgb] = (255, 196, 0)

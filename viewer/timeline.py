@@ -17,14 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-ACTION_RGB: Final[tuple[colors.Rgb, ...]] = (
-    (86, 180, 233),  # easiest
-    (213, 94, 0),  # nearest-to-civilian
-    (240, 192, 64),  # nearest-to-center
-    (0, 158, 115),  # nearest-to-me
-    (176, 90, 148),  # own-target
-)
-"""By index into records.ACTION_NAMES, for a white ground: every eye tells them apart."""
 _WIDTH_INCHES: Final = 12.0
 _LANE_INCHES: Final = 0.42
 _BESIDE_LANES_INCHES: Final = 0.75
@@ -68,7 +60,7 @@ def _tables(recording: Recording) -> tuple[Array, Array]:
 
 def _draw_panel(axes: Axes, recording: Recording, span: tuple[int, int]) -> None:
     n, steps = _n_brigades(recording), np.asarray(recording.steps)
-    palettes = ACTION_RGB, colors.ACTIVITY_RGB
+    palettes = colors.ACTION_RGB, colors.ACTIVITY_RGB
     for table, palette, (top, height) in zip(_tables(recording), palettes, _BANDS, strict=True):
         for brigade in range(n):
             for start, end, code in _stretches(steps, table[:, brigade]):
@@ -95,7 +87,7 @@ def _draw_legend(figure: Figure, recordings: Sequence[Recording], total: float) 
     """Name the actions and the activities that occur."""
     from matplotlib.patches import Patch
 
-    kinds = (("chose:", ACTION_NAMES, ACTION_RGB), ("did:", ACTIVITIES, colors.ACTIVITY_RGB))
+    kinds = (("chose:", ACTION_NAMES, colors.ACTION_RGB), ("did:", ACTIVITIES, colors.ACTIVITY_RGB))
     for row, (heading, names, palette) in enumerate(kinds):
         occurring = {int(code) for one in recordings for code in np.unique(_tables(one)[row]) if code >= 0}
         handles = [

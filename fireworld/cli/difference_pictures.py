@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
@@ -13,6 +12,7 @@ from recorder.spread import differing_entities
 from viewer import colors
 from viewer.comparison import difference as compare_damage
 from viewer.maps import draw_map
+from viewer.output import png_bytes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,7 +54,7 @@ def draw_all(
     for moment, row in zip(("first", "last"), _ends(difference.spread.rows), strict=False):
         images |= {f"{moment}-{name}": image for name, image in _draw_maps(logs, row.step, rules).items()}
     if rows:
-        images["curves"] = _png(_draw_curves(rows, difference))
+        images["curves"] = png_bytes(_draw_curves(rows, difference))
     return images
 
 
@@ -66,8 +66,8 @@ def _ends(rows: Sequence[SpreadRow]) -> Sequence[SpreadRow]:
 def _draw_maps(logs: tuple[Log, Log], step: int, rules: Rules) -> dict[str, bytes]:
     """Draw one step of both runs, and what of it differs."""
     city, (a, b) = logs[0].city, (log.step(step) for log in logs)
-    maps = {name: _png(_draw_run(city, record, name.upper())) for name, record in (("a", a), ("b", b))}
-    return maps | {"difference": _png(_draw_difference(city, a, b, differing_entities(a, b, rules, city)))}
+    maps = {name: png_bytes(_draw_run(city, record, name.upper())) for name, record in (("a", a), ("b", b))}
+    return maps | {"difference": png_bytes(_draw_difference(city, a, b, differing_entities(a, b, rules, city)))}
 
 
 def _draw_run(city: CityRecord, record: StepRecord, name: str) -> Figure:
@@ -173,9 +173,3 @@ def _unit(rgb: colors.Rgb) -> tuple[float, float, float]:
     """Return a color as matplotlib wants it, 0..1."""
     red, green, blue = rgb
     return red / 255, green / 255, blue / 255
-
-
-def _png(figure: Figure) -> bytes:
-    data = io.BytesIO()
-    figure.savefig(data, format="png", metadata={"Software": "fireworld"})
-    return data.getvalue()

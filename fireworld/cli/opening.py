@@ -21,5 +21,5 @@ def open_committed(path: Path, *, doing: str) -> Log:
 
     log = open_log(path, partial=True)
     if log.damage is not None:
-        click.echo(f"{path}: {log.damage}; {doing} {len(log)} committed steps", err=True)
+        click.echo(f"{path}: {log.damage}; {doing} {len(log.steps)} committed steps", err=True)
     return log

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,9 +20,7 @@ from fireworld.scenario import load_scenario
 from fireworld.world.stage import Ground, build_stage
 from recorder.writer import LogWriter
 from viewer.maps import draw_map
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from viewer.output import png_bytes
 
 
 @dataclass(frozen=True)
@@ -89,8 +85,8 @@ def draw_all(study: Study, recorded: list[Recorded]) -> Iterator[tuple[str, byte
     Raises:
         ViewError: matplotlib is not installed.
     """
-    yield "returns", _png(draw_returns(study))
-    yield "policy-changes", _png(draw_policy_changes(study))
+    yield "returns", png_bytes(draw_returns(study))
+    yield "policy-changes", png_bytes(draw_policy_changes(study))
     tests = {row.scenario for row in (*paper.TABLE_2, *paper.TABLE_3)}
     for run in recorded:
         if run.scenario not in tests:
@@ -108,10 +104,4 @@ def _map(run: Recorded, record: StepRecord, moment: str) -> bytes:
         civilian_hp=record.civilians.hp,
         title=f"{run.scenario}: {moment}, score {record.score.score:.2f} of {record.score.score_max:.0f}",
     )
-    return _png(figure)
-
-
-def _png(figure: Figure) -> bytes:
-    data = io.BytesIO()
-    figure.savefig(data, format="png", metadata={"Software": "fireworld"})
-    return data.getvalue()
+    return png_bytes(figure)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from fireworld.cli.opening import open_committed
+
 if TYPE_CHECKING:
     from fireworld.records import Recording
     from viewer.outcome import Outcome
@@ -75,7 +77,9 @@ def command(
     from viewer import app
     from viewer.selection import select_steps
 
-    recordings = [select_steps(_open(path), first=first, last=last, every=every) for path in logs]
+    recordings = [
+        select_steps(open_committed(path, doing="showing"), first=first, last=last, every=every) for path in logs
+    ]
     outcome = _outcome(logs, recordings)
     if output is not None:
         app.save(recordings, output, focus=focus, outcome=outcome, force=force)
@@ -84,16 +88,6 @@ def command(
         app.serve(recordings, focus=focus, outcome=outcome, port=port or app.WEB_PORT, announce=_announce)
     else:
         app.show(recordings, focus=focus, outcome=outcome)
-
-
-def _open(path: Path) -> Recording:
-    """Open a log as far as it is good; say so where that is not to its end."""
-    from recorder.reader import open_log
-
-    log = open_log(path, partial=True)
-    if log.damage is not None:
-        click.echo(f"{path}: {log.damage}; showing {len(log.steps)} committed steps", err=True)
-    return log
 
 
 def _outcome(logs: Sequence[Path], recordings: Sequence[Recording]) -> Outcome:
