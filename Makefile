@@ -67,6 +67,7 @@ pictures: install  ## Draw the pictures of the docs again, from runs made again.
 	$(BIN)/fireworld render $(PICTURE)default.mcap -o docs/pictures/film.gif --force
 	$(BIN)/fireworld render $(PICTURE)alone.mcap $(PICTURE)together.mcap -o docs/pictures/pair.png --step 60 --force
 	$(BIN)/fireworld render $(PICTURE)alone.mcap $(PICTURE)together.mcap -o docs/pictures/before-after.png --steps 0,last --force
+	$(BIN)/python -m tests.viewer.headless
 
 fuzz: install  ## Try odd and altered files on all readers for FUZZ_SECONDS (60).
 	$(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS)

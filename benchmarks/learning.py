@@ -35,9 +35,7 @@ SEEDS_OF_SLOW: Final = {"planner": 3, "paper-noncooperative": 5, "paper-cooperat
 BEST: Final = "own-cooperative"
 PAIRS: Final = (
     *((BEST, rule) for rule in ("easiest", "nearest-to-civilian", "nearest-to-center", "nearest-to-me")),
-    *((BEST, rule) for rule in ("each-another", "random", "chief", "best-joint", "own-alone")),
-    ("own-cooperative-small", "own-alone-small"),
-    ("own-cooperative-small", "named-cooperative"),
+    *((BEST, rule) for rule in ("each-another", "random", "chief", "best-joint", "own-alone", "named-cooperative")),
     ("named-cooperative", "best-joint"),
     ("named-cooperative", "nearest-to-civilian"),
     ("named-cooperative", "named-alone"),

@@ -106,35 +106,20 @@ def contestants(size: Size, fires: Fires, folder: Path, grounds: dict[str, Groun
         Contestant("distilled-4320", "the planner's values averaged in 4320 states", 1, workshop.distilled(4320)),
         Contestant("linear-270", LINEAR_WORDS.format(270), few, workshop.linear(cooperation=False)),
         Contestant("linear-4320", LINEAR_WORDS.format(4320), few, workshop.linear(cooperation=True)),
-        *(
-            Contestant(
-                f"named-{sight}",
-                f"small search, the paper's actions, {SIGHT[sight]}",
-                some,
-                workshop.small("named", sight),
-            )
-            for sight in SIGHT
+        Contestant(
+            "named-alone",
+            "search, the paper's actions, nobody sees the others",
+            some,
+            workshop.ranking("named", "alone"),
         ),
-        *(
-            Contestant(
-                f"own-{sight}-small", f"small search, own targets, {SIGHT[sight]}", n, workshop.small("own", sight)
-            )
-            for sight in SIGHT
-        ),
-        *(
-            Contestant(
-                f"own-{sight}",
-                f"search, own targets, {SIGHT[sight]}{MADE_BEST[sight]}",
-                n,
-                workshop.ranking("own", sight),
-            )
-            for sight in SIGHT
+        Contestant("named-cooperative", "search, the paper's actions", some, workshop.ranking("named", "cooperative")),
+        Contestant("own-alone", "search, own targets, nobody sees the others", n, workshop.ranking("own", "alone")),
+        Contestant(
+            "own-cooperative", "search, own targets: how `best` was made", n, workshop.ranking("own", "cooperative")
         ),
     ]
 
 
-SIGHT: Final = {"alone": "nobody sees the others", "cooperative": "all see what the others go for"}
-MADE_BEST: Final = {"alone": "", "cooperative": ": how `best` was made"}
 SARSA_WORDS: Final = (
     "SARSA in {} states on the contested fires: reward change, one table, alpha .1, gamma .95, 4 steps a choice"
 )
@@ -162,29 +147,13 @@ class Workshop:
         )
         return replace(whole, stages=stages)
 
-    def small(self, targets: str, sight: str) -> Callable[[int, str], KernelPolicy]:
-        """Search with half as many fights."""
-        return self._searched(f"{targets}-{sight}-small", targets, sight, self._small_search())
-
-    def _small_search(self) -> Search:
-        whole = self.size.search
-        return replace(
-            whole,
-            n_candidates=3 * whole.n_candidates // 4,
-            n_best=3 * whole.n_best // 4,
-            n_fires=2 * whole.n_fires // 3,
-        )
-
     def ranking(self, targets: str, sight: str) -> Callable[[int, str], KernelPolicy]:
         """Search as `fireworld train --method search` does."""
-        return self._searched(f"{targets}-{sight}", targets, sight, self.size.search)
-
-    def _searched(self, name: str, targets: str, sight: str, search: Search) -> Callable[[int, str], KernelPolicy]:
-        search = replace(search, own_targets=targets == "own", cooperation=sight == "cooperative")
+        search = replace(self.size.search, own_targets=targets == "own", cooperation=sight == "cooperative")
 
         def make(number: int, group: str) -> KernelPolicy:
             del group
-            path = self.folder / f"{name}-{number}.npz"
+            path = self.folder / f"{targets}-{sight}-{number}.npz"
             run = SearchRun(Searcher(self.curriculum(), search, seed=number, grounds=self.grounds), path)
             run.resume()
             run.run(Event(), n_threads=N_THREADS, report=lambda _, __: None)
@@ -229,10 +198,7 @@ class Workshop:
             del group
             path = self.folder / f"linear-{cooperation}-{number}.npy"
             searcher = TableSearcher(
-                self.curriculum(),
-                replace(self._small_search(), cooperation=cooperation),
-                seed=number,
-                grounds=self.grounds,
+                self.curriculum(), replace(self.size.search, cooperation=cooperation), seed=number, grounds=self.grounds
             )
             if not path.exists():
                 for _ in searcher.run(n_threads=N_THREADS, stop=Event()):

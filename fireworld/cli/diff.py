@@ -121,14 +121,14 @@ def command(
         _tell_same(logs)
         context.exit(0)
     difference = _compare(order, logs)
+    if junit is not None:  # before anything is shown: a reader of the output may leave early
+        _write_junit(junit, order, difference)
+    if html is not None:
+        _write_page(html, order, logs, difference)
     if as_json:
         _write_recordings_json(difference, logs)
     else:
         show(difference, names=order.names)
-    if junit is not None:
-        _write_junit(junit, order, difference)
-    if html is not None:
-        _write_page(html, order, logs, difference)
     context.exit(0 if difference.same else 1)
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,78 +9,28 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests import command_line
 from tests.viewer.conftest import make_recording
+from tests.viewer.headless import has_driver, headless, loaded, opened, picture
 from viewer import app, colors
 from viewer.outcome import Outcome
 
-DRIVERS = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d", "/usr/local/share/vulkan/icd.d")
-
 pytestmark = pytest.mark.skipif(
-    not any(Path(folder).is_dir() and any(Path(folder).iterdir()) for folder in DRIVERS),
+    not has_driver(),
     reason="no Vulkan driver here; on Debian: apt-get install mesa-vulkan-drivers libvulkan1",
 )
 
 
 @pytest.fixture
 def viewer(tmp_path: Path) -> Iterator[Any]:
-    """A viewer without a window, on this machine only, that ends with the test."""
-    from rerun.experimental import ViewerClient
-
-    port = app.free_port()
-    command = [str(app.viewer_executable()), "--headless", "--bind", app.LOCALHOST, "--port", str(port)]
-    environment = {**app.viewer_environment(os.environ), "HOME": str(tmp_path), "RUST_LOG": "off"}
-    with subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-        try:
-            yield connect(lambda: ViewerClient.connect(f"rerun+http://{app.LOCALHOST}:{port}/proxy"), process)
-        finally:
-            process.terminate()
-            process.wait(timeout=20)
-
-
-def connect(client: Any, process: subprocess.Popen[bytes]) -> Any:
-    for _ in range(300):
-        assert process.poll() is None, "the viewer ended"
-        try:
-            connected = client()
-            connected.get_state()
-        except Exception:  # noqa: BLE001 - whatever it is, the viewer is not ready
-            time.sleep(0.1)
-        else:
-            return connected
-    raise AssertionError("the viewer did not start")
-
-
-def picture(viewer: Any, step: int) -> np.ndarray:
-    """Take pictures at a step until two are equal; return (height, width, 3)."""
-    import io
-
-    from matplotlib.image import imread
-
-    viewer.set_time("step", sequence=step)
-    last = b""
-    for _ in range(100):
-        taken = viewer.take_screenshot()
-        if taken == last:
-            return (imread(io.BytesIO(taken))[..., :3] * 255).round().astype(np.uint8)
-        last = taken
-        time.sleep(0.1)
-    raise AssertionError("the picture did not come to rest")
+    """A viewer without a window that ends with the test."""
+    with headless(tmp_path) as (client, _):
+        yield client
 
 
 def n_near(image: np.ndarray, rgb: colors.Rgb, *, tolerance: int = 10) -> int:
     """How many pixels have about a color."""
     return int(np.all(np.abs(image.astype(int) - rgb) <= tolerance, axis=-1).sum())
-
-
-def opened(viewer: Any, path: Path) -> Any:
-    """Open a file and return what the viewer says of it once it is loaded."""
-    viewer.open(str(path))
-    for _ in range(100):
-        state = viewer.get_state()
-        if state.recordings and state.recordings[0].timelines and not state.loading:
-            return state
-        time.sleep(0.1)
-    raise AssertionError("the file was not loaded")
 
 
 def part(image: np.ndarray, *, rows: tuple[float, float], columns: tuple[float, float]) -> np.ndarray:
@@ -134,3 +81,16 @@ def test_two_runs_are_seen_side_by_side_with_their_difference(viewer: Any, tmp_p
     lane = part(image, rows=(0.42, 0.58), columns=(0.0, 1.0))
     reddish = (lane[..., 0] > 120) & (lane[..., 1] < 80) & (lane[..., 2] < 80)
     assert reddish.sum() > 1_000  # the buildings differ most of the time
+
+
+def test_a_run_is_seen_while_it_happens(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    with headless(tmp_path) as (viewer, address):
+        done = command_line.call(monkeypatch, "run", "quick", "--policy", "chief", "--view-url", address)
+        assert (done.code, done.err) == (0, "")
+        assert [line.name for line in loaded(viewer).recordings[0].timelines] == ["step"]
+        image = picture(viewer, 62)  # it follows what happens: the run is over, and the fire out
+    seen = part(image, rows=(0.05, 0.7), columns=(0.0, 0.65))
+    unburnt, heating, inferno, minor_damage = (colors.FIERYNESS_RGB[code] for code in (0, 1, 3, 5))
+    assert n_near(seen, unburnt) > 20_000
+    assert n_near(seen, minor_damage) > 1_000
+    assert n_near(seen, heating) == n_near(seen, inferno) == 0
