@@ -42,7 +42,7 @@ class Size:
 
     n_trainings: int = 20
     """Of the methods that claims are made about."""
-    n_rivals: int = 6
+    n_rivals: int = 20
     """Of those that they are compared with, where one training is like another."""
     n_trials: int = 3
     """Of the others."""

@@ -40,14 +40,18 @@ def test_what_is_said_of_the_others():
     best_rule = max(mean[rule]["contested"] for rule in (*ACTIONS, "each-another", "random", "chief"))
     for failed in ("paper-cooperative", "paper-noncooperative", "sarsa-fires-4320", "distilled-4320"):
         assert mean[failed]["contested"] < best_rule
-    for group in ("contested", "larger"):
+    for group in GROUPS:
         assert DIFFERENCES["named-cooperative", "best-joint"][group]["low"] > 0
 
 
 def test_what_is_said_of_cooperation():
-    own, named = (DIFFERENCES[f"{kind}-cooperative", f"{kind}-alone"] for kind in ("own", "named"))
-    assert own["tests"]["low"] > 0
-    for group in ("contested", "larger"):
-        for difference in (own, named):
-            assert difference[group]["mean"] > 0
-            assert difference[group]["low"] < 0.001, "not shown"
+    low, mean = (
+        {(kind, group): DIFFERENCES[f"{kind}-cooperative", f"{kind}-alone"][group][key] for kind, group in PLACES}
+        for key in ("low", "mean")
+    )
+    assert all(value > 0 for value in mean.values())
+    assert {place for place in PLACES if low[place] > 0} == {("own", "tests"), ("named", "tests"), ("named", "larger")}
+    assert max(mean, key=lambda place: mean[place]) == ("named", "tests")
+
+
+PLACES = [(kind, group) for kind in ("own", "named") for group in GROUPS]
