@@ -255,7 +255,7 @@ def _write(found: Comparison, *, junit: Path | None, plot: Path | None, force: b
     """
     if junit is not None:
         from fireworld.cli.comparison_text import junit as to_junit
-        from fireworld.cli.report_folder import write_file
+        from fireworld.files import write_file
 
         write_file(junit, to_junit(found))
     if plot is not None:

@@ -12,11 +12,11 @@ from functools import partial
 from threading import Event
 from typing import Final
 
-from fireworld.cli.report_folder import write_file
 from fireworld.cli.workers import Workers
 from fireworld.errors import PolicyError
 from fireworld.evaluation.archive import Archive, Result, RunKey, policy_identity, simulator_version
 from fireworld.evaluation.runs import Outcomes, Row, outcomes, run_compiled, run_step_by_step
+from fireworld.files import write_file
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.names import NamedPolicy, load_policy
 from fireworld.scenario import Scenario

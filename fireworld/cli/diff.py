@@ -264,7 +264,7 @@ def _steps(order: Order, logs: tuple[Log, Log]) -> Steps:
 
 def _write_junit(path: Path, order: Order, difference: Difference) -> None:
     from fireworld.cli.difference_junit import junit_xml
-    from fireworld.cli.report_folder import write_file
+    from fireworld.files import write_file
     from recorder.match import Rules
 
     write_file(path, junit_xml(difference, Rules(order.tolerances, order.ignore), paths=order.paths))
@@ -274,7 +274,7 @@ def _write_junit(path: Path, order: Order, difference: Difference) -> None:
 def _write_page(path: Path, order: Order, logs: tuple[Log, Log], difference: Difference) -> None:
     from fireworld.cli.difference_page import difference_page
     from fireworld.cli.difference_pictures import draw_all
-    from fireworld.cli.report_folder import write_file
+    from fireworld.files import write_file
     from recorder.match import Rules
 
     rules = Rules(order.tolerances, order.ignore)

@@ -60,8 +60,7 @@ def check(
     """
     from fireworld.cli.golden_junit import junit_xml
     from fireworld.cli.goldens import find_goldens, make_golden_folder, store_recording
-    from fireworld.cli.report_folder import write_file
-    from fireworld.policy.npz import check_free
+    from fireworld.files import check_free, write_file
 
     if keep is not None and keep.resolve() == folder.resolve():
         raise click.UsageError("--keep: expected another folder than that of the goldens.")
@@ -99,7 +98,7 @@ def update(context: click.Context, *, names: tuple[str, ...], reason: str, folde
     Exit code: 0 done, or there was nothing to do; 2 one cannot be run.
     """
     from fireworld.cli.goldens import find_goldens, store_golden, store_text
-    from fireworld.cli.report_folder import write_file
+    from fireworld.files import write_file
 
     reason = " ".join(reason.split())
     if not reason:

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 
 from fireworld.cli.golden_text import golden_text, tells_of
-from fireworld.cli.report_folder import write_file
 from fireworld.errors import FireworldError, OutputError, expected
+from fireworld.files import write_file
 from fireworld.records import MemoryRecording, RunHeader
 
 if TYPE_CHECKING:

@@ -12,11 +12,12 @@ import numpy as np
 from msgspec import Struct
 
 from fireworld.cli.repetitions import Repetition
-from fireworld.cli.report_folder import SETTINGS, write_file
+from fireworld.cli.report_folder import SETTINGS
 from fireworld.cli.trials import Tested
 from fireworld.errors import TrainingError, expected
 from fireworld.evaluation.runs import QUANTITIES, Outcomes, outcomes
 from fireworld.evaluation.study import TOGETHER, Lesson
+from fireworld.files import write_file
 from fireworld.policy.team import Team, load_team, save_team
 from fireworld.training.checkpoint import check_same
 

@@ -36,8 +36,8 @@ def command(*, logs: tuple[Path, ...], output: Path, force: bool) -> None:
     """  # noqa: D301 - click wants the character
     if len(logs) > 2:
         raise click.UsageError(f"Expected one or two recordings, got {len(logs)}.")
-    from fireworld.cli.report_folder import write_file
     from fireworld.cli.run_page import run_page
+    from fireworld.files import write_file
     from viewer.output import check_output
 
     check_output(output, endings=(".html", ".htm"), force=force)

@@ -58,18 +58,3 @@ def _products(folder: Path) -> list[Path]:
     scattered += [path for team in TEAMS for path in folder.glob(f"teams/{team}-*.npz*")]
     scattered += [path for team in TEAMS for path in folder.glob(f"recordings/*-{team}.mcap*")]
     return [*scattered, *folder.glob("figures/*.png"), *(folder / name for name in (*SHEETS, "report.html"))]
-
-
-def write_file(path: Path, data: bytes) -> None:
-    """Write a file, beside and renamed.
-
-    Raises:
-        OutputError: it cannot be written.
-    """
-    partial = path.with_name(path.name + ".partial")
-    try:
-        partial.write_bytes(data)
-        partial.replace(path)
-    except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from None

@@ -14,7 +14,8 @@ import click
 from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.interrupt import gentle_interrupt
-from fireworld.cli.report_folder import find_folder, make_folder, write_file
+from fireworld.cli.report_folder import find_folder, make_folder
+from fireworld.files import write_file
 
 if TYPE_CHECKING:
     from rich.progress import Progress

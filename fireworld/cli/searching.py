@@ -34,7 +34,7 @@ def train_by_search(
     Raises:
         FireworldError: as in training.
     """
-    from fireworld.errors import TrainingError, expected
+    from fireworld.training.checkpoint import begin_all
     from fireworld.training.search import Search, Searcher
     from fireworld.training.searches import SearchRun
     from fireworld.training.teams import numbered
@@ -50,14 +50,7 @@ def train_by_search(
         )
         for number in range(1, repetitions + 1)
     ]
-    if resume:
-        found = [run.resume() for run in runs]
-        if not any(found):
-            got = f"no {runs[0].checkpoint}"
-            raise TrainingError(expected("--resume", "", "a checkpoint to go on from", got, "leave out --resume"))
-    else:
-        for run in runs:
-            run.begin()
+    begin_all(runs, resume=resume)
     n_threads = jobs or os.cpu_count() or 1
     with gentle_interrupt() as interrupted, _progress(runs) as report:
         for run in runs:

@@ -114,6 +114,7 @@ def command(
     screen = find_screen(view=view, url=view_url)
     announce_compilation()
     from fireworld.scenario import split_settings
+    from fireworld.training.checkpoint import begin_all
     from fireworld.training.curriculum import load_curriculum
     from fireworld.training.method import SEARCH, find_method
     from fireworld.training.teams import Training, numbered, train_all
@@ -150,7 +151,7 @@ def command(
         )
         for number in range(1, repetitions + 1)
     ]
-    _begin(trainings, resume=resume)
+    begin_all(trainings, resume=resume)
     n_jobs = min(jobs or os.cpu_count() or 1, repetitions)
     with gentle_interrupt() as interrupted, _progress(trainings) as report, watched_training(screen) as show:
 
@@ -162,20 +163,6 @@ def command(
     for training in trainings:
         _show(training)
     context.exit(0 if all(training.team is not None for training in trainings) else INTERRUPTED)
-
-
-def _begin(trainings: list[Training], *, resume: bool) -> None:
-    """See that nothing is in the way, or find what there is to go on from."""
-    from fireworld.errors import TrainingError, expected
-
-    if not resume:
-        for training in trainings:
-            training.begin()
-        return
-    found = [training.resume() for training in trainings]  # all of them, each to be looked at
-    if not any(found):
-        got = f"no {trainings[0].checkpoint}"
-        raise TrainingError(expected("--resume", "", "a checkpoint to go on from", got, "leave out --resume"))
 
 
 def _show(training: Training) -> None:

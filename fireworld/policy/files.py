@@ -6,8 +6,8 @@ from pathlib import Path
 
 from fireworld.policy import ranking
 from fireworld.policy.npz import parse_arrays, read_bytes
-from fireworld.policy.ranking import Ranking, parse_ranking
-from fireworld.policy.team import Team, parse_team
+from fireworld.policy.ranking import Ranking, ranking_of
+from fireworld.policy.team import Team, team_of
 
 
 def parse_team_file(content: bytes, *, source: str) -> Team | Ranking:
@@ -20,10 +20,10 @@ def parse_team_file(content: bytes, *, source: str) -> Team | Ranking:
     Raises:
         TrainingError: it is not a team file, of another format, or makes no sense.
     """
-    header, _ = parse_arrays(content, source=source)
+    header, arrays = parse_arrays(content, source=source)
     if str(header.get("format")).startswith(ranking.FORMAT.partition("/")[0]):
-        return parse_ranking(content, source=source)[0]
-    return parse_team(content, source=source)[0]
+        return ranking_of(header, arrays, source=source)[0]
+    return team_of(header, arrays, source=source)[0]
 
 
 def load_team_file(path: Path) -> Team | Ranking:

@@ -11,28 +11,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from fireworld.errors import OutputError, TrainingError, expected
+from fireworld.errors import TrainingError, expected
+from fireworld.files import check_free, written_beside
 from fireworld.records import Array
 
 SUFFIX: Final = ".npz"
 FIXED_TIME: Final = (1980, 1, 1, 0, 0, 0)
 SIZE_MAX_BYTES: Final = 300_000_000
 """Above the tables of a thousand brigades, which are the most that a scenario can have."""
-
-
-def check_free(path: Path, *, force: bool = False) -> None:
-    """Refuse an output that could not be written, before the work is done that makes it.
-
-    Raises:
-        OutputError: the file exists, or there is no folder for it.
-    """
-    if path.exists() and not force:
-        raise OutputError(
-            expected(str(path), "", "a name that is free", "an existing file", "use --force to replace it")
-        )
-    if path.is_dir() or not path.parent.is_dir():
-        got = "a folder" if path.is_dir() else "no such folder"
-        raise OutputError(expected(str(path), "", "a file in an existing folder", got))
 
 
 def write_arrays(path: Path, header: Mapping[str, Any], arrays: Mapping[str, Array], *, force: bool = False) -> None:
@@ -49,16 +35,10 @@ def write_arrays(path: Path, header: Mapping[str, Any], arrays: Mapping[str, Arr
     """
     check_free(path, force=force)
     text = np.frombuffer(json.dumps(header, sort_keys=True).encode(), dtype=np.uint8)
-    partial = path.with_name(path.name + ".partial")
-    try:
-        with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as archive:
-            for name, array in {"header": text, **arrays}.items():
-                with archive.open(_entry(name), "w", force_zip64=True) as file:
-                    np.lib.format.write_array(file, array, allow_pickle=False)
-        partial.replace(path)
-    except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from None
+    with written_beside(path) as partial, zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, array in {"header": text, **arrays}.items():
+            with archive.open(_entry(name), "w", force_zip64=True) as file:
+                np.lib.format.write_array(file, array, allow_pickle=False)
 
 
 def read_bytes(path: Path) -> bytes:

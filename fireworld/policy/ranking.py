@@ -116,7 +116,11 @@ def parse_ranking(content: bytes, *, source: str) -> tuple[Ranking, dict[str, Ar
     Raises:
         TrainingError: not such a file, of another format or other weights, or with weights that make no sense.
     """
-    header, arrays = parse_arrays(content, source=source)
+    return ranking_of(*parse_arrays(content, source=source), source=source)
+
+
+def ranking_of(header: dict[str, Any], arrays: dict[str, Array], *, source: str) -> tuple[Ranking, dict[str, Array]]:
+    """Make a ranking of the header and the arrays of its file, which this takes apart; as `parse_ranking`."""
     form = header.pop("format", None)
     if form != FORMAT:
         hint = "made by a later fireworld?" if isinstance(form, str) and form.startswith("fireworld-ranking/") else ""

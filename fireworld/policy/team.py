@@ -98,7 +98,11 @@ def parse_team(content: bytes, *, source: str) -> tuple[Team, dict[str, Array]]:
     Raises:
         TrainingError: as for `load_team`.
     """
-    header, arrays = parse_arrays(content, source=source)
+    return team_of(*parse_arrays(content, source=source), source=source)
+
+
+def team_of(header: dict[str, Any], arrays: dict[str, Array], *, source: str) -> tuple[Team, dict[str, Array]]:
+    """Make a team of the header and the arrays of its file, which this takes apart; as `parse_team`."""
     _check_header(source, header)
     check_arrays(arrays, "tables", "visits", source=source)
     tables, visits = arrays.pop("tables"), arrays.pop("visits")

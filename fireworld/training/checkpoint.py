@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import numpy as np
 
-from fireworld.errors import TrainingError, expected
+from fireworld.errors import OutputError, TrainingError, expected
 from fireworld.kernels.arrays import Array
 from fireworld.policy.team import Team, read_team, save_team
 from fireworld.training.trainer import Progress, Trainer
@@ -20,6 +20,51 @@ HINT: Final = "name what it was begun with, or begin again with --force"
 def checkpoint_path(path: Path) -> Path:
     """Name the checkpoint of the team file that a training is to make."""
     return path.with_name(path.name + SUFFIX)
+
+
+def check_no_checkpoint(path: Path, *, force: bool) -> None:
+    """Refuse to begin a training anew where an unfinished one is kept.
+
+    Raises:
+        OutputError: one is, and shall not be replaced.
+    """
+    if path.exists() and not force:
+        hint = "go on from it with --resume, or begin again with --force"
+        raise OutputError(expected(str(path), "", "no checkpoint", "one of an earlier training", hint))
+
+
+class Resumable(Protocol):
+    """A training with files: what a command begins, or goes on with."""
+
+    @property
+    def checkpoint(self) -> Path:
+        """Where it is kept while unfinished."""
+        ...
+
+    def begin(self) -> None:
+        """See that nothing is in the way."""
+        ...
+
+    def resume(self) -> bool:
+        """Go on where an earlier call stopped; tell whether there was something to go on from."""
+        ...
+
+
+def begin_all(trainings: Sequence[Resumable], *, resume: bool) -> None:
+    """See that nothing is in the way, or find what there is to go on from.
+
+    Raises:
+        TrainingError: there is nothing to go on from, or a file of another training.
+        OutputError: a file is in the way.
+    """
+    if not resume:
+        for training in trainings:
+            training.begin()
+        return
+    found = [training.resume() for training in trainings]  # all of them, each to be looked at
+    if not any(found):
+        got = f"no {trainings[0].checkpoint}"
+        raise TrainingError(expected("--resume", "", "a checkpoint to go on from", got, "leave out --resume"))
 
 
 def save_checkpoint(trainer: Trainer, path: Path, *, log: bytes = b"") -> None:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from fireworld.errors import TrainingError, expected
 from fireworld.policy.team import COMMIT_MAX
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 Rule = Literal["sarsa", "expected-sarsa", "q-learning"]
 RULES: Final[tuple[Rule, ...]] = ("sarsa", "expected-sarsa", "q-learning")
@@ -82,11 +85,7 @@ class Method:
         Raises:
             TrainingError: no such figure, or not a value it can have.
         """
-        for key in settings:
-            if key not in method_keys():
-                raise TrainingError(expected("--set", key, "one of " + ", ".join(method_keys()), key))
-        figures: dict[str, Any] = {key: _read(key, text) for key, text in settings.items()}
-        return replace(self, **figures)
+        return replace(self, **read_figures(settings, self))
 
 
 PAPER: Final = Method()
@@ -112,9 +111,25 @@ def find_method(name: str) -> Method:
     return METHODS[name]
 
 
-def _read(key: str, text: str) -> object:
+def read_figures(settings: Mapping[str, str], figures: DataclassInstance) -> dict[str, Any]:
+    """Read figures that a user sets, each of the kind that it is of by now.
+
+    Args:
+        settings: figures as text by name.
+        figures: what they belong to.
+
+    Raises:
+        TrainingError: no such figure, or not a value it can have.
+    """
+    names = [item.name for item in fields(figures)]
+    for key in settings:
+        if key not in names:
+            raise TrainingError(expected("--set", key, "one of " + ", ".join(names), key))
+    return {key: _read(key, text, getattr(figures, key)) for key, text in settings.items()}
+
+
+def _read(key: str, text: str, default: object) -> object:
     """Read a figure of the kind that its default is of."""
-    default = getattr(PAPER, key)
     if isinstance(default, str):
         return text
     if isinstance(default, bool):
@@ -122,7 +137,7 @@ def _read(key: str, text: str) -> object:
             raise TrainingError(expected("--set", key, "true or false", text))
         return text == "true"
     try:
-        return type(default)(text)
+        return type(default)(text)  # type: ignore[call-arg]  # a number of one kind or the other
     except ValueError:
         wanted = "a whole number" if isinstance(default, int) else "a number"
         raise TrainingError(expected("--set", key, wanted, text)) from None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from threading import Event
 from typing import Any, Final
 
@@ -20,6 +20,7 @@ from fireworld.kernels.ranking import N_OF_TEAM, N_TARGET_FEATURES, N_WEIGHTS
 from fireworld.policy.kernel import KernelPolicy, from_rankings
 from fireworld.policy.ranking import Ranking
 from fireworld.training.curriculum import Curriculum
+from fireworld.training.method import read_figures
 from fireworld.world.stage import Ground, Stage, build_stage
 
 SEED_BITS: Final = 32
@@ -213,28 +214,3 @@ def _moved(state: State, best: Array, search: Search, free: Array) -> State:
         mean[k] = (1.0 - step) * mean[k] + step * center
         spread[k] = max((1.0 - step) * spread[k] + step * deviation, search.spread_least)
     return State(state.generation + 1, mean, spread)
-
-
-def read_figures(settings: Mapping[str, str], defaults: Search) -> dict[str, Any]:
-    """Read figures that a user sets, each of the kind of its default.
-
-    Raises:
-        TrainingError: no such figure, or not a value it can have.
-    """
-    names = [item.name for item in fields(Search)]
-    figures: dict[str, Any] = {}
-    for key, text in settings.items():
-        if key not in names:
-            raise TrainingError(expected("--set", key, "one of " + ", ".join(names), key))
-        default = getattr(defaults, key)
-        if isinstance(default, bool):
-            if text not in {"true", "false"}:
-                raise TrainingError(expected("--set", key, "true or false", text))
-            figures[key] = text == "true"
-            continue
-        try:
-            figures[key] = type(default)(text)
-        except ValueError:
-            wanted = "a whole number" if isinstance(default, int) else "a number"
-            raise TrainingError(expected("--set", key, wanted, text)) from None
-    return figures

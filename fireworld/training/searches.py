@@ -11,10 +11,11 @@ from typing import Final
 import numpy as np
 
 from fireworld.errors import OutputError, TrainingError, expected
+from fireworld.files import check_free
 from fireworld.kernels.ranking import N_WEIGHTS
-from fireworld.policy.npz import check_arrays, check_finite, check_free, read_bytes
+from fireworld.policy.npz import check_arrays, check_finite, read_bytes
 from fireworld.policy.ranking import Ranking, parse_ranking, save_ranking
-from fireworld.training.checkpoint import check_same, checkpoint_path
+from fireworld.training.checkpoint import check_no_checkpoint, check_same, checkpoint_path
 from fireworld.training.search import Generation, Searcher, State
 
 IDENTITY: Final = ("method", "seed", "curriculum")
@@ -43,9 +44,7 @@ class SearchRun:
             OutputError: something is.
         """
         check_free(self.path, force=self.force)
-        if self.checkpoint.exists() and not self.force:
-            hint = "go on from it with --resume, or begin again with --force"
-            raise OutputError(expected(str(self.checkpoint), "", "no checkpoint", "one of an earlier training", hint))
+        check_no_checkpoint(self.checkpoint, force=self.force)
 
     def resume(self) -> bool:
         """Go on where an earlier call stopped; tell whether there was something to go on from.

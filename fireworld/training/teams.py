@@ -12,9 +12,15 @@ from threading import Event
 from typing import Final
 
 from fireworld.errors import OutputError, TrainingError, expected
-from fireworld.policy.npz import check_free
+from fireworld.files import check_free, write_file
 from fireworld.policy.team import Team, read_team, save_team
-from fireworld.training.checkpoint import check_identity, checkpoint_path, restore_checkpoint, save_checkpoint
+from fireworld.training.checkpoint import (
+    check_identity,
+    check_no_checkpoint,
+    checkpoint_path,
+    restore_checkpoint,
+    save_checkpoint,
+)
 from fireworld.training.trainer import EpisodeReport, Trainer
 
 LOOK_UP_SECONDS: Final = 0.2
@@ -49,9 +55,7 @@ class Training:
         for path in (self.path, self.log_path):
             if path is not None:
                 check_free(path, force=self.force)
-        if self.checkpoint.exists() and not self.force:
-            hint = "go on from it with --resume, or begin again with --force"
-            raise OutputError(expected(str(self.checkpoint), "", "no checkpoint", "one of an earlier training", hint))
+        check_no_checkpoint(self.checkpoint, force=self.force)
 
     def resume(self) -> bool:
         """Go on where an earlier call stopped; tell whether there was something to go on from.
@@ -110,7 +114,7 @@ class Training:
         team = self.trainer.team()
         try:
             if self.log_path is not None:
-                _write_text(self.log_path, log_heading() + self.log)
+                write_file(self.log_path, (log_heading() + self.log).encode())
             try:
                 save_team(team, self.path, force=self.force)
             except OutputError:
@@ -168,14 +172,3 @@ def _csv_line(values: Sequence[object]) -> str:
     line = io.StringIO()
     csv.writer(line, lineterminator="\n").writerow(values)
     return line.getvalue()
-
-
-def _write_text(path: Path, text: str) -> None:
-    """Write a file, beside and renamed."""
-    partial = path.with_name(path.name + ".partial")
-    try:
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(path)
-    except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from None
