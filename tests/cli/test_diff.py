@@ -312,9 +312,9 @@ class Page(HTMLParser):
 def test_the_page_holds_everything_itself(diff, tmp_path, monkeypatch):
     imported = builtins.__import__
 
-    def without_viewer(name, *rest):
+    def without_viewer(name, *rest, **named):
         assert name.partition(".")[0] not in {"rerun", "numba"}
-        return imported(name, *rest)
+        return imported(name, *rest, **named)
 
     monkeypatch.setattr(builtins, "__import__", without_viewer)
     done = diff("golden.mcap", "new.mcap", "--html", "out.html", "--junit", "out.xml", "--json")
