@@ -1,10 +1,11 @@
-"""Rows of the viewer: turning logs into Rerun files, one run and two, and sending a run step by step."""
+"""Rows of the viewer: turning logs into Rerun files, one run and two; sending a run step by step; moving the cursor."""
 
 from __future__ import annotations
 
 import importlib.util
 import tempfile
 from collections.abc import Iterator
+from itertools import cycle
 from pathlib import Path
 from typing import Final
 
@@ -13,10 +14,13 @@ from benchmarks.runs import new_world, write_log
 from benchmarks.timing import Contender, Row, compare
 from fireworld.records import MemoryRecording
 from recorder.reader import open_log
+from tests.viewer.headless import has_driver, headless, opened, screenshot
 from viewer.app import save
 from viewer.selection import select_steps
 
 N_STEPS: Final = 300
+VISITED: Final = (1, 5, 3, 4, 2)
+"""Where the cursor goes, in sixths of the run."""
 
 
 def rows(*, quick: bool) -> Iterator[Row]:
@@ -30,6 +34,8 @@ def rows(*, quick: bool) -> Iterator[Row]:
             write_log(log_path, new_world(size, 50 if quick else N_STEPS))
             yield _to_file("log to Rerun file", log_path, size, n_runs=1, seconds=seconds)
             if size == sizes[0]:
+                if has_driver():
+                    yield _cursor(log_path, size, seconds=seconds)
                 yield _to_file("two logs to one Rerun file", log_path, size, n_runs=2, seconds=seconds)
                 yield _by_steps(log_path, size, seconds=seconds)
 
@@ -69,6 +75,29 @@ def _by_steps(log_path: Path, size: int, *, seconds: float) -> Row:
     ours = Contender("Feed.take for each step", lambda _: send(parts))
     baseline = Contender("for all steps at once", lambda _: send([whole]))
     return compare("view", "a run sent step by step", _label(log_path, size), ours, baseline, seconds=seconds)
+
+
+def _cursor(log_path: Path, size: int, *, seconds: float) -> Row:
+    """Move the cursor and wait until the picture is that of the step; drawn without a window, by software."""
+    view_path = log_path.with_suffix(".rrd")
+    recording = select_steps(open_log(log_path))
+    save([recording], view_path, force=True)
+    last = int(recording.steps[-1])
+    steps = [last * place // 6 for place in VISITED]
+    with tempfile.TemporaryDirectory() as home, headless(Path(home)) as (viewer, _):
+        opened(viewer, view_path)
+        for _ in range(2):  # what a panel shows may depend on where the cursor came from: the second round counts
+            at_rest = {step: screenshot(viewer, step) for step in steps}
+        turns = cycle(steps)
+
+        def move(step: int) -> None:
+            viewer.set_time("step", sequence=step)
+            while viewer.take_screenshot() != at_rest[step]:
+                pass
+
+        ours = Contender("cursor moved, step drawn", move, lambda: next(turns))
+        baseline = Contender("a picture without moving", lambda _: viewer.take_screenshot())
+        return compare("view", "moving the cursor", _label(log_path, size), ours, baseline, seconds=seconds)
 
 
 def _label(log_path: Path, size: int) -> str:

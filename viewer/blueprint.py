@@ -107,8 +107,8 @@ def single(recording: Recording, *, focus: bool, outcome: Outcome | None = None)
         row_shares=[2.6, 1],
     )
     rows = [plot_view("Buildings", ["/plots/buildings"]), *plot_tabs("", [""], recording, focus=focus), legend_view()]
-    right = rrb.Vertical(*rows, row_shares=[1.0] * (len(rows) - 1) + [1.45])
-    return blueprint(rrb.Horizontal(left, right, column_shares=[2.1, 1]))
+    right = rrb.Vertical(*rows, row_shares=[1.0] * (len(rows) - 1) + [1.9])
+    return blueprint(rrb.Horizontal(left, right, column_shares=[1.8, 1]))
 
 
 def pair(first: Recording, second: Recording, *, focus: bool, outcome: Outcome | None = None) -> Any:
@@ -148,10 +148,10 @@ def pair(first: Recording, second: Recording, *, focus: bool, outcome: Outcome |
     curves += outcome_page
     details.append(rrb.Tabs(legend_view(comparing=True), help_page, active_tab=0))
     rows = [row_of_maps, rrb.Horizontal(*curves), rrb.Horizontal(*details)]
-    shares = [2.0, 1.1, 1.1]
+    shares = [1.8, 1.05, 1.3]
     if outcome is not None:
         rows.insert(1, rrb.StateTimelineView(name="Are A and B the same?", origin="/diff/agreement"))
-        shares.insert(1, 0.45)
+        shares.insert(1, 0.5)
     begin = None if outcome is None else outcome.first_step
     last = max(int(one.steps[-1]) for one in both)
     return blueprint(rrb.Vertical(*rows, row_shares=shares), marked=None if begin is None else (begin, last))

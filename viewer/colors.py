@@ -68,15 +68,19 @@ AIR_RGB: Final[tuple[Rgb, ...]] = ((96, 20, 150), (232, 64, 160), (255, 236, 246
 
 BRIGADE_RGB: Final[tuple[Rgb, ...]] = (
     (79, 147, 255),
-    (255, 160, 60),
-    (88, 196, 120),
+    (230, 126, 20),
+    (38, 166, 91),
     (224, 100, 190),
-    (190, 170, 255),
-    (240, 220, 90),
-    (100, 210, 220),
-    (230, 110, 100),
+    (150, 124, 246),
+    (180, 150, 10),
+    (10, 162, 178),
+    (226, 92, 82),
 )
-"""Line colors of the brigades in plots; repeated when there are more."""
+"""Colors of the brigades in plots and logs, to be read on black and on white; repeated when there are more."""
+
+TOTAL_RGB: Final[Rgb] = (140, 110, 200)
+GREY_RGB: Final[Rgb] = (128, 124, 120)
+"""What is burnt out, and what comes second, in plots and logs."""
 
 HEALTHY_RGB: Final[Rgb] = (96, 240, 120)
 HURT_RGB: Final[Rgb] = (250, 250, 250)
@@ -104,9 +108,9 @@ def packed_table(colors: Sequence[Rgb]) -> UInt32Array:
     return np.array([packed(rgb) for rgb in colors], dtype=np.uint32)
 
 
-def lighter(rgb: Rgb) -> Rgb:
-    """Mix a color half and half with white: the same thing in the second of two runs."""
-    red, green, blue = ((part + 255) // 2 for part in rgb)
+def paler(rgb: Rgb) -> Rgb:
+    """Mix a color half and half with grey: the same thing in the second of two runs, still to be read on any ground."""
+    red, green, blue = ((part + grey) // 2 for part, grey in zip(rgb, GREY_RGB, strict=True))
     return red, green, blue
 
 

@@ -13,16 +13,16 @@ if TYPE_CHECKING:
 LEGEND_PATH: Final = "/legend"
 HELP_PATH: Final = "/help"
 
-_COLUMN_WIDTH: Final = {False: 2.9, True: 4.1}
-"""By whether two runs are compared: then there is a row more in the same place, and less room for the names."""
+_COLUMN_WIDTH: Final = 3.9
+"""In rows: a name is so wide, and a row as high as a dot with its name."""
 
 HELP: Final = """\
 # How to read this
 
 **Buildings** stand as they are, 3 m a storey. Grey ones are untouched; yellow, orange and dark red ones burn; blue ones
-were watered or put out; black ones are burnt out; green ones are refuges, where tanks are refilled. Point at the dot on
-a roof, or click it and open the panel on the right (the button at the top right), to read the building's temperature,
-fuel, water and fieryness at this step.
+were watered or put out; black ones are burnt out; green ones are refuges, where tanks are refilled. Click the dot on a
+roof and open the panel on the right (the button at the top right) to read the building's temperature, fuel, water and
+fieryness at this step.
 
 **Brigades** are balls, colored by what they do. The blue bar above a brigade is the water in its tank; the label is
 its name and the litres. A blue arc is water on its way to the target; a thin white one leads to the target that a
@@ -50,16 +50,16 @@ def entries(*, comparing: bool) -> list[list[tuple[str, colors.Rgb]]]:
     names = [f"brigade {activity}".replace("driving-to", "to") for activity in ACTIVITIES]
     brigades = list(zip(names, colors.ACTIVITY_RGB, strict=True))
     rows = [
-        [*buildings[:4], buildings[8]],
-        [*buildings[4:8], ("refuge", colors.REFUGE_RGB)],
-        [*brigades[:3], ("water", colors.WATER_RGB), ("fire can spread", colors.FREE_SIDE_RGB)],
-        [*brigades[3:], ("hydrant", colors.HYDRANT_RGB)],
+        buildings[:4],
+        buildings[4:8],
+        [buildings[8], ("refuge", colors.REFUGE_RGB), ("hydrant", colors.HYDRANT_RGB), ("hot air", colors.AIR_RGB[1])],
+        [*brigades[:3], ("water", colors.WATER_RGB)],
+        [*brigades[3:], ("fire can spread", colors.FREE_SIDE_RGB)],
         [
             ("civilian, well", colors.HEALTHY_RGB),
             ("civilian, hurt", colors.HURT_RGB),
             ("civilian, dying", colors.DYING_RGB),
             ("civilian, dead", colors.DEAD_RGB),
-            ("hot air", colors.AIR_RGB[1]),
         ],
     ]
     if comparing:
@@ -70,8 +70,8 @@ def entries(*, comparing: bool) -> list[list[tuple[str, colors.Rgb]]]:
 def bounds(*, comparing: bool) -> tuple[tuple[float, float], tuple[float, float]]:
     """What of the legend's plane is to be seen: its range in x and in y."""
     rows = entries(comparing=comparing)
-    width = _COLUMN_WIDTH[comparing]
-    return (-width / 2, width * (max(map(len, rows)) - 0.5)), (-0.4, len(rows) - 0.1)
+    n_columns = max(map(len, rows))
+    return (-_COLUMN_WIDTH / 2, _COLUMN_WIDTH * (n_columns - 0.5)), (-0.4, len(rows) - 0.1)
 
 
 def log_legend(stream: rerun.RecordingStream, *, comparing: bool) -> None:
@@ -79,7 +79,7 @@ def log_legend(stream: rerun.RecordingStream, *, comparing: bool) -> None:
     import rerun
 
     rows = entries(comparing=comparing)
-    place = [(_COLUMN_WIDTH[comparing] * x, float(y)) for y, row in enumerate(rows) for x in range(len(row))]
+    place = [(_COLUMN_WIDTH * x, float(y)) for y, row in enumerate(rows) for x in range(len(row))]
     named = [entry for row in rows for entry in row]
     dots = rerun.Points2D(
         place, colors=colors.packed_table([rgb for _, rgb in named]), radii=rerun.Radius.ui_points(6.0)

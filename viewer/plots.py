@@ -21,12 +21,12 @@ N_FOCUS: Final = 4
 _TERMS: Final = ("water-damaged", "burning", "burnt out", "civilians")
 
 _FIERYNESS = colors.FIERYNESS_RGB
-_COUNT_RGB: Final = (_FIERYNESS[2], _FIERYNESS[5], (120, 116, 112))
-_REWARD_RGB: Final = (_FIERYNESS[5], _FIERYNESS[2], (120, 116, 112), colors.HEALTHY_RGB, (240, 240, 240))
+_COUNT_RGB: Final = (_FIERYNESS[2], _FIERYNESS[5], colors.GREY_RGB)
+_REWARD_RGB: Final = (_FIERYNESS[5], _FIERYNESS[2], colors.GREY_RGB, colors.REFUGE_RGB, colors.TOTAL_RGB)
 _SCORE_RGB: Final = {
-    "": ((250, 250, 250), (150, 150, 150)),
-    "A": (colors.BRIGADE_RGB[0], (48, 88, 150)),
-    "B": (colors.BRIGADE_RGB[1], (150, 96, 40)),
+    "": (colors.BRIGADE_RGB[0], colors.GREY_RGB),
+    "A": (colors.BRIGADE_RGB[0], colors.paler(colors.BRIGADE_RGB[0])),
+    "B": (colors.BRIGADE_RGB[1], colors.paler(colors.BRIGADE_RGB[1])),
 }
 """By the name of the run."""
 
@@ -71,7 +71,7 @@ def log_choice_values(stage: Stage, recording: Recording) -> None:
         name = f"brigade {brigade}"
         log_curve(stage, f"plots/values/brigade_{brigade}", chosen.chosen[:, brigade], name, rgb, width=2.5)
         path, name = f"plots/values_best/brigade_{brigade}", f"{name}, best action"
-        log_curve(stage, path, best[:, brigade], name, colors.lighter(rgb), width=1.0)
+        log_curve(stage, path, best[:, brigade], name, colors.paler(rgb), width=1.0)
 
 
 def has_choice_values(recording: Recording) -> bool:
@@ -121,8 +121,8 @@ def log_curve(
 
 
 def _of_run(stage: Stage, rgb: Sequence[colors.Rgb]) -> list[colors.Rgb]:
-    """Make the colors of the second of two runs lighter."""
-    return [colors.lighter(one) if stage.name == "B" else one for one in rgb]
+    """Make the colors of the second of two runs paler."""
+    return [colors.paler(one) if stage.name == "B" else one for one in rgb]
 
 
 def _cycle(n: int) -> list[colors.Rgb]:

@@ -29,12 +29,12 @@ SEEN: Final = (
 _EVENT_LINES: Final = {
     "ignited": ("WARN", "building {} ignited", colors.FIERYNESS_RGB[2]),
     "extinguished": ("INFO", "building {} is out", colors.FIERYNESS_RGB[5]),
-    "burnt-out": ("ERROR", "building {} burnt out", (150, 150, 150)),
+    "burnt-out": ("ERROR", "building {} burnt out", colors.GREY_RGB),
     "civilian-hurt": ("WARN", "civilian {} is hurt", colors.DYING_RGB),
     "civilian-died": ("CRITICAL", "civilian {} died", colors.DYING_RGB),
-    "tank-empty": ("WARN", "brigade {}: tank empty", colors.ACTIVITY_RGB[3]),
+    "tank-empty": ("WARN", "brigade {}: tank empty", colors.HYDRANT_RGB),
     "refilled": ("INFO", "brigade {}: tank full", colors.ACTIVITY_RGB[4]),
-    "site-out": ("INFO", "fire {} is out", colors.HEALTHY_RGB),
+    "site-out": ("INFO", "fire {} is out", colors.REFUGE_RGB),
     "brigade-hurt": ("WARN", "brigade {} is hurt", colors.DYING_RGB),
     "brigade-died": ("CRITICAL", "brigade {} died", colors.DYING_RGB),
 }

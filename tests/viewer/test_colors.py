@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fireworld.records import ACTIVITIES, FIERYNESS
-from viewer import colors
+from viewer import colors, plots, telling
 
 
 def test_every_code_and_activity_has_a_color_of_its_own():
@@ -39,3 +39,25 @@ def test_health_follows_each_persons_own_start():
     shown = colors.health_rgb(np.array([500, 500]), np.array([500, 1000]))
     assert tuple(shown[0]) == colors.HEALTHY_RGB
     assert tuple(shown[1]) == pytest.approx(colors.HURT_RGB, abs=2)
+
+
+def luminance(rgb: colors.Rgb) -> float:
+    """Relative luminance of an sRGB color, 0 to 1 (WCAG 2)."""
+    parts = np.array(rgb) / 255
+    linear = np.where(parts <= 0.03928, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+    return float(linear @ (0.2126, 0.7152, 0.0722))
+
+
+def contrast(one: colors.Rgb, other: colors.Rgb) -> float:
+    """Contrast of two colors, 1 to 21 (WCAG 2)."""
+    dark, light = sorted((luminance(one), luminance(other)))
+    return (light + 0.05) / (dark + 0.05)
+
+
+def test_curves_and_logs_are_to_be_read_on_black_and_on_white():
+    said = [rgb for *_, rgb in telling._EVENT_LINES.values()]
+    single_run = [*colors.BRIGADE_RGB, *plots._COUNT_RGB, *plots._REWARD_RGB]
+    scores = [rgb for pair in plots._SCORE_RGB.values() for rgb in pair]
+    for rgb in (*said, *single_run, *map(colors.paler, single_run), *scores):
+        assert contrast(rgb, (255, 255, 255)) > 2.2, rgb
+        assert contrast(rgb, (13, 16, 17)) > 2.2, rgb  # Rerun's dark background
