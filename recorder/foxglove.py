@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from fireworld.records import STEP_SECONDS
 from recorder.codec import varint
-from recorder.foxglove_schema import ENUMERATIONS, MESSAGES, descriptor_set, length_delimited, schema_name
+from recorder.foxglove_schema import ENUMERATIONS, MESSAGES, Item, descriptor_set, length_delimited, schema_name
 from recorder.writer import Channel
 
 FRAME: Final = "city"
 """The one frame of reference: metres east, north and up, as the city has them."""
 Rgb = tuple[int, int, int]
+_LAYOUTS: Final = {"double": ("<d", 1), "fixed32": ("<I", 5)}
+"""Layout and wire type of the numbers of fixed length."""
 _NUMERIC: Final = {"u1": "UINT8", "i4": "INT32", "u4": "UINT32", "f4": "FLOAT32", "f8": "FLOAT64"}
 
 
@@ -129,9 +131,12 @@ def _packed_field(name: str, kind: str, offset: int) -> bytes:
     return _part("PackedElementField", "name", name) + _value("PackedElementField", "offset", offset) + type_
 
 
+def _item(message: str, field: str) -> Item:
+    return next(item for item in MESSAGES[message] if item.name == field)
+
+
 def _tag(message: str, field: str, wire_type: int) -> int:
-    number = next(item.number for item in MESSAGES[message] if item.name == field)
-    return number << 3 | wire_type
+    return _item(message, field).number << 3 | wire_type
 
 
 def _part(message: str, field: str, data: bytes | str) -> bytes:
@@ -139,8 +144,8 @@ def _part(message: str, field: str, data: bytes | str) -> bytes:
 
 
 def _value(message: str, field: str, value: float) -> bytes:
-    """Encode a double, or a fixed32 if it is a whole number by type."""
-    layout, wire_type = ("<I", 5) if isinstance(value, int) else ("<d", 1)
+    """Encode a double or a fixed32, whichever the field is."""
+    layout, wire_type = _LAYOUTS[_item(message, field).type]
     return varint(_tag(message, field, wire_type)) + struct.pack(layout, value)
 
 

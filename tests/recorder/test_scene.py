@@ -107,6 +107,9 @@ def messages_of(log, topic):
             stamped = list(one.entities) if topic in {CITY, FIRE, TEAM} else [one]
             assert {item.timestamp.seconds for item in stamped} == {60 * step}
             assert all(item.frame_id == "city" for item in stamped if topic != LOG)
+            declared = type(one).FromString(one.SerializeToString())
+            declared.DiscardUnknownFields()
+            assert declared.ByteSize() == one.ByteSize()  # all that is written is in the schema, by number and type
     return steps
 
 
@@ -223,6 +226,7 @@ def test_the_team_stands_where_it_stands(log):
             assert (position.x, position.y) == (record.brigades.x_m[brigade], record.brigades.y_m[brigade])
             assert rgb_of(ball.color) == colors.ACTIVITY_RGB[record.brigades.activity[brigade]]
             assert f"{record.brigades.tank_litres[brigade]} l" in entity.texts[brigade].text
+            assert (entity.texts[brigade].font_size, entity.texts[brigade].billboard) == (6.0, True)
         assert len(civilians) == len(log.city.civilian_hp)
         n_jets = int(np.count_nonzero(record.brigades.sprayed_litres))
         assert sum(len(one.points) for one in entity.lines) == 2 * n_jets
