@@ -69,8 +69,11 @@ pictures: install  ## Draw the pictures of the docs again, from runs made again.
 	$(BIN)/fireworld render $(PICTURE)alone.mcap $(PICTURE)together.mcap -o docs/pictures/before-after.png --steps 0,last --force
 	$(BIN)/python -m tests.viewer.headless
 
-fuzz: install  ## Try odd and altered files on all readers for FUZZ_SECONDS (60).
+fuzz: install  ## Try odd and altered files on all readers for FUZZ_SECONDS (60), and as long with atheris where it installs.
 	$(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS)
+	if PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --editable '.[fuzz]'; \
+	then $(BIN)/python -m tests.fuzz.with_atheris --seconds $(FUZZ_SECONDS); \
+	else echo "atheris does not install here: done without it"; fi
 
 bench: install  ## Measure speed; prints ratios taken within the run.
 	$(BIN)/python -m benchmarks.bench
