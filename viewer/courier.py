@@ -72,6 +72,7 @@ class ViewerPipe:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        self._process.stdin.close()  # once more where all was written; else nobody writes to a dead process for long
         return finished and self._process.returncode == 0
 
 

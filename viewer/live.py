@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import socket
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from threading import Lock
 from typing import Any, Final
@@ -13,24 +13,14 @@ from urllib.parse import urlsplit
 
 from fireworld.errors import ViewError, expected
 from fireworld.records import CityRecord, MemoryRecording, RunHeader, StepRecord
-from viewer import app, colors
+from viewer import app
 from viewer.courier import Courier, ViewerPipe
+from viewer.learning import CurveDrawing, Point, Sheet
 
-TRAINING_ID: Final = "fireworld-training"
-EPISODE: Final = "episode"
-CURVES: Final = {
-    "return": "Return",
-    "score": "Score, as a share of the best",
-    "epsilon": "Epsilon",
-    "n_changed": "States in which the greedy action changed",
-    "n_burnt_out": "Burnt out",
-    "n_steps": "Steps",
-}
-"""What is drawn of each episode, and the titles."""
 _WAITING_BYTES_MAX: Final = 64_000_000
 _BYTES_PER_BUILDING: Final = 40
 _WAITING_MAX: Final = 2_000
-_EPISODES_WAITING_MAX: Final = 100_000
+_POINTS_WAITING_MAX: Final = 100_000
 _ENCODE_SECONDS: Final = 60.0
 
 
@@ -148,44 +138,33 @@ class RunDrawing:
         return _drained(self._bytes)
 
 
-@dataclass(frozen=True)
-class EpisodePoint:
-    """An episode of training, as it is drawn."""
-
-    team: str
-    number: int
-    """Counted per team from 0, through all scenarios."""
-    values: Mapping[str, float]
-    """By the names in CURVES."""
-    note: str = ""
-    """A line for the log, where there is something to say."""
-
-
 Showing = Callable[[], tuple[str, RunHeader, CityRecord, Sequence[StepRecord]]]
-"""Plays an episode to be looked at: its title, and the run."""
+"""Plays a run to be looked at: its title, and the run."""
 
 
 class TrainingView:
-    """A training that is watched: curves of all episodes, and now and then an episode played for the viewer.
+    """A training that is watched: curves of all that it reports, and now and then a run played for the viewer.
 
     Args:
         screen: where to show it.
+        sheet: what is drawn.
         tell: told in one line if the view has to end before the training.
 
     Raises:
         ViewError: the viewer cannot be started.
     """
 
-    def __init__(self, screen: Screen, *, tell: Callable[[str], None]) -> None:
-        self._curves = CurveDrawing()
+    def __init__(self, screen: Screen, sheet: Sheet, *, tell: Callable[[str], None]) -> None:
+        stream, self._bytes = _new_stream(f"{app.APPLICATION_ID}-{sheet.title}")
+        self._curves = CurveDrawing(stream, sheet)
         self._due: Showing | None = None
         self._lock = Lock()
-        self._courier: Courier[EpisodePoint] = Courier(
-            self._encode, screen.open(), n_waiting_max=_EPISODES_WAITING_MAX, tell=tell
+        self._courier: Courier[Point] = Courier(
+            self._encode, screen.open(), n_waiting_max=_POINTS_WAITING_MAX, tell=tell
         )
 
-    def add(self, point: EpisodePoint, *, showing: Showing | None = None) -> None:
-        """Hand over an episode, and what to play after it; a playing that has not begun gives way to a later one."""
+    def add(self, point: Point, *, showing: Showing | None = None) -> None:
+        """Hand over a point, and what to play after it; a playing that has not begun gives way to a later one."""
         if showing is not None:
             with self._lock:
                 self._due = showing
@@ -195,48 +174,15 @@ class TrainingView:
         """Bring what is left."""
         self._courier.close()
 
-    def _encode(self, points: Sequence[EpisodePoint]) -> bytes:
-        content = self._curves.encode(points)
+    def _encode(self, points: Sequence[Point]) -> bytes:
+        self._curves.draw(points)
+        content = _drained(self._bytes)
         with self._lock:
             due, self._due = self._due, None
         if due is not None:
             title, header, city, records = due()
             content += RunDrawing(header, city, title=title).encode(records)
         return content
-
-
-class CurveDrawing:
-    """Episodes of training as bytes that Rerun reads: a plot for each quantity, in it a curve for each team."""
-
-    def __init__(self) -> None:
-        self._stream, self._bytes = _new_stream(TRAINING_ID)
-        self._teams: dict[str, int] = {}
-
-    def encode(self, points: Sequence[EpisodePoint]) -> bytes:
-        """Draw the next episodes."""
-        import rerun
-
-        if not self._teams:
-            self._stream.send_blueprint(_curve_layout())
-            self._stream.send_recording_name("training")
-        for team in dict.fromkeys(point.team for point in points):
-            own = [point for point in points if point.team == team]
-            numbers = rerun.TimeColumn(EPISODE, sequence=[point.number for point in own])
-            for name in CURVES:
-                path = f"{name}/{team}"
-                if team not in self._teams:
-                    rgb = colors.BRIGADE_RGB[len(self._teams) % len(colors.BRIGADE_RGB)]
-                    style = rerun.SeriesLines(names=[team], colors=colors.single(rgb), widths=[1.5])
-                    self._stream.log(path, style, static=True)
-                values = rerun.Scalars.columns(scalars=[point.values[name] for point in own])
-                self._stream.send_columns(path, indexes=[numbers], columns=values)
-            self._teams.setdefault(team, len(self._teams))
-            noted = [point for point in own if point.note]
-            if noted:
-                when = rerun.TimeColumn(EPISODE, sequence=[point.number for point in noted])
-                texts = rerun.TextLog.columns(text=[f"{team}: {point.note}" for point in noted])
-                self._stream.send_columns("log", indexes=[when], columns=texts)
-        return _drained(self._bytes)
 
 
 def _new_stream(application_id: str) -> tuple[Any, Any]:
@@ -269,19 +215,3 @@ def _following(layout: Any, *, listed: bool) -> Any:
     if listed:
         layout.blueprint_panel = rrb.BlueprintPanel(state="expanded")
     return layout
-
-
-def _curve_layout() -> Any:
-    """The plots of a training in a grid, and the log of its scenarios."""
-    import rerun.blueprint as rrb
-
-    legend = rrb.PlotLegend(rrb.Corner2D.LeftTop)
-    plots = [rrb.TimeSeriesView(name=title, origin=f"/{name}", plot_legend=legend) for name, title in CURVES.items()]
-    columns = rrb.TextLogColumns(timeline_columns=[EPISODE], text_log_columns=["body"])
-    log = rrb.TextLogView(name="Scenarios", origin="/log", columns=columns)
-    return rrb.Blueprint(
-        rrb.Horizontal(rrb.Grid(*plots, grid_columns=2), log, column_shares=[3, 1]),
-        rrb.TimePanel(state="collapsed", timeline=EPISODE, play_state="following"),
-        rrb.BlueprintPanel(state="expanded"),
-        rrb.SelectionPanel(state="collapsed"),
-    )

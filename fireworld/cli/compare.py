@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -14,10 +12,13 @@ import click
 
 from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
+from fireworld.cli.installed import check_matplotlib
 from fireworld.cli.interrupt import gentle_interrupt
+from fireworld.cli.options import SEED_MAX
+from fireworld.cli.progress import BAR, COUNT, DESCRIPTION, LEFT, bar
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from fireworld.cli.comparison_text import Comparison
     from fireworld.cli.contest import Contest
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 TESTS: Final = "test-1,test-2,test-3"
 METRIC_NAMES: Final = ("score", "burnt-out", "time", "civilians")
 SEEDS: Final = 100
-SEED_MAX: Final = 2**32 - 1
 UNLIMITED: Final = 10_000
 EXIT_CODES: Final = {"not worse": 0, "worse": 1, "cannot tell": 3}
 
@@ -129,17 +129,15 @@ def _check_outputs(paths: Sequence[Path], *, force: bool, plot: bool) -> None:
         OutputError: a file exists, or its folder does not.
         ViewError: matplotlib is not installed.
     """
-    from importlib.util import find_spec
-
-    from fireworld.errors import OutputError, ViewError
+    from fireworld.errors import OutputError
 
     for path in paths:
         if path.exists() and not force:
             raise OutputError(f"{path}: exists already; try --force")
         if path.is_dir() or not path.parent.is_dir():
             raise OutputError(f"{path}: cannot be written: {'is a folder' if path.is_dir() else 'no such folder'}")
-    if plot and find_spec("matplotlib") is None:
-        raise ViewError("--plot: matplotlib is not installed; try pip install 'fireworld[figures]'")
+    if plot:
+        check_matplotlib("--plot")
 
 
 def _prepare(
@@ -201,7 +199,7 @@ def _carry_out(contest: Contest) -> bool:
     kept = f"they are kept in {path}" if path is not None else "with --results they would have been kept"
     n_done, how = 0, "interrupted"
     try:
-        with gentle_interrupt() as interrupted, _bar(n_missing) as advance:
+        with gentle_interrupt() as interrupted, bar("runs", n_missing, DESCRIPTION, BAR, COUNT, LEFT) as advance:
 
             def on_run() -> None:
                 nonlocal n_done
@@ -214,18 +212,6 @@ def _carry_out(contest: Contest) -> bool:
         how = "interrupted within a run"
     click.echo(f"{how}; {n_done} of {n_missing} runs were done: {kept}", err=True)
     return False
-
-
-@contextmanager
-def _bar(total: int) -> Iterator[Callable[[], object]]:
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    console = Console(stderr=True)
-    columns = (TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task("runs", total=total)
-        yield lambda: progress.advance(task)
 
 
 def _compare(contest: Contest, *, metric: str, margin: float) -> Comparison:

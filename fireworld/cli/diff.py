@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fireworld.cli.difference_text import show, show_header
+from fireworld.cli.installed import check_matplotlib
 
 if TYPE_CHECKING:
     from recorder.diff import Difference, Steps
@@ -169,9 +170,7 @@ def _check_outputs(paths: Sequence[Path], *, force: bool, figures: bool) -> None
         OutputError: one exists, or its folder does not.
         ViewError: matplotlib is wanted and not installed.
     """
-    from importlib.util import find_spec
-
-    from fireworld.errors import OutputError, ViewError, expected
+    from fireworld.errors import OutputError, expected
 
     for path in paths:
         if not path.parent.is_dir():
@@ -181,8 +180,8 @@ def _check_outputs(paths: Sequence[Path], *, force: bool, figures: bool) -> None
         if path.exists() and not force:
             hint = "use --force to replace it"
             raise OutputError(expected(str(path), "", "a name that is free", "an existing file", hint))
-    if figures and find_spec("matplotlib") is None:
-        raise ViewError("diff --html: matplotlib is not installed; try pip install 'fireworld[figures]'")
+    if figures:
+        check_matplotlib("diff --html")
 
 
 def _open(order: Order) -> tuple[Log, Log]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from fireworld.cli.record_map import draw_record
 from fireworld.records import Array, CityRecord, StepRecord
 from recorder.spread import differing_entities
 from viewer import colors
@@ -66,18 +67,13 @@ def _ends(rows: Sequence[SpreadRow]) -> Sequence[SpreadRow]:
 def _draw_maps(logs: tuple[Log, Log], step: int, rules: Rules) -> dict[str, bytes]:
     """Draw one step of both runs, and what of it differs."""
     city, (a, b) = logs[0].city, (log.step(step) for log in logs)
-    maps = {name: png_bytes(_draw_run(city, record, name.upper())) for name, record in (("a", a), ("b", b))}
+    maps = {name: _draw_run(city, record, name.upper()) for name, record in (("a", a), ("b", b))}
     return maps | {"difference": png_bytes(_draw_difference(city, a, b, differing_entities(a, b, rules, city)))}
 
 
-def _draw_run(city: CityRecord, record: StepRecord, name: str) -> Figure:
-    return draw_map(
-        city,
-        fieryness=record.buildings.fieryness,
-        brigades_xy=np.column_stack([record.brigades.x_m, record.brigades.y_m]),
-        civilian_hp=record.civilians.hp,
-        title=f"{name}: step {record.step}, score {record.score.score:.4g} of {record.score.score_max:.0f}",
-    )
+def _draw_run(city: CityRecord, record: StepRecord, name: str) -> bytes:
+    title = f"{name}: step {record.step}, score {record.score.score:.4g} of {record.score.score_max:.0f}"
+    return draw_record(city, record, title=title)
 
 
 def _draw_difference(city: CityRecord, a: StepRecord, b: StepRecord, differing: Mapping[str, Array]) -> Figure:

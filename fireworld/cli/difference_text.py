@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 import click
+
+from fireworld.cli.tables import print_table
 
 if TYPE_CHECKING:
     from recorder.diff import Difference
@@ -34,16 +36,19 @@ def show(difference: Difference, *, names: tuple[str, str]) -> None:
     first = difference.first
     click.echo(f"the same: {difference.n_steps_compared} steps" if first is None else first.sentence)
     show_header(difference.header)
-    _print_table(("", *names), list(totals_rows(difference)))
+    click.echo()
+    print_table(("", *names), list(totals_rows(difference)))
     if difference.n_steps_differing:
         counts = [
             (topic, str(difference.first_by_topic[topic].step), str(n))
             for topic, n in difference.n_steps_differing.items()
         ]
         heads = ("topic", "first at step", f"steps that differ, of {difference.n_steps_compared}")
-        _print_table(heads, counts)
+        click.echo()
+        print_table(heads, counts)
     if difference.spread.rows:
-        _print_table(SPREAD_HEADS, [spread_cells(row) for row in difference.spread.rows], narrow=True)
+        click.echo()
+        print_table(SPREAD_HEADS, [spread_cells(row) for row in difference.spread.rows], left=(), narrow=True)
         click.echo(f"\n{SPREAD_NOTE}")
         for sentence in reached(difference):
             click.echo(sentence)
@@ -95,17 +100,3 @@ def _number(value: Any) -> str:
     if value is None:
         return "-"
     return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-def _print_table(head: Sequence[str], rows: Sequence[Sequence[str]], *, narrow: bool = False) -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE, show_edge=False, pad_edge=False, padding=(0, 0 if narrow else 1))
-    for index, name in enumerate(head):
-        table.add_column(name, justify="right" if index or narrow else "left", overflow="fold")
-    for row in rows:
-        table.add_row(*row)
-    click.echo()
-    Console(highlight=False, markup=False).print(table)

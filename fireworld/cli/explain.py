@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -13,8 +12,9 @@ import click
 
 from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
-from fireworld.cli.explanation_text import Pair, as_json_content, show
+from fireworld.cli.explanation_text import Pair, as_json_content, own_targets, show
 from fireworld.cli.interrupt import gentle_interrupt
+from fireworld.cli.progress import BAR, ELAPSED, bar
 
 if TYPE_CHECKING:
     from fireworld.cli.workers import Workers
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 BUDGET: Final = 200
 SHOWN_MAX: Final = 20
 N_THREADS: Final = 2
+REPLAYS: Final = "replay {task.completed:.0f} of at most {task.total:.0f}"
 
 
 @click.command()
@@ -79,7 +80,7 @@ def command(context: click.Context, *, first: Path, second: Path, budget: int, l
     better = RecordedDecisions(pair.better)
     run = prepare_worse_run(recorded_stage(pair.worse.header), pair.worse, better, make_policy)
     stretches = find_stretches(run.recorded, better, n_brigades=run.n_brigades)
-    with gentle_interrupt() as interrupted, _progress(budget) as advance:
+    with gentle_interrupt() as interrupted, bar("explain", budget, REPLAYS, BAR, ELAPSED) as advance:
         workers = Workers(N_THREADS if run.compiled else 1, interrupted)
         explanation = explain(
             stretches,
@@ -88,11 +89,14 @@ def command(context: click.Context, *, first: Path, second: Path, budget: int, l
             budget=budget,
             score_all=_score_all(run, workers, advance),
         )
+    targets = own_targets(pair, better)
     if as_json:
-        known = as_json_content(pair, explanation, why_recorded=why_recorded, interrupted=interrupted.is_set())
+        known = as_json_content(
+            pair, explanation, targets=targets, why_recorded=why_recorded, interrupted=interrupted.is_set()
+        )
         click.echo(json.dumps(known, indent=2))
     else:
-        show(pair, explanation, why_recorded=why_recorded, limit=limit)
+        show(pair, explanation, targets=targets, why_recorded=why_recorded, limit=limit)
     if interrupted.is_set():
         click.echo(f"interrupted after {explanation.n_replays} replays; more may be found", err=True)
         context.exit(INTERRUPTED)
@@ -165,16 +169,3 @@ def _score_all(run: WorseRun, workers: Workers, advance: Callable[[], object]) -
         return scores
 
     return score_all
-
-
-@contextmanager
-def _progress(budget: int) -> Iterator[Callable[[], object]]:
-    """Show a bar where people watch."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    console = Console(stderr=True)
-    columns = (TextColumn("replay {task.completed:.0f} of at most {task.total:.0f}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task("explain", total=budget)
-        yield lambda: progress.advance(task)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import click
 
+from fireworld.cli.tables import print_table
+
 if TYPE_CHECKING:
+    from fireworld.forks.decisions import RecordedDecisions
     from fireworld.forks.explain import Explanation, Found
     from fireworld.forks.stretches import Stretch
     from recorder.reader import Log
@@ -18,6 +21,11 @@ APART: Final = 0.05
 
 TELLING: Final = 0.005
 """Shares below are not listed for people: they would be shown as 0 %."""
+
+HEADS: Final = ("brigade", "steps", "decision", "explains", "all but it", "narrowed to")
+
+OwnTargets: TypeAlias = "Callable[[Stretch], list[int]]"
+"""From a stretch to the ids of the buildings that the brigade named itself in it, none with another action."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +38,27 @@ class Pair:
     better_score: float
 
 
-def as_json_content(pair: Pair, explanation: Explanation, *, why_recorded: str, interrupted: bool) -> dict[str, Any]:
+def own_targets(pair: Pair, better: RecordedDecisions) -> OwnTargets:
+    """Return what finds the buildings that a stretch of the better run's decisions names.
+
+    Args:
+        pair: the recordings.
+        better: decisions of the better one.
+    """
+    from fireworld.records import ACTIONS
+
+    def find(stretch: Stretch) -> list[int]:
+        if stretch.action < len(ACTIONS):
+            return []
+        named = better.targets(stretch.brigade, first=stretch.first, last=stretch.last)
+        return [int(pair.better.city.building_id[building]) for building in named]
+
+    return find
+
+
+def as_json_content(
+    pair: Pair, explanation: Explanation, *, targets: OwnTargets, why_recorded: str, interrupted: bool
+) -> dict[str, Any]:
     """Collect what is known, in plain values."""
     together = explanation.together
     return {
@@ -44,11 +72,11 @@ def as_json_content(pair: Pair, explanation: Explanation, *, why_recorded: str, 
         "n_replays": explanation.n_replays,
         "interrupted": interrupted,
         "together": {"score": together[0], "share": together[1]} if together else None,
-        "stretches": [_stretch_as_json(one) for one in explanation.found],
+        "stretches": [_stretch_as_json(one, targets) for one in explanation.found],
     }
 
 
-def _stretch_as_json(one: Found) -> dict[str, Any]:
+def _stretch_as_json(one: Found, targets: OwnTargets) -> dict[str, Any]:
     from fireworld.records import ACTION_NAMES
 
     stretch, core = one.stretch, one.core
@@ -57,6 +85,7 @@ def _stretch_as_json(one: Found) -> dict[str, Any]:
         "first": stretch.first,
         "last": stretch.last,
         "action": ACTION_NAMES[stretch.action],
+        "targets": targets(stretch),
         "instead_of": [ACTION_NAMES[action] for action in stretch.instead_of],
         "score": one.score,
         "share": one.share,
@@ -66,12 +95,8 @@ def _stretch_as_json(one: Found) -> dict[str, Any]:
     }
 
 
-def show(pair: Pair, explanation: Explanation, *, why_recorded: str, limit: int) -> None:
+def show(pair: Pair, explanation: Explanation, *, targets: OwnTargets, why_recorded: str, limit: int) -> None:
     """Say for people what is known."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
     better, worse = pair.better.path, pair.worse.path
     difference = pair.better_score - pair.worse_score
     click.echo(f"{better} scores {pair.better_score:.6g}, {worse} {pair.worse_score:.6g}: {difference:.6g} to explain")
@@ -79,21 +104,21 @@ def show(pair: Pair, explanation: Explanation, *, why_recorded: str, limit: int)
     if explanation.n_stretches == 0:
         click.echo("no brigade took another action in steps that both runs have")
         return
-    table = Table(box=box.SIMPLE, show_edge=False, pad_edge=False)
-    for name in ("brigade", "steps", "decision", "explains", "all but it", "narrowed to"):
-        table.add_column(name, justify="left" if name == "decision" else "right", overflow="fold")
     telling = [one for one in explanation.found if _is_telling(one, explanation)]
-    for one in telling[:limit]:
-        core = f"{_span(one.core.stretch)}: {_share(one.core.share)}" if one.core else ""
-        rest = _share(one.share_without) if one.share_without is not None else ""
-        stretch = one.stretch
-        table.add_row(str(stretch.brigade), _span(stretch), str(stretch), _share(one.share), rest, core)
     click.echo()
     if telling:
-        Console(highlight=False, markup=False).print(table)
+        print_table(HEADS, [_cells(one, targets) for one in telling[:limit]], left=(HEADS.index("decision"),))
         click.echo()
     for line in _closing_lines(explanation, why_recorded=why_recorded, n_telling=len(telling), limit=limit):
         click.echo(line)
+
+
+def _cells(one: Found, targets: OwnTargets) -> tuple[str, ...]:
+    """Write a row of the table."""
+    stretch = one.stretch
+    core = f"{_span(one.core.stretch)}: {_share(one.core.share)}" if one.core else ""
+    rest = _share(one.share_without) if one.share_without is not None else ""
+    return str(stretch.brigade), _span(stretch), stretch.in_words(targets(stretch)), _share(one.share), rest, core
 
 
 def _is_telling(one: Found, explanation: Explanation) -> bool:

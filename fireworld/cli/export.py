@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-if TYPE_CHECKING:
-    from fireworld.records import StepRecord
+from fireworld.cli.progress import bar
 
 
 @click.command()
@@ -54,8 +50,8 @@ def command(*, log: Path, folder: Path, tables: str | None, force: bool, as_json
     recording = open_log(log, partial=True)
     from recorder.parquet import SUFFIX, export
 
-    with _progress(len(recording), quiet=as_json) as advance:
-        n_rows = export(recording, folder, tables=chosen, force=force, on_step=advance)
+    with bar("export", len(recording), quiet=as_json) as advance:
+        n_rows = export(recording, folder, tables=chosen, force=force, on_step=lambda _: advance())
     if recording.damage is not None:
         click.echo(f"{log}: {recording.damage}; exported {len(recording)} committed steps", err=True)
     if as_json:
@@ -80,15 +76,3 @@ def _chosen(tables: str | None) -> list[str]:
         if name not in TABLES:
             raise click.UsageError(f"--tables: expected some of {', '.join(TABLES)}, got {name!r}")
     return names
-
-
-@contextmanager
-def _progress(n_steps: int, *, quiet: bool) -> Iterator[Callable[[StepRecord], object]]:
-    """Show a bar where people watch; yield what is to be called after each step."""
-    from rich.console import Console
-    from rich.progress import Progress
-
-    console = Console(stderr=True)
-    with Progress(console=console, transient=True, disable=quiet or not console.is_terminal) as progress:
-        task = progress.add_task("export", total=n_steps)
-        yield lambda _: progress.advance(task)

@@ -10,11 +10,13 @@ import click
 
 from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
+from fireworld.cli.options import record_options
 
 if TYPE_CHECKING:
     from fireworld.forks.fork import Change, Swap
     from fireworld.forks.resume import Resumed
     from fireworld.policy.names import NamedPolicy
+    from fireworld.policy.protocol import Decision
     from fireworld.records import MemoryRecording
     from recorder.reader import Log
 
@@ -36,7 +38,8 @@ RECORDED: Final = "recorded"
     "decided",
     metavar="BRIGADE=ACTION",
     multiple=True,
-    help="What a brigade does in step STEP+1, unasked; repeatable.",
+    help="What a brigade does in step STEP+1, unasked: one of the four actions, or own-target:BUILDING, a burning "
+    "building of its fire site; repeatable.",
 )
 @click.option(
     "--swap",
@@ -46,10 +49,7 @@ RECORDED: Final = "recorded"
     help="From step STEP+1 on that brigade does what it did in the recording OTHER, of the same scenario and seed; "
     "repeatable.",
 )
-@click.option(
-    "--record", "output", metavar="FILE.mcap", type=click.Path(path_type=Path), help="Record every step to a file."
-)
-@click.option("--force", is_flag=True, help="Replace an existing recording.")
+@record_options
 @click.option("--json", "as_json", is_flag=True, help="Write the outcome as JSON.")
 @click.pass_context
 def command(
@@ -68,6 +68,7 @@ def command(
 
     \b
     fireworld fork a.mcap --at 14 --decide 2=nearest-to-me --record b.mcap
+    fireworld fork a.mcap --at 14 --decide 2=own-target:301 --record b.mcap
     fireworld fork a.mcap --at 14 --policy planner --record b.mcap
     fireworld fork a.mcap --at 14 --swap other.mcap:2 --record b.mcap
     fireworld diff a.mcap b.mcap
@@ -96,7 +97,7 @@ def command(
     original = open_log(log)
     beginning = recorded_up_to(original, step)
     named = _policy(original, policy)
-    change = Change(named, decided=_decided(decided), swaps=_swaps(swapped))
+    change = Change(named, decided=_decided(decided, original), swaps=_swaps(swapped))
     _check_told_once(change)
     remembering = named if policy is None and has_memory(named.policy) else None
     stage = recorded_stage(original.header)
@@ -166,30 +167,48 @@ def _policy(log: Log, name: str | None) -> NamedPolicy:
     return load_policy(name) if name is not None else recorded_policy(log.header, source=str(log.path))
 
 
-def _decided(texts: tuple[str, ...]) -> dict[int, int]:
-    """Read BRIGADE=ACTION.
+def _decided(texts: tuple[str, ...], log: Log) -> dict[int, Decision]:
+    """Read BRIGADE=ACTION, and BRIGADE=own-target:BUILDING.
 
     Raises:
-        PolicyError: there is no such action.
+        PolicyError: there is no such action or building, or a building where none belongs.
     """
+    decided: dict[int, Decision] = {}
+    for text in texts:
+        number, _, order = text.partition("=")
+        if not (number.isascii() and number.isdecimal() and order):
+            raise click.UsageError(f"--decide: expected BRIGADE=ACTION as in 2=nearest-to-me, got {text!r}")
+        if int(number) in decided:
+            raise click.UsageError(f"--decide: expected one action for brigade {int(number)}, got two")
+        decided[int(number)] = _decision(number, order, log)
+    return decided
+
+
+def _decision(number: str, order: str, log: Log) -> Decision:
     from difflib import get_close_matches
 
     from fireworld.errors import PolicyError, expected
-    from fireworld.records import ACTIONS
+    from fireworld.policy.protocol import Action, Decision
+    from fireworld.records import ACTION_NAMES
 
-    decided: dict[int, int] = {}
-    for text in texts:
-        number, _, action = text.partition("=")
-        if not (number.isascii() and number.isdecimal() and action):
-            raise click.UsageError(f"--decide: expected BRIGADE=ACTION as in 2=nearest-to-me, got {text!r}")
-        if action not in ACTIONS:
-            near = [name for name in ACTIONS if action in name] or get_close_matches(action, ACTIONS, n=1)
-            hint = "try " + " or ".join(near) if near else ""
-            raise PolicyError(expected("--decide", number, "one of " + ", ".join(ACTIONS), action, hint))
-        if int(number) in decided:
-            raise click.UsageError(f"--decide: expected one action for brigade {int(number)}, got two")
-        decided[int(number)] = ACTIONS.index(action)
-    return decided
+    name, colon, building = order.partition(":")
+    if name not in ACTION_NAMES:
+        near = [one for one in ACTION_NAMES if name in one] or get_close_matches(name, ACTION_NAMES, n=1)
+        hint = "try " + " or ".join(near) if near else ""
+        raise PolicyError(expected("--decide", number, "one of " + ", ".join(ACTION_NAMES), name, hint))
+    action = Action(ACTION_NAMES.index(name))
+    if action != Action.OWN_TARGET:
+        if colon:
+            hint = "a brigade goes for a building with own-target:BUILDING"
+            raise PolicyError(expected("--decide", number, f"{name} without a building", order, hint))
+        return Decision(action)
+    if not (building.isascii() and building.isdecimal()):
+        raise PolicyError(expected("--decide", number, f"a building behind {name}, as in {name}:301", order))
+    ids = log.city.building_id.tolist()
+    if int(building) not in ids:
+        wanted = f"the id of a building of {log.path}, {min(ids)} to {max(ids)}"
+        raise PolicyError(expected("--decide", number, wanted, order))
+    return Decision(action, target=ids.index(int(building)))
 
 
 def _swaps(texts: tuple[str, ...]) -> list[Swap]:

@@ -7,13 +7,16 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from fireworld.cli import USER_ERROR
 from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.interrupt import gentle_interrupt
+from fireworld.cli.options import seed_option, settings_option, steps_option
+from fireworld.cli.progress import bar
+from fireworld.cli.tables import print_table
 from fireworld.errors import OutputError, expected
 
 if TYPE_CHECKING:
@@ -127,9 +130,9 @@ def update(context: click.Context, *, names: tuple[str, ...], reason: str, folde
 @command.command(short_help="Run a scenario and keep the recording.")
 @click.argument("scenario")
 @click.option("--policy", required=True, help="As for `fireworld run`: a name, TEAM.npz, or MODULE:CLASS.")
-@click.option("--seed", default=1, show_default=True, type=click.IntRange(0, 2**32 - 1), help="Seed of all luck.")
-@click.option("--steps", type=click.IntRange(min=1), help="Stop after this step.  [default: the scenario's]")
-@click.option("--set", "settings", metavar="KEY=VALUE", multiple=True, help="Set a key of the scenario; repeatable.")
+@seed_option
+@steps_option
+@settings_option
 @click.option("--name", help="Name of the golden.  [default: made of scenario, policy and seed]")
 @click.option("--dir", "folder", metavar="DIR", type=_DIRECTORY, default=FOLDER, help="Folder of the goldens.")
 def add(
@@ -184,16 +187,13 @@ def _made_up_name(scenario: str, policy: str, seed: int) -> str:
 def _check_all(paths: Sequence[Path], *, quiet: bool = False) -> Iterator[Checked]:
     """Check goldens one after another, under a progress display where people watch."""
     announce_compilation()
-    from rich.console import Console
-    from rich.progress import track
-
     from fireworld.cli.goldens import check_golden
 
-    console = Console(stderr=True)
-    shown = track(paths, "running", console=console, transient=True, disable=quiet or not console.is_terminal)
     grounds: dict[str, Ground] = {}
-    for path in shown:
-        yield check_golden(path, grounds=grounds)
+    with bar("running", len(paths), quiet=quiet) as advance:
+        for path in paths:
+            yield check_golden(path, grounds=grounds)
+            advance()
 
 
 def _reasons(path: Path, reason: str, changed: Sequence[Checked]) -> str:
@@ -239,21 +239,14 @@ def _difference(checked: Checked) -> dict[str, Any]:
 
 def _show(results: Sequence[Checked], *, keep: Path | None) -> None:
     """Show results as a table; below it, for each that is not the same, what differs."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
     from fireworld.cli.goldens import changes
 
-    table = Table(box=box.SIMPLE, show_edge=False, pad_edge=False)
-    for head in ("golden", "scenario", "policy", "seed", "steps", "result"):
-        justify: Literal["left", "right"] = "right" if head in {"seed", "steps"} else "left"
-        table.add_column(head, justify=justify, overflow="fold", no_wrap=head == "golden")
+    rows = []
     for checked in results:
         header, steps = checked.header, checked.difference.totals[0].n_steps if checked.difference else "-"
         what = (header.scenario, header.policy, str(header.seed)) if header is not None else ("-", "-", "-")
-        table.add_row(checked.name, *what, str(steps), checked.result)
-    Console(highlight=False, markup=False).print(table)
+        rows.append((checked.name, *what, str(steps), checked.result))
+    print_table(("golden", "scenario", "policy", "seed", "steps", "result"), rows, left=(0, 1, 2, 5), whole=(0,))
     for checked in results:
         if checked.result == "same":
             continue

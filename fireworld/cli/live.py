@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from threading import Lock
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
@@ -15,9 +15,20 @@ if TYPE_CHECKING:
     from fireworld.records import CityRecord, RunHeader, StepRecord
     from fireworld.training.teams import Training
     from fireworld.training.trainer import EpisodeReport
-    from viewer.live import EpisodePoint, Screen, Showing
+    from viewer.learning import Point, Sheet
+    from viewer.live import Screen, Showing
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+
+CURVES: Final = {
+    "return": "Return",
+    "score": "Score, as a share of the best",
+    "epsilon": "Epsilon",
+    "n_changed": "States in which the greedy action changed",
+    "n_burnt_out": "Burnt out",
+    "n_steps": "Steps",
+}
+"""What is drawn of each episode, and the titles."""
 
 
 def view_options(command: Command) -> Command:
@@ -51,11 +62,8 @@ def watched_run(screen: Screen | None, header: RunHeader, city: CityRecord) -> I
         return
     from viewer.live import RunView
 
-    watched = RunView(screen, header, city, tell=_tell)
-    try:
+    with closing(RunView(screen, header, city, tell=tell)) as watched:
         yield watched.add
-    finally:
-        watched.close()
 
 
 @contextmanager
@@ -70,17 +78,21 @@ def watched_training(screen: Screen | None) -> Iterator[Callable[[Training, Epis
         return
     from viewer.live import TrainingView
 
-    watched, episodes, lock = TrainingView(screen, tell=_tell), Episodes(), Lock()
+    episodes, lock = Episodes(), Lock()
+    with closing(TrainingView(screen, _sheet(), tell=tell)) as watched:
 
-    def show(training: Training, episode: EpisodeReport) -> None:
-        with lock:
-            point, showing = episodes.point(training, episode)
-            watched.add(point, showing=showing)
+        def show(training: Training, episode: EpisodeReport) -> None:
+            with lock:
+                point, showing = episodes.point(training, episode)
+                watched.add(point, showing=showing)
 
-    try:
         yield show
-    finally:
-        watched.close()
+
+
+def _sheet() -> Sheet:
+    from viewer.learning import Sheet
+
+    return Sheet(title="training", timeline="episode", plots=CURVES, log="Scenarios")
 
 
 class Episodes:
@@ -90,9 +102,9 @@ class Episodes:
         self._n_episodes: dict[int, int] = {}
         self._first: int | None = None
 
-    def point(self, training: Training, episode: EpisodeReport) -> tuple[EpisodePoint, Showing | None]:
+    def point(self, training: Training, episode: EpisodeReport) -> tuple[Point, Showing | None]:
         """Return an episode as it is drawn, and what is to be played after it."""
-        from viewer.live import EpisodePoint
+        from viewer.learning import Point
 
         seed = training.trainer.seed
         number = self._n_episodes.get(seed, 0)
@@ -100,18 +112,19 @@ class Episodes:
         self._first = seed if self._first is None else self._first
         ended = training.trainer.progress.episode == 0  # it starts at 0 again with every scenario
         settled = "settled" if episode.converged else "not settled"
-        point = EpisodePoint(
-            team=f"seed {seed}",
+        values = {
+            "return": episode.total_reward,
+            "score": episode.score / episode.score_max,
+            "epsilon": episode.epsilon,
+            "n_changed": episode.n_changed,
+            "n_burnt_out": episode.n_burnt_out,
+            "n_steps": episode.n_steps,
+        }
+        team = f"seed {seed}"
+        point = Point(
             number=number,
-            values={
-                "return": episode.total_reward,
-                "score": episode.score / episode.score_max,
-                "epsilon": episode.epsilon,
-                "n_changed": episode.n_changed,
-                "n_burnt_out": episode.n_burnt_out,
-                "n_steps": episode.n_steps,
-            },
-            note=f"{episode.scenario}: {settled} after {episode.episode + 1} episodes" if ended else "",
+            values={name: {team: value} for name, value in values.items()},
+            note=f"{team}: {episode.scenario}: {settled} after {episode.episode + 1} episodes" if ended else "",
         )
         return point, _showing(training, episode) if ended and seed == self._first and _ends_stage(training) else None
 
@@ -145,5 +158,6 @@ def _showing(training: Training, episode: EpisodeReport) -> Showing:
     return play
 
 
-def _tell(line: str) -> None:
+def tell(line: str) -> None:
+    """Say why a view has ended before what it shows."""
     click.echo(line, err=True)

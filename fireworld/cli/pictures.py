@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
+from fireworld.cli.record_map import draw_record
 from fireworld.cli.repetitions import Repetition
 from fireworld.evaluation import paper
 from fireworld.evaluation.figures import draw_policy_changes, draw_returns
@@ -19,7 +18,6 @@ from fireworld.runs import prepare_run
 from fireworld.scenario import load_scenario
 from fireworld.world.stage import Ground, build_stage
 from recorder.writer import LogWriter
-from viewer.maps import draw_map
 from viewer.output import png_bytes
 
 
@@ -97,11 +95,5 @@ def draw_all(study: Study, recorded: list[Recorded]) -> Iterator[tuple[str, byte
 
 
 def _map(run: Recorded, record: StepRecord, moment: str) -> bytes:
-    figure = draw_map(
-        run.city,
-        fieryness=record.buildings.fieryness,
-        brigades_xy=np.column_stack([record.brigades.x_m, record.brigades.y_m]),
-        civilian_hp=record.civilians.hp,
-        title=f"{run.scenario}: {moment}, score {record.score.score:.2f} of {record.score.score_max:.0f}",
-    )
-    return png_bytes(figure)
+    title = f"{run.scenario}: {moment}, score {record.score.score:.2f} of {record.score.score_max:.0f}"
+    return draw_record(run.city, record, title=title)

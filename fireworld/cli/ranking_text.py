@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fireworld.cli.team_text import print_table
+from fireworld.cli.tables import print_table
 
 if TYPE_CHECKING:
     from fireworld.policy.preferences import RankingDifference
@@ -42,7 +42,8 @@ def show_ranking(ranking: Ranking, name: str, *, origin: Sequence[str]) -> None:
         [weight.name, weight.meaning, *map(_signed, ranking.weights[:, place[weight.name]])]
         for weight in by_size(ranking)
     ]
-    print_table(["weight", "of what", *_columns(n)], rows, n_left=2)
+    click.echo()
+    print_table(["weight", "of what", *_columns(n)], rows, left=(0, 1), whole=(0,))
     click.echo(f"\n{HINT}")
     for row in range(n):
         if n > 1:
@@ -105,7 +106,8 @@ def show_ranking_difference(difference: RankingDifference, *, limit: int) -> Non
         for one in difference.changed[:limit]
     ]
     whose = ["of"] if difference.n_rows > 1 else []
-    print_table(["weight", *whose, "A", "B", "B less A"], rows, n_left=1 + len(whose))
+    click.echo()
+    print_table(["weight", *whose, "A", "B", "B less A"], rows, left=range(1 + len(whose)), whole=(0,))
     if n > limit:
         click.echo(f"... and {n - limit} more; --limit shows more of them")
 

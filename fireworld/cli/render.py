@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import click
 
 from fireworld.cli.opening import open_committed
+from fireworld.cli.progress import bar
 
 if TYPE_CHECKING:
     from fireworld.records import Recording
@@ -112,7 +112,7 @@ def _render_film(
 
     recordings: list[Recording] = [open_committed(path, doing="drawing") for path in paths]
     moments = moments_between(recordings, first=first, last=last, every=every)
-    with plain_style(), _progress(len(moments)) as advance:
+    with plain_style(), bar("film", len(moments)) as advance:
         save_film(recordings, moments, output, fps=fps or FPS, on_frame=advance)
     span = f"steps {moments[0].step} to {moments[-1].step}"
     click.echo(f"{output}: {len(moments)} frames, {span}, {_size(output)}")
@@ -121,15 +121,3 @@ def _render_film(
 def _size(path: Path) -> str:
     n_bytes = path.stat().st_size
     return f"{n_bytes / 1e6:.1f} MB" if n_bytes >= 1_000_000 else f"{n_bytes / 1e3:.0f} kB"
-
-
-@contextmanager
-def _progress(n_frames: int) -> Iterator[Callable[[], object]]:
-    """Show a bar where people watch; yield what is to be called after each frame."""
-    from rich.console import Console
-    from rich.progress import Progress
-
-    console = Console(stderr=True)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task("film", total=n_frames)
-        yield lambda: progress.advance(task)

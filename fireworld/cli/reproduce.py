@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -13,7 +11,9 @@ import click
 
 from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
+from fireworld.cli.installed import check_matplotlib
 from fireworld.cli.interrupt import gentle_interrupt
+from fireworld.cli.progress import BAR, COUNT, DESCRIPTION, ELAPSED, bars
 from fireworld.cli.report_folder import find_folder, make_folder
 from fireworld.files import write_file
 
@@ -100,7 +100,7 @@ def command(
         folder=out,
         resume=resume,
     )
-    _check_figures()
+    check_matplotlib("reproduce")
     if resume:
         find_folder(out)
     else:
@@ -108,7 +108,7 @@ def command(
     announce_compilation()
     from fireworld.cli.workers import Workers
 
-    with gentle_interrupt() as interrupted, _progress() as progress:
+    with gentle_interrupt() as interrupted, bars(DESCRIPTION, BAR, COUNT, ELAPSED) as progress:
         found = _reproduce(order, Workers(jobs or os.cpu_count() or 1, interrupted), progress)
     if found is None:
         from fireworld.cli.kept import Kept
@@ -203,32 +203,6 @@ def _measure(order: Order, workshop: Workshop, workers: Workers) -> tuple[Study,
         agreement=[repetition.agreement for repetition in repetitions],
     )
     return study, repetitions[0]
-
-
-def _check_figures() -> None:
-    """See that figures can be drawn, before minutes of training.
-
-    Raises:
-        ViewError: matplotlib is not installed.
-    """
-    from importlib.util import find_spec
-
-    from fireworld.errors import ViewError
-
-    if find_spec("matplotlib") is None:
-        raise ViewError("reproduce: matplotlib is not installed; try pip install 'fireworld[figures]'")
-
-
-@contextmanager
-def _progress() -> Iterator[Progress]:
-    """Show bars where people watch."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        yield progress
 
 
 def _show(study: Study, tables: Tables) -> None:

@@ -13,6 +13,8 @@ from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.interrupt import gentle_interrupt
 from fireworld.cli.live import find_screen, view_options, watched_run
+from fireworld.cli.options import record_options, seed_option, settings_option, steps_option
+from fireworld.cli.progress import BAR, ELAPSED, bars, is_watched
 from fireworld.policy.shipped import team_names
 
 if TYPE_CHECKING:
@@ -28,22 +30,21 @@ POLICIES_HELP: Final = (
     "planner (planner:horizon=30,interval=4,rollouts=1), "
     f"{', '.join(team_names())} (teams), a team file (TEAM.npz), or MODULE:CLASS of your own."
 )
+STEP: Final = "step {task.completed:.0f} of at most {task.total:.0f}"
+STATE: Final = "{task.fields[burning]} burning, score {task.fields[score]:.2f}"
 
 
 @click.command()
 @click.argument("scenario", default="default")
 @click.option("--policy", default="best", show_default=True, help=POLICIES_HELP)
-@click.option("--seed", default=1, show_default=True, type=click.IntRange(0, 2**32 - 1), help="Seed of all luck.")
-@click.option("--steps", type=click.IntRange(min=1), help="Stop after this step.  [default: the scenario's]")
-@click.option(
-    "--record", "output", metavar="FILE.mcap", type=click.Path(path_type=Path), help="Record every step to a file."
-)
-@click.option("--force", is_flag=True, help="Replace an existing recording.")
+@seed_option
+@steps_option
+@record_options
 @click.option(
     "--scene", type=click.Choice(["foxglove"]), help="Add to the recording what Foxglove, Lichtblick and Rerun draw."
 )
 @view_options
-@click.option("--set", "settings", metavar="KEY=VALUE", multiple=True, help="Set a key of the scenario; repeatable.")
+@settings_option
 @click.option("--json", "as_json", is_flag=True, help="Write the outcome as JSON.")
 @click.pass_context
 def command(
@@ -165,20 +166,10 @@ def make_scene(header: RunHeader, city: CityRecord) -> Scene:
 
 def _with_progress(run: Run, *, quiet: bool) -> Iterator[StepRecord]:
     """Yield the steps of a run, under a progress display where people watch."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    console = Console(stderr=True)
-    if quiet or not console.is_terminal:
+    if quiet or not is_watched():
         yield from run
         return
-    columns = (
-        TextColumn("step {task.completed:.0f} of at most {task.total:.0f}"),
-        BarColumn(),
-        TextColumn("{task.fields[burning]} burning, score {task.fields[score]:.2f}"),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=console, transient=True) as progress:
+    with bars(STEP, BAR, STATE, ELAPSED) as progress:
         task = progress.add_task("run", total=run.header.n_steps_max, burning=0, score=0.0)
         for record in run:
             score = record.score

@@ -11,11 +11,14 @@ from typing import TYPE_CHECKING
 import click
 
 from fireworld.cli.interrupt import gentle_interrupt
+from fireworld.cli.live_search import watched_search
+from fireworld.cli.progress import BAR, DESCRIPTION, ELAPSED, bars, is_watched
 
 if TYPE_CHECKING:
     from fireworld.training.curriculum import Curriculum
     from fireworld.training.search import Generation
     from fireworld.training.searches import SearchRun
+    from viewer.live import Screen
 
 
 def train_by_search(
@@ -28,8 +31,11 @@ def train_by_search(
     jobs: int | None,
     resume: bool,
     force: bool,
+    screen: Screen | None,
 ) -> bool:
     """Search for rankings, one after another, each with all cores; tell whether all were found.
+
+    Args are those of `fireworld train`; `screen` is where to show it, None for nowhere.
 
     Raises:
         FireworldError: as in training.
@@ -52,10 +58,15 @@ def train_by_search(
     ]
     begin_all(runs, resume=resume)
     n_threads = jobs or os.cpu_count() or 1
-    with gentle_interrupt() as interrupted, _progress(runs) as report:
+    with gentle_interrupt() as interrupted, _progress(runs) as report, watched_search(screen, runs) as show:
+
+        def report_and_show(run: SearchRun, generation: Generation) -> None:
+            report(run, generation)
+            show(run, generation)
+
         for run in runs:
             if not interrupted.is_set():
-                run.run(interrupted, n_threads=n_threads, report=report)
+                run.run(interrupted, n_threads=n_threads, report=report_and_show)
                 _show(run)
     return all(run.ranking is not None for run in runs)
 
@@ -73,8 +84,6 @@ def _show(run: SearchRun) -> None:
 @contextmanager
 def _progress(runs: Sequence[SearchRun]) -> Iterator[Callable[[SearchRun, Generation], None]]:
     """Show progress: a bar where people watch, else a line for every generation."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     def words(run: SearchRun, done: Generation) -> str:
         return (
@@ -82,11 +91,9 @@ def _progress(runs: Sequence[SearchRun]) -> Iterator[Callable[[SearchRun, Genera
             f"score {done.score_mean:.3f}, of the best {done.score_best:.3f}, spread {done.spread:.2f}"
         )
 
-    console = Console(stderr=True)
-    if not console.is_terminal:
+    if not is_watched():
         yield lambda run, done: click.echo(words(run, done), err=True)
         return
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True) as progress:
+    with bars(DESCRIPTION, BAR, ELAPSED) as progress:
         task = progress.add_task("the first generation", total=sum(run.searcher.search.n_generations for run in runs))
         yield lambda run, done: progress.update(task, advance=1, description=words(run, done))

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from fireworld.cli.tables import print_table
+
 if TYPE_CHECKING:
     from fireworld.policy.inspection import Choice, TeamDifference
     from fireworld.policy.ranking import Ranking
@@ -30,7 +32,8 @@ def show_team(team: Team, name: str) -> None:
         [action, *(_share(summary.n_by_action[k], summary.n_visited) for summary in summaries)]
         for k, action in enumerate(ACTIONS)
     ]
-    print_table(["", *(f"brigade {number}" for number in range(n_tables))], rows)
+    click.echo()
+    print_table(["", *(f"brigade {number}" for number in range(n_tables))], rows, whole=(0,))
     if n_tables > 1:
         same, common = agreement(team)
         click.echo(f"\nof {common} states that all visited, all prefer the same action in {same}")
@@ -81,7 +84,8 @@ def _show_choices(choices: Sequence[Choice]) -> None:
     for k, action in enumerate(ACTIONS):
         cells = [f"{'> ' if one.action == k else ''}{_number(one.q_values[k])} ({one.visits[k]})" for one in choices]
         rows.append([action, *cells])
-    print_table(["value (times tried)", *(f"brigade {one.table}" for one in choices)], rows)
+    click.echo()
+    print_table(["value (times tried)", *(f"brigade {one.table}" for one in choices)], rows, whole=(0,))
     for why in dict.fromkeys(one.why for one in choices):
         brigades = ", ".join(str(one.table) for one in choices if one.why == why)
         click.echo(f"brigade {brigades}: {why}")
@@ -112,7 +116,8 @@ def show_difference(difference: TeamDifference, *, limit: int) -> None:
         [name, ", ".join(f"{value} {n}" for value, n in values.items() if n)]
         for name, values in difference.by_feature()
     ]
-    print_table(["feature", "changed entries by its value"], counts, n_left=2)
+    click.echo()
+    print_table(["feature", "changed entries by its value"], counts, left=(0, 1), whole=(0,))
     click.echo()
     for a, b in difference.changed[:limit]:
         state = short_state(a.state, with_others=difference.n_states > 270)
@@ -182,24 +187,3 @@ def _rows_of(states: Sequence[int], n_states: int) -> list[int]:
 
     step = N_STATES // n_states
     return list(dict.fromkeys(state // step * step for state in states))
-
-
-def print_table(head: Sequence[str], rows: Sequence[Sequence[str]], *, n_left: int = 1) -> None:
-    """Print a table with an empty line before it.
-
-    Args:
-        head: what stands above the columns.
-        rows: cells.
-        n_left: the first columns are set to the left, the others to the right.
-    """
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE, show_edge=False, pad_edge=False)
-    for index, name in enumerate(head):
-        table.add_column(name, justify="left" if index < n_left else "right", no_wrap=not index, overflow="fold")
-    for row in rows:
-        table.add_row(*row)
-    click.echo()
-    Console(highlight=False, markup=False).print(table)

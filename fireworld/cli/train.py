@@ -15,14 +15,12 @@ from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.interrupt import gentle_interrupt
 from fireworld.cli.live import find_screen, view_options, watched_training
+from fireworld.cli.options import SEED_MAX, seed_option
+from fireworld.cli.progress import BAR, DESCRIPTION, ELAPSED, bars, is_watched
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from fireworld.training.teams import Training
     from fireworld.training.trainer import EpisodeReport
-
-SEED_MAX = 2**32 - 1
 
 
 class Report(Protocol):
@@ -47,7 +45,7 @@ class Report(Protocol):
 )
 @click.option("--set", "settings", metavar="KEY=VALUE", multiple=True, help="Set a figure of the method; repeatable.")
 @click.option("--stages", metavar="NAME,...", help="Train in these stages of the curriculum only.")
-@click.option("--seed", default=1, show_default=True, type=click.IntRange(0, SEED_MAX), help="Seed of all luck.")
+@seed_option
 @click.option(
     "--repetitions",
     default=1,
@@ -94,6 +92,7 @@ def command(
     fireworld train -o team.npz --set alpha=0.1 --seed 7
     fireworld train -o best.npz --method search          a ranking of targets
     fireworld train -o team.npz --view                   curves while it learns, a fire after every stage
+    fireworld train -o best.npz --method search --view   scores and weights, generation by generation
     fireworld run test-2 --policy team.npz               let it fight a fire
 
     The same seed gives the same team. Ctrl-C keeps a checkpoint, TEAM.npz.checkpoint, from which --resume goes on bit
@@ -109,8 +108,6 @@ def command(
         raise click.UsageError("-o and --log name the same file.")
     if seed + repetitions - 1 > SEED_MAX:
         raise click.UsageError(f"--repetitions: expected seeds up to {SEED_MAX}, got up to {seed + repetitions - 1}.")
-    if method == "search" and (view or view_url is not None):
-        raise click.UsageError("--view: a search has no episodes to show; its generations are written.")
     screen = find_screen(view=view, url=view_url)
     announce_compilation()
     from fireworld.scenario import split_settings
@@ -138,6 +135,7 @@ def command(
             jobs=jobs,
             resume=resume,
             force=force,
+            screen=screen,
         )
         context.exit(0 if done else INTERRUPTED)
     learned = find_method(method).with_settings(figures)
@@ -180,14 +178,11 @@ def _show(training: Training) -> None:
 @contextmanager
 def _progress(trainings: list[Training]) -> Iterator[Report]:
     """Show progress: bars where people watch, else a line for every scenario that is done."""
-    from rich.console import Console
-
-    console = Console(stderr=True)
-    if console.is_terminal:
-        with _bars(trainings, console) as report:
-            yield report
-    else:
+    if not is_watched():
         yield _lines()
+        return
+    with _bars(trainings) as report:
+        yield report
 
 
 def _lines() -> Report:
@@ -208,16 +203,8 @@ def _lines() -> Report:
 
 
 @contextmanager
-def _bars(trainings: list[Training], console: Console) -> Iterator[Report]:
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.fields[state]}"),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=console, transient=True) as progress:
+def _bars(trainings: list[Training]) -> Iterator[Report]:
+    with bars(DESCRIPTION, BAR, "{task.fields[state]}", ELAPSED) as progress:
         tasks = {
             training.trainer.seed: progress.add_task(
                 f"seed {training.trainer.seed}", total=training.trainer.curriculum.n_scenarios, state="", start=False

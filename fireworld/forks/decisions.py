@@ -7,7 +7,7 @@ from collections.abc import Callable
 from fireworld.errors import LogError, expected
 from fireworld.policy.asking import ask
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
-from fireworld.records import Recording, RunHeader
+from fireworld.records import ACTION_NAMES, CityRecord, Recording, RunHeader
 from fireworld.replay import recorded_decision
 
 Told = Callable[[int, int], Decision | None]
@@ -62,6 +62,11 @@ class RecordedDecisions:
                 return Decision(decision.action, target=decision.target)
         return FIRST_ACTION
 
+    def targets(self, brigade: int, *, first: int, last: int) -> list[int]:
+        """Return the buildings that a brigade named itself from a step to another, each once, in their order."""
+        made = (self.made(step, brigade) for step in range(first, last + 1))
+        return [*dict.fromkeys(one.target for one in made if one is not None and one.target is not None)]
+
     def decide(self, observation: Observation) -> Decision:
         """Decide as recorded; `easiest` instead of a target of its own that does not burn here."""
         decision = self.at(observation.step, observation.brigade)
@@ -112,6 +117,12 @@ class ComparedPolicy:
 def possible(decision: Decision, observation: Observation) -> bool:
     """Tell whether a decision can be made: a target of its own must burn, in the brigade's fire site."""
     return decision.target is None or decision.target in observation.burning
+
+
+def in_words(decision: Decision, city: CityRecord) -> str:
+    """Say a decision as `--decide` takes it: its action, and the id of the building that it names itself."""
+    name = ACTION_NAMES[decision.action]
+    return name if decision.target is None else f"{name}:{city.building_id[decision.target]}"
 
 
 def _last(observation: Observation) -> Decision:

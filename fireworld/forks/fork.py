@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,18 +10,20 @@ from typing import Any, Final
 
 from fireworld import __version__
 from fireworld.errors import LogError, expected
-from fireworld.forks.decisions import RecordedDecisions, ToldPolicy, check_same_luck
+from fireworld.forks.decisions import FIRST_ACTION, RecordedDecisions, ToldPolicy, check_same_luck, in_words, possible
 from fireworld.forks.resume import Resumed
-from fireworld.kernels.observation import can_choose
 from fireworld.policy.names import TEAM_ATTACHMENT, NamedPolicy
-from fireworld.policy.protocol import Decision
-from fireworld.records import ACTIONS, Recording, RunHeader, StepRecord
+from fireworld.policy.protocol import Decision, Observation
+from fireworld.records import CityRecord, Recording, RunHeader, StepRecord
 from fireworld.runs import Run
 from fireworld.world.observer import Observer
+from fireworld.world.state import copy_world
 from fireworld.world.world import World
 
 FORK_ATTACHMENT: Final = "fork.json"
 """What a recording calls the list of its forks, the oldest first."""
+NAMED_MAX: Final = 8
+"""Buildings that an error names at most."""
 
 
 @dataclass(frozen=True)
@@ -41,12 +44,12 @@ class Change:
 
     Attributes:
         named: the policy that goes on.
-        decided: actions by brigade, for the first step after the fork.
+        decided: decisions by brigade, for the first step after the fork.
         swaps: brigades that take another run's decisions, to the end.
     """
 
     named: NamedPolicy
-    decided: Mapping[int, int] = field(default_factory=dict)
+    decided: Mapping[int, Decision] = field(default_factory=dict)
     swaps: Sequence[Swap] = ()
 
 
@@ -85,8 +88,11 @@ def prepare_fork(
     """
     world, header = resumed.world, recording.header
     _check_not_over(world, source)
-    for brigade in change.decided:
-        _check_decides(world, brigade, recording)
+    if change.decided:
+        asked = _asked_next(world)
+        for brigade, decision in change.decided.items():
+            _check_decides(world, brigade, recording, asked)
+            _check_possible(world, brigade, decision, recording.city, asked[brigade])
     for swap in change.swaps:
         _check_swap(world, swap, header, source)
     step = world.step_number
@@ -95,11 +101,11 @@ def prepare_fork(
     def told(brigade: int, now: int) -> Decision | None:
         if brigade in swapped:
             return swapped[brigade].at(now, brigade)
-        return Decision(change.decided[brigade]) if now == step + 1 and brigade in change.decided else None
+        return change.decided.get(brigade) if now == step + 1 else None
 
     attachments = {name: data for name, data in header.attachments.items() if name != TEAM_ATTACHMENT}
     attachments |= change.named.attachments
-    attachments[FORK_ATTACHMENT] = _told_forks(header, _in_words(change, digest=digest, step=step))
+    attachments[FORK_ATTACHMENT] = _told_forks(header, _told(change, recording.city, digest=digest, step=step))
     return Fork(
         header=replace(
             header,
@@ -129,17 +135,50 @@ def _check_brigade(option: str, brigade: int, n_brigades: int) -> None:
         raise LogError(expected(option, "brigade", f"a number from 0 to {n_brigades - 1}", brigade))
 
 
-def _check_decides(world: World, brigade: int, recording: Recording) -> None:
+class _Asked:
+    """Asked for decisions, it remembers what was seen."""
+
+    def __init__(self) -> None:
+        self.seen: dict[int, Observation] = {}
+
+    def decide(self, observation: Observation) -> Decision:
+        _ = observation.burning  # what burns where it stands now: the arrays behind it change within the step
+        self.seen[observation.brigade] = observation
+        return FIRST_ACTION
+
+
+def _asked_next(world: World) -> dict[int, Observation]:
+    """Return what the brigades that are asked in the next step see then; the world stays as it is."""
+    ahead, asked = copy.copy(world), _Asked()
+    ahead.arrays = copy_world(world.arrays)
+    ahead.step(asked)
+    return asked.seen
+
+
+def _check_decides(world: World, brigade: int, recording: Recording, asked: Mapping[int, Observation]) -> None:
     """Refuse a decision that would not be asked for, and so change nothing."""
     _check_brigade("--decide", brigade, world.n_brigades)
-    # Before the first step nobody has looked for fires yet, and everybody can choose.
-    if world.step_number and not can_choose(brigade, world.arrays.brigades, world.arrays.sites):
+    if brigade not in asked:
         got = "one that is dead" if world.arrays.brigades.hp[brigade] <= 0 else "one that refills"
         wanted = f"a brigade that decides in step {world.step_number + 1}"
         actions = zip(recording.steps.tolist(), recording.ragged("/decisions", "action"), strict=True)
         later = [step for step, made in actions if step > world.step_number and made[brigade] >= 0]
         hint = f"it decides again in step {later[0]}: try --at {later[0] - 1}" if later else ""
         raise LogError(expected("--decide", str(brigade), wanted, got, hint))
+
+
+def _check_possible(world: World, brigade: int, decision: Decision, city: CityRecord, seen: Observation) -> None:
+    """Refuse a target that no policy could name."""
+    if possible(decision, seen):
+        return
+    burns = 1 <= world.arrays.fire.fieryness[decision.target] <= 3
+    wanted = f"a building that burns in the brigade's fire site in step {seen.step}"
+    got = f"{city.building_id[decision.target]}, which {'burns in another one' if burns else 'does not burn'}"
+    burning = sorted(city.building_id[seen.burning].tolist())
+    more = f" or {len(burning) - NAMED_MAX} more" if len(burning) > NAMED_MAX else ""
+    raise LogError(
+        expected("--decide", str(brigade), wanted, got, f"try {', '.join(map(str, burning[:NAMED_MAX]))}{more}")
+    )
 
 
 def _check_swap(world: World, swap: Swap, header: RunHeader, source: str) -> None:
@@ -150,13 +189,13 @@ def _check_swap(world: World, swap: Swap, header: RunHeader, source: str) -> Non
         raise LogError(expected("--swap", swap.name, wanted, f"one that ends at step {swap.decisions.last_step}"))
 
 
-def _in_words(change: Change, *, digest: str, step: int) -> dict[str, Any]:
+def _told(change: Change, city: CityRecord, *, digest: str, step: int) -> dict[str, Any]:
     """Say what a fork changed, in plain values."""
     return {
         "from": digest,
         "step": step,
         "policy": change.named.name,
-        "decide": {str(brigade): ACTIONS[action] for brigade, action in sorted(change.decided.items())},
+        "decide": {str(brigade): in_words(decision, city) for brigade, decision in sorted(change.decided.items())},
         "swap": {str(swap.brigade): swap.digest for swap in sorted(change.swaps, key=lambda swap: swap.brigade)},
     }
 

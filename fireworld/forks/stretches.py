@@ -21,8 +21,19 @@ class Stretch:
 
     def __str__(self) -> str:
         """Say it, as in "nearest-to-me instead of easiest"."""
+        return self.in_words()
+
+    def in_words(self, targets: Sequence[int] = ()) -> str:
+        """Say it with the buildings that the brigade names itself, as in "own-target:301 instead of easiest".
+
+        Args:
+            targets: their ids; of several only the number is said.
+        """
+        now = ACTION_NAMES[self.action]
+        if targets:
+            now = f"{now}:{targets[0]}" if len(targets) == 1 else f"{now} ({len(targets)} buildings)"
         before = ["other targets" if action == self.action else ACTION_NAMES[action] for action in self.instead_of]
-        return f"{ACTION_NAMES[self.action]} instead of {' or '.join(before)}"
+        return f"{now} instead of {' or '.join(before)}"
 
     @property
     def n_steps(self) -> int:

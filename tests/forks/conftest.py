@@ -9,6 +9,9 @@ from functools import partial
 
 import pytest
 
+from fireworld.city.plan_file import dump_plan
+from fireworld.placement import scenario_plan
+from fireworld.scenario import load_scenario
 from recorder.reader import open_log
 from recorder.writer import LogWriter
 from tests import command_line
@@ -71,11 +74,29 @@ def write_log(path, log, records, *, force=False):
             writer.write(record)
 
 
+@pytest.fixture(scope="session")
+def two_fires(recordings):
+    """A run in a town whose buildings have ids 100 above their places, with a fire in two of its corners."""
+    plan = dump_plan(scenario_plan(load_scenario("quick")))
+    buildings = [building | {"id": building["id"] + 100} for building in plan["buildings"]]
+    (recordings / "town.json").write_text(json.dumps({"buildings": buildings}))
+    (recordings / "town.yaml").write_text(
+        "preset: paper\ncity: {file: town.json}\nbrigades: {n: 2}\nsteps: 12\n"
+        "fires: [{buildings: [101, 102, 103, 112]}, {buildings: [167, 176, 177, 178]}]\n"
+    )
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        take_folder(recordings, monkeypatch)
+        words = ("run", "town.yaml", "--policy", "easiest", "--record", "two-fires.mcap")
+        done = command_line.call(monkeypatch, *words)
+    assert done.code == 0, done.err
+    return recordings / "two-fires.mcap"
+
+
 @pytest.fixture
-def here(tmp_path, monkeypatch, recordings):
+def here(tmp_path, monkeypatch, recordings, two_fires):
     """An empty folder to work in, beside which the recordings lie; what is imported from it is forgotten again."""
     take_folder(tmp_path, monkeypatch)
-    for path in recordings.glob("*.mcap"):
+    for path in (*recordings.glob("*.mcap"), *recordings.glob("town.*")):
         (tmp_path / path.name).symlink_to(path)
     yield tmp_path
     sys.modules.pop("own_policies", None)

@@ -202,6 +202,29 @@ def test_targets_of_its_own(here, answer, other):
     assert known["together"]["share"] == pytest.approx(1.0, abs=0.1)
 
 
+def test_a_stretch_of_one_target_is_what_a_fork_with_that_target_is(here, fireworld, answer):
+    """Between two runs of a team that ranks targets: the words of the answer are those that a fork takes."""
+    answer("run", "quick", "--policy", "best", "--record", "best.mcap")
+    answer("fork", "best.mcap", "--at", 5, "--decide", "1=own-target:44", "--record", "f.mcap")
+    known = answer("explain", "best.mcap", "f.mcap")
+    assert known["goes_on"] == "policy"
+    assert {one["action"] for one in known["stretches"]} == {"own-target"}
+    assert known["worse"]["path"] == "best.mcap"
+    refused = []
+    for one in known["stretches"]:
+        assert (one["first"], one["action"]) == (one["last"], "own-target")
+        (building,) = one["targets"]
+        decide = f"{one['brigade']}=own-target:{building}"
+        fork = fireworld("fork", "best.mcap", "--at", one["first"] - 1, "--decide", decide, "--json")
+        refused.append("which does not burn" in fork.err)
+        score = known["worse"]["score"] if refused[-1] else json.loads(fork.out)["score"]
+        assert one["score"] == score, "what cannot be done is decided by the policy"
+    assert len(set(refused)) == 2
+    (told,) = (one for one in known["stretches"] if one["first"] == 6)
+    assert (told["brigade"], told["targets"], told["share"]) == (1, [44], 1.0)
+    assert "own-target:44 instead of" in fireworld("explain", "best.mcap", "f.mcap").out
+
+
 def test_the_decision_of_a_fork_explains_it_all(here, answer):
     """The fork's policy alone would not have made it; its recorded decisions stand until one is replaced."""
     known = answer("explain", "random.mcap", "chief.mcap", "--budget", 12)

@@ -14,7 +14,7 @@ from fireworld.forks.resume import resume
 from fireworld.policy.asking import begin
 from fireworld.policy.names import load_policy
 from fireworld.policy.team import Team, save_team
-from fireworld.records import ACTIONS, MemoryRecording
+from fireworld.records import ACTION_NAMES, ACTIONS, MemoryRecording
 from fireworld.replay import recorded_stage
 from recorder.chain import Digest
 from recorder.diff import compare
@@ -107,6 +107,28 @@ def test_the_recording_of_a_fork(here, fireworld, answer):
     assert done.code == 1
     assert f"step {step}, choose: brigade {brigade} chose nearest-to-civilian, was easiest" in done.out
     assert f"forked from  {log.digest}:{at}" in fireworld("info", "f.mcap").out
+
+
+def test_a_target_of_its_own(here, fireworld, answer):
+    """Told by the building's id, which here is not its place in the city."""
+    answer("fork", "two-fires.mcap", "--at", 5, "--decide", "1=own-target:167", "--record", "f.mcap")
+    log, fork = open_log("two-fires.mcap"), open_log("f.mcap")
+    (told,) = json.loads(fork.header.attachments["fork.json"])
+    assert told["decide"] == {"1": "own-target:167"}
+    made, was = fork.step(6).decisions, log.step(6).decisions
+    assert (made.action.tolist(), was.action.tolist()) == ([0, ACTION_NAMES.index("own-target")], [0, 0])
+    assert log.city.building_id[made.target].tolist() == [112, 167]
+    assert log.city.building_id[was.target].tolist() == [112, 176]
+    assert {decision(fork, step, 1) for step in range(7, 13)} == {0}, "afterwards the policy decides again"
+    assert fireworld("verify", "f.mcap").code == 0
+    assert "brigade 1 chose own-target, was easiest" in fireworld("diff", "two-fires.mcap", "f.mcap").out
+    assert answer("fork", "f.mcap", "--at", 8)["digest"] == fork.digest
+
+
+def test_a_target_of_its_own_before_the_first_step(here, answer):
+    answer("fork", "two-fires.mcap", "--at", 0, "--decide", "1=own-target:167", "--record", "f.mcap")
+    log = open_log("f.mcap")
+    assert log.city.building_id[log.step(1).decisions.target[1]] == 167
 
 
 def test_another_policy_takes_over(here, answer):
@@ -237,6 +259,26 @@ def test_mistakes(here, fireworld, words):
     assert (done.code, done.out) == (2, "")
     assert WRONG[words] in done.err
     assert not list(here.glob("f.mcap*")), "nothing half-written"
+
+
+WRONG_TARGETS = {
+    "0=own-target": "--decide: 0: expected a building behind own-target, as in own-target:301, got 'own-target'",
+    "0=own-target:": "--decide: 0: expected a building behind own-target, as in own-target:301, got 'own-target:'",
+    "0=own-target:-1": "expected a building behind own-target, as in own-target:301, got 'own-target:-1'",
+    "0=own-target:7": "--decide: 0: expected the id of a building of two-fires.mcap, 100 to 179, got 'own-target:7'",
+    "0=easiest:112": "--decide: 0: expected easiest without a building, got 'easiest:112'; a brigade goes for a ",
+    "0=own": "nearest-to-me, own-target, got 'own'; try own-target",
+    "0=own-target:101": "that burns in the brigade's fire site in step 6, got 101, which does not burn; try 112",
+    "1=own-target:112": "in step 6, got 112, which burns in another one; try 167, 176",
+}
+
+
+@pytest.mark.parametrize("words", WRONG_TARGETS)
+def test_targets_that_cannot_be(here, fireworld, words):
+    done = fireworld("fork", "two-fires.mcap", "--at", 5, "--decide", words, "--record", "f.mcap")
+    assert (done.code, done.out, done.err.count("\n")) == (2, "", 1)
+    assert WRONG_TARGETS[words] in done.err
+    assert not list(here.glob("f.mcap*"))
 
 
 def test_a_decision_of_one_who_has_none(here, fireworld):

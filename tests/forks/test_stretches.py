@@ -86,6 +86,15 @@ def test_other_targets_of_its_own_are_other_decisions():
     assert str(stretch) == "own-target instead of other targets or easiest"
 
 
+def test_targets_of_its_own_in_words():
+    made = decisions("41444", targets=[7, 3, 5, 7, 8])
+    assert made.targets(0, first=1, last=5) == [7, 5, 8]
+    assert made.targets(0, first=2, last=2) == []
+    stretch = Stretch(0, 1, 5, 4, (0, 4))
+    assert stretch.in_words([301]) == "own-target:301 instead of easiest or other targets"
+    assert stretch.in_words([301, 4]) == "own-target (2 buildings) instead of easiest or other targets"
+
+
 def test_where_nothing_is_recorded_the_last_action_goes_on():
     made = decisions("-2--")
     assert made.made(1, 0) is None

@@ -15,6 +15,9 @@ import numpy as np
 import pytest
 
 from fireworld.errors import ViewError
+from fireworld.policy.files import load_team_file
+from fireworld.policy.preferences import sentences
+from fireworld.policy.ranking import OF_BRIGADE, OF_BUILDING, OF_TEAM, WEIGHTS
 from tests.cli.conftest import here  # noqa: F401 - a folder with policies in it
 from tests.command_line import call
 from tests.training.conftest import SHORT_WORDS, TINY
@@ -255,12 +258,6 @@ def test_both_at_once(here, fireworld, words):  # noqa: F811
     assert "--view and --view-url exclude each other." in done.err
 
 
-def test_a_search_is_not_shown(here, fireworld):  # noqa: F811
-    done = fireworld("train", "-o", "a.npz", "--method", "search", "--view")
-    assert done.code == 2
-    assert "--view: a search has no episodes to show" in done.err
-
-
 def test_a_watched_training_is_the_same_training(here, fireworld, window):  # noqa: F811
     (here / "tiny.yaml").write_text(TINY)
     assert fireworld(*TRAIN, "alone.npz").code == 0
@@ -278,8 +275,72 @@ def test_a_watched_training_is_the_same_training(here, fireworld, window):  # no
     assert seen["/plots/score"]["Scalars:scalars"]
 
 
+SEARCH_FIGURES = ("n_generations=3", "n_candidates=4", "n_best=2", "n_fires=2", "n_steps_max=10")
+SEARCH = ("train", "tiny.yaml", "--method", "search", *(word for one in SEARCH_FIGURES for word in ("--set", one)))
+
+
+def test_a_watched_search_is_the_same_search(here, fireworld, window):  # noqa: F811
+    (here / "tiny.yaml").write_text(TINY)
+    alone = fireworld(*SEARCH, "-o", "alone.npz")
+    assert alone.code == 0
+    done = fireworld(*SEARCH, "-o", "seen.npz", "--view")
+    assert (done.code, done.err) == (0, alone.err)
+    assert (here / "seen.npz").read_bytes() == (here / "alone.npz").read_bytes()
+    seen = read_all(window)
+    told = [line.split(", ") for line in alone.err.splitlines()]
+    assert len(told) == 3
+    for path, words, digits in (
+        ("/score/seed\\ 1\\,\\ all", [line[1].removeprefix("score ") for line in told], 3),
+        ("/score/seed\\ 1\\,\\ the\\ best", [line[2].removeprefix("of the best ") for line in told], 3),
+        ("/spread/seed\\ 1", [line[3].removeprefix("spread ") for line in told], 2),
+    ):
+        drawn = seen[path]["Scalars:scalars"]
+        assert [f"{row.as_py()[0]:.{digits}f}" for _, row in drawn] == words, path
+        assert [number for number, _ in drawn] == [1, 2, 3], path
+    team = load_team_file(here / "seen.npz")
+    names = [*OF_BUILDING, *OF_BRIGADE, *OF_TEAM]
+    assert weights_drawn(seen, seed=1) == dict(zip((one.name for one in names), team.weights[0], strict=False))
+    pages = [row.as_py()[0] for _, row in seen["/page/1"]["TextDocument:text"]]
+    assert [page.splitlines()[0] for page in pages] == [f"# Generation {k} of 3" for k in (1, 2, 3)]
+    assert all(f"* {sentence}\n" in pages[-1] for sentence in sentences(team, row=0))
+    assert all(f"* **{one.name}**: {one.meaning}\n" in pages[-1] for one in names)
+
+
+def weights_drawn(seen: dict[str, rrd.Rows], *, seed: int) -> dict[str, float]:
+    """The last point of every curve of weights of a search, by the name of the curve."""
+    drawn = {path: rows for path, rows in seen.items() if path.startswith(f"/weights/{seed}/")}
+    lasts = {path: rows["Scalars:scalars"][-1] for path, rows in drawn.items()}
+    assert {number for number, _ in lasts.values()} == {3}
+    return {drawn[path]["SeriesLines:names"][0][1].as_py()[0]: row.as_py()[0] for path, (_, row) in lasts.items()}
+
+
+def test_only_weights_that_are_searched_for_are_drawn(here, fireworld, window):  # noqa: F811
+    (here / "tiny.yaml").write_text(TINY)
+    words = ("--set", "cooperation=false", "--set", "own_targets=false", "--repetitions", 2)
+    assert fireworld(*SEARCH, *words, "-o", "seen.npz", "--view").code == 0
+    seen = read_all(window)
+    for seed in (1, 2):
+        weights = load_team_file(here / f"seen-{seed}.npz").weights[0]
+        names = [weight.name for weight in WEIGHTS]
+        free = dict(zip(names, weights, strict=True))
+        for one in OF_TEAM:
+            assert free.pop(one.name) == 0
+        assert weights_drawn(seen, seed=seed) == free
+        last = seen[f"/page/{seed}"]["TextDocument:text"][-1][1].as_py()[0]
+        assert ("**nearest-to-me**" in last, "**others_here**" in last) == (True, False)
+
+
+def test_a_viewer_closed_in_mid_search(here, fireworld, monkeypatch):  # noqa: F811
+    (here / "tiny.yaml").write_text(TINY)
+    assert fireworld(*SEARCH, "-o", "alone.npz").code == 0
+    monkeypatch.setattr(live, "own_window", lambda: live.Screen(DYING, stays=True))
+    done = fireworld(*SEARCH, "-o", "seen.npz", "--view")
+    assert (done.code, NOTE in done.err) == (0, True)
+    assert (here / "seen.npz").read_bytes() == (here / "alone.npz").read_bytes()
+
+
 def read_all(path: Path) -> dict[str, rrd.Rows]:
-    """Read a file of several recordings, on whatever timeline."""
+    """Read a file of several recordings, each on its timeline; what is there always has no number."""
     from collections import defaultdict
 
     from rerun.chunk import RrdReader
@@ -289,7 +350,8 @@ def read_all(path: Path) -> dict[str, rrd.Rows]:
     for store in reader.recordings():
         for chunk in reader.stream(store=store):
             batch = chunk.to_record_batch()
+            times = [batch.column(name).to_pylist() for name in chunk.timeline_names] or [[None] * chunk.num_rows]
             for name in batch.schema.names:
                 if "RowId" not in name and name not in chunk.timeline_names:
-                    found[chunk.entity_path][name].extend((None, row) for row in batch.column(name))
+                    found[chunk.entity_path][name].extend(zip(times[0], batch.column(name), strict=True))
     return found

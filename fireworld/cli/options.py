@@ -1,0 +1,30 @@
+"""Options that several commands have."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+import click
+
+SEED_MAX: Final = 2**32 - 1
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+seed_option = click.option(
+    "--seed", default=1, show_default=True, type=click.IntRange(0, SEED_MAX), help="Seed of all luck."
+)
+steps_option = click.option(
+    "--steps", type=click.IntRange(min=1), help="Stop after this step.  [default: the scenario's]"
+)
+settings_option = click.option(
+    "--set", "settings", metavar="KEY=VALUE", multiple=True, help="Set a key of the scenario; repeatable."
+)
+
+
+def record_options(command: Command) -> Command:
+    """Add --record and --force to a command."""
+    record = click.option(
+        "--record", "output", metavar="FILE.mcap", type=click.Path(path_type=Path), help="Record every step to a file."
+    )
+    return record(click.option("--force", is_flag=True, help="Replace an existing recording.")(command))

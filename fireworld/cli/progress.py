@@ -1,0 +1,65 @@
+"""Progress on the error stream, where people watch it; it leaves nothing behind."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, ProgressColumn
+
+BAR: Final = "<bar>"
+COUNT: Final = "<count>"
+ELAPSED: Final = "<elapsed>"
+LEFT: Final = "<left>"
+"""Columns that are not words: a bar, how many of how many, the time so far, the time left."""
+DESCRIPTION: Final = "{task.description}"
+"""The column that says what a bar is about."""
+
+
+def is_watched() -> bool:
+    """Tell whether people watch the error stream."""
+    from rich.console import Console
+
+    return Console(stderr=True).is_terminal
+
+
+@contextmanager
+def bars(*columns: str, quiet: bool = False) -> Iterator[Progress]:
+    """Show bars, one for each task that is added; nothing where nobody watches.
+
+    Args:
+        columns: what a bar has from left to right: words, with what they tell of the task in braces, and BAR and the
+            like. Rich's own if none are named.
+        quiet: show nothing in any case.
+    """
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(stderr=True)
+    made = [_column(column) for column in columns]
+    with Progress(*made, console=console, transient=True, disable=quiet or not console.is_terminal) as progress:
+        yield progress
+
+
+@contextmanager
+def bar(what: str, total: int, *columns: str, quiet: bool = False) -> Iterator[Callable[[], None]]:
+    """Show one bar, as `bars`, and give what is to be called after each of its parts.
+
+    Args:
+        what: its description.
+        total: how many parts it has.
+        columns: as for `bars`.
+        quiet: show nothing in any case.
+    """
+    with bars(*columns, quiet=quiet) as progress:
+        task = progress.add_task(what, total=total)
+        yield lambda: progress.advance(task)
+
+
+def _column(name: str) -> ProgressColumn:
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    kinds = {BAR: BarColumn, COUNT: MofNCompleteColumn, ELAPSED: TimeElapsedColumn, LEFT: TimeRemainingColumn}
+    return kinds[name]() if name in kinds else TextColumn(name)

@@ -1,0 +1,34 @@
+"""Plain tables in the terminal: a head, a line, rows; what does not fit is folded."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+
+def print_table(
+    head: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    *,
+    left: Collection[int] = (0,),
+    whole: Collection[int] = (),
+    narrow: bool = False,
+) -> None:
+    """Print a table.
+
+    Args:
+        head: what stands above the columns.
+        rows: cells.
+        left: places of the columns that are set to the left; the others are set to the right.
+        whole: places of the columns whose cells stay on one line as long as possible.
+        narrow: with little space between the columns.
+    """
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE, show_edge=False, pad_edge=False, padding=(0, 0 if narrow else 1))
+    for place, name in enumerate(head):
+        table.add_column(name, justify="left" if place in left else "right", no_wrap=place in whole, overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    Console(highlight=False, markup=False).print(table)
