@@ -14,6 +14,8 @@ UNCHAINED: Final = frozenset({Snapshot.topic, Commit.topic})
 SCENE_PREFIX: Final = "/scene/"
 """What the topics begin with that show a step to other tools: derived from it, not chained, any number in a step."""
 
+_PARTS: Final = [(topic.topic, topic.topic[1:]) for topic in STEP_TOPICS]
+
 
 class Chain:
     """Hashes of a run as its messages come by.
@@ -24,7 +26,7 @@ class Chain:
 
     def __init__(self, city: Buffer) -> None:
         self.hash = hashlib.sha256(FORMAT.encode() + bytes(city)).digest()
-        self._next = hashlib.sha256(self.hash)
+        self._parts: list[Buffer] = []  # of the step under way: one long call of the hash beats many short ones
 
     def add(self, topic: str, data: Buffer) -> None:
         """Take in a message of the step under way; those of UNCHAINED topics and of the scene are left out."""
@@ -35,18 +37,18 @@ class Chain:
         """Seal the step under way and return its commit."""
         open_commit = Commit(step=step, terminated=terminated, truncated=truncated, hash=b"")
         self._update(Commit.topic, encode(open_commit))
-        self.hash = self._next.digest()
-        self._next = hashlib.sha256(self.hash)
+        self.hash = hashlib.sha256(b"".join((self.hash, *self._parts))).digest()
+        self._parts.clear()
         return Commit(step=step, terminated=terminated, truncated=truncated, hash=self.hash)
 
     def _update(self, topic: str, data: Buffer) -> None:
-        self._next.update(b"%b\0%b" % (topic.encode(), len(data).to_bytes(8, "little")))
-        self._next.update(data)
+        self._parts += (topic.encode(), b"\0", len(data).to_bytes(8, "little"), data)
 
 
 def step_messages(record: StepRecord) -> list[tuple[str, bytes]]:
     """Encode the topics of a step in the order in which things happen, without snapshot and commit."""
-    return [(topic.topic, encode(getattr(record, topic.topic[1:]))) for topic in STEP_TOPICS]
+    parts = vars(record)
+    return [(topic, encode(parts[name])) for topic, name in _PARTS]
 
 
 class Digest:

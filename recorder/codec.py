@@ -6,6 +6,7 @@ library writes: fields by rising number, zeros and empty arrays left out.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import math
 import struct
@@ -22,6 +23,7 @@ RecordType = TypeVar("RecordType")
 Buffer = bytes | memoryview
 
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
+_WIDTHS: Final = {_FIXED64: 8, _FIXED32: 4}
 _WIRE_TYPES: Final = {"double": 1, "fixed64": 1, "float": 5, "sfixed32": 5, "uint8": 0, "bool": 0}
 _STRUCTS: Final = {
     "double": struct.Struct("<d"),
@@ -38,7 +40,6 @@ class _Slot(NamedTuple):
     """How one field travels."""
 
     name: str
-    tag: bytes
     wire: str
     wire_type: int
     dtype: np.dtype[Any] | None  # of an array; None for a single value
@@ -56,30 +57,35 @@ def varint(number: int) -> bytes:
     return bytes(parts)
 
 
-_LAYOUTS: Final[dict[type[Any], dict[int, _Slot]]] = {}
+class _Layout(NamedTuple):
+    """How the records of one type travel."""
+
+    slots: dict[int, _Slot]  # by rising field number
+    plan: list[tuple[Any, ...]]  # what `encode` needs of each; plain tuples, because named ones unpack slowly
 
 
-def _layout(record_type: type[Any]) -> dict[int, _Slot]:
-    """Return the slots of a record type by rising field number; worked out once."""
+_LAYOUTS: Final[dict[type[Any], _Layout]] = {}
+
+
+def _layout(record_type: type[Any]) -> _Layout:
+    """Return the layout of a record type; worked out once."""
     layout = _LAYOUTS.get(record_type)
     if layout is None:
         layout = _LAYOUTS[record_type] = _make_layout(record_type)
     return layout
 
 
-def _make_layout(record_type: type[Any]) -> dict[int, _Slot]:
+def _make_layout(record_type: type[Any]) -> _Layout:
     zeros = {"string": "", "bytes": b"", "bool": False, "double": 0.0, "float": 0.0}
-    layout = {}
+    layout = _Layout({}, [])
     for item in sorted(message_of(record_type).fields, key=lambda field: field.number):
         wire_type = _BYTES if item.repeated else _WIRE_TYPES.get(item.wire, _BYTES)
-        layout[item.number] = _Slot(
-            name=item.name,
-            tag=varint(item.number << 3 | wire_type),
-            wire=item.wire,
-            wire_type=wire_type,
-            dtype=np.dtype(DTYPES[item.wire]) if item.repeated else None,
-            zero=zeros.get(item.wire, 0),
-        )
+        tag = varint(item.number << 3 | wire_type)
+        dtype = np.dtype(DTYPES[item.wire]) if item.repeated else None
+        packing = None if item.repeated else _STRUCTS.get(item.wire)
+        absent = packing.pack(0) if packing else b""
+        layout.slots[item.number] = _Slot(item.name, item.wire, wire_type, dtype, zeros.get(item.wire, 0))
+        layout.plan.append((item.name, tag, item.wire, dtype, item.wire == "uint8", packing, absent))
     return layout
 
 
@@ -90,30 +96,27 @@ def encode(record: Any) -> bytes:
         ValueError: an array is not one-dimensional, or a value does not fit its declared type.
     """
     parts: list[bytes] = []
-    for slot in _layout(type(record)).values():
-        value = getattr(record, slot.name)
-        if slot.dtype is not None:
-            if len(value) == 0:
+    values = vars(record)
+    for name, tag, wire, dtype, small, packing, absent in _layout(type(record)).plan:
+        value = values[name]
+        if dtype is not None:
+            body = value.tobytes() if value.dtype is dtype and value.ndim == 1 else _cast(value, dtype, name)
+            if not body:
                 continue
-            body = (
-                value.tobytes()
-                if value.dtype is slot.dtype and value.ndim == 1
-                else _cast(value, slot.dtype, slot.name)
-            )
-            if slot.wire == "uint8" and not body.isascii():
-                raise ValueError(f"{slot.name}: a value above 127 in a uint8 column")
-            parts += (slot.tag, varint(len(body)), body)
-        elif slot.wire_type == _BYTES:
-            body = value.encode() if slot.wire == "string" else value
-            if body:
-                parts += (slot.tag, varint(len(body)), body)
-        else:
+            if small and not body.isascii():
+                raise ValueError(f"{name}: a value above 127 in a uint8 column")
+            parts += (tag, varint(len(body)), body)
+        elif packing is not None:
             try:
-                body = _STRUCTS[slot.wire].pack(value)
+                body = packing.pack(value)
             except struct.error as error:
-                raise ValueError(f"{slot.name}: {value!r} does not fit {slot.wire}") from error
-            if any(body):
-                parts += (slot.tag, body)
+                raise ValueError(f"{name}: {value!r} does not fit {wire}") from error
+            if body != absent:
+                parts += (tag, body)
+        else:
+            body = value.encode() if wire == "string" else value
+            if body:
+                parts += (tag, varint(len(body)), body)
     return b"".join(parts)
 
 
@@ -178,6 +181,27 @@ def walk(data: Buffer) -> Iterator[tuple[int, int, Any]]:
         position += length
 
 
+def long_fields(data: Buffer, n_bytes: int) -> list[tuple[int, int]]:
+    """List where the fields of at least that many bytes begin and end, up to the first that is no protobuf field."""
+    found: list[tuple[int, int]] = []
+    position, end = 0, len(data)
+    with contextlib.suppress(LogError):
+        while position < end:
+            start = position
+            tag, position = _read_varint(data, position)
+            wire_type = tag & 7
+            if wire_type == _BYTES:
+                length, position = _read_varint(data, position)
+                position += length
+            elif wire_type == _VARINT:
+                _, position = _read_varint(data, position)
+            else:
+                position += _WIDTHS.get(wire_type, end)  # an unknown type ends the search
+            if n_bytes <= position - start and position <= end:
+                found.append((start, position))
+    return found
+
+
 def _read(slot: _Slot, wire_type: int, raw: Any) -> Any:
     if wire_type != slot.wire_type:
         raise LogError(f"{slot.name}: expected wire type {slot.wire_type}, got {wire_type}")
@@ -210,7 +234,7 @@ def decode(record_type: type[RecordType], data: Buffer) -> RecordType:
     Raises:
         LogError: the bytes are not a message of this type.
     """
-    layout = _layout(record_type)
+    layout = _layout(record_type).slots
     values: dict[str, Any] = {}
     for number, wire_type, raw in walk(data):
         slot = layout.get(number)
@@ -231,7 +255,7 @@ def decode_field(record_type: type[Any], number: int, data: Buffer) -> Any:
     Raises:
         LogError: the bytes are not a message of this type.
     """
-    slot = _layout(record_type)[number]
+    slot = _layout(record_type).slots[number]
     for found, wire_type, raw in walk(data):
         if found == number:
             return _read(slot, wire_type, raw)
@@ -247,7 +271,8 @@ def encode_snapshot(arrays: Mapping[str, Array]) -> bytes:
         if dtype.str not in _SNAPSHOT_DTYPES:
             raise ValueError(f"{name}: arrays of {dtype} cannot be recorded")
         shape = np.array(array.shape, np.int32)
-        body = encode(NamedArray(name=name, dtype=dtype.str, shape=shape, data=array.astype(dtype).tobytes()))
+        data = array.astype(dtype, copy=False).tobytes()
+        body = encode(NamedArray(name=name, dtype=dtype.str, shape=shape, data=data))
         parts += (b"\x0a", varint(len(body)), body)
     return b"".join(parts)
 

@@ -10,19 +10,17 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final, NamedTuple, Protocol, Self
 
-from mcap.writer import Writer
-
 from fireworld.errors import OutputError, expected
 from fireworld.records import FORMAT, STEP_SECONDS, CityRecord, RunHeader, Snapshot, StepRecord
 from recorder.chain import Chain, step_messages
 from recorder.codec import encode, encode_snapshot
 from recorder.container import CHUNK_BYTES_MAX
+from recorder.container_writer import ContainerWriter
 from recorder.header import METADATA_NAME, PROFILE, to_metadata
 from recorder.schema import PACKAGE, Commit, descriptors
 
 PARTIAL_SUFFIX: Final = ".partial"
 _STEP_NANOSECONDS: Final = STEP_SECONDS * 1_000_000_000
-_CHUNK_BYTES: Final = 1 << 40  # a chunk ends with its step, never before
 CHUNK_PAYLOAD_MAX: Final = CHUNK_BYTES_MAX - (1 << 20)
 """Bytes of the messages of a chunk; the rest is for their heads, and for the schemas in the first one."""
 _MEDIA_TYPES: Final = {".yaml": "application/yaml", ".json": "application/json"}
@@ -82,7 +80,6 @@ class StepFile:
         self.path = path
         self.partial = path.with_name(path.name + (scratch_suffix or PARTIAL_SUFFIX))
         self.n_commits = 0
-        self._n_chunk_bytes = 0
         self._force = force
         self._keep_partial = not scratch_suffix
         self._open = False
@@ -93,18 +90,18 @@ class StepFile:
         with self._guard():
             self._file = self.partial.open("wb" if replace_partial else "xb")
             self._open = True
-            self._writer = Writer(self._file, chunk_size=_CHUNK_BYTES, enable_data_crcs=True)
-            self._writer.start(profile=PROFILE, library=FORMAT)
-            self._writer.add_metadata(METADATA_NAME, dict(metadata))
+            self._writer = ContainerWriter(self._file, profile=PROFILE, library=FORMAT)
+            self._writer.add_metadata(METADATA_NAME, metadata)
             for name in sorted(attachments):
                 media_type = _MEDIA_TYPES.get(Path(name).suffix, "application/octet-stream")
-                self._writer.add_attachment(0, 0, name, media_type, attachments[name])
-            self._channel_ids = {}
-            for channel in channels:
-                schema_id = self._writer.register_schema(channel.schema_name, "protobuf", channel.schema)
-                self._channel_ids[channel.topic] = self._writer.register_channel(channel.topic, "protobuf", schema_id)
-            self._add(CityRecord.topic, city, step=0)
-            self._flush()
+                self._writer.add_attachment(name, media_type, attachments[name])
+            self._channel_ids = {
+                channel.topic: self._writer.register(
+                    channel.topic, schema_name=channel.schema_name, schema=channel.schema, encoding="protobuf"
+                )
+                for channel in channels
+            }
+            self._write(0, [(CityRecord.topic, city)])
 
     def commit(self, step: int, messages: Iterable[tuple[str, bytes]]) -> None:
         """Write the messages of a step, /commit last; when this returns a kill cannot lose them.
@@ -113,9 +110,7 @@ class StepFile:
             OutputError: the disk is full, or another fault of the output.
         """
         with self._guard():
-            for topic, data in messages:
-                self._add(topic, data, step=step)
-            self._flush()
+            self._write(step, messages)
             self.n_commits += 1
 
     def close(self) -> None:
@@ -127,8 +122,7 @@ class StepFile:
         if not self._open:
             return
         with self._guard():
-            self._writer.finish()  # type: ignore[no-untyped-call]
-            self._file.flush()
+            self._writer.finish()
             os.fsync(self._file.fileno())
             self._file.close()
             if not self._force:
@@ -162,18 +156,14 @@ class StepFile:
         """Whether the partial file is worth keeping."""
         return self._keep_partial and self.n_commits > 0
 
-    def _flush(self) -> None:
-        """End the chunk."""
-        self._writer.flush()  # type: ignore[no-untyped-call]
-        self._n_chunk_bytes = 0
-
-    def _add(self, topic: str, data: bytes, *, step: int) -> None:
-        self._n_chunk_bytes += len(data)
-        if self._n_chunk_bytes > CHUNK_PAYLOAD_MAX:  # a reader would refuse it
+    def _write(self, step: int, messages: Iterable[tuple[str, bytes]]) -> None:
+        """Write messages as a chunk."""
+        chunk = [(self._channel_ids[topic], data) for topic, data in messages]
+        n_bytes = sum([len(data) for _, data in chunk])
+        if n_bytes > CHUNK_PAYLOAD_MAX:  # a reader would refuse it
             wanted = f"at most {CHUNK_PAYLOAD_MAX} bytes in a step"
-            raise OutputError(expected(str(self.path), f"step {step}", wanted, f"{self._n_chunk_bytes} bytes"))
-        time = step * _STEP_NANOSECONDS
-        self._writer.add_message(self._channel_ids[topic], time, data, time, step)
+            raise OutputError(expected(str(self.path), f"step {step}", wanted, f"{n_bytes} bytes"))
+        self._writer.write_chunk(chunk, time=step * _STEP_NANOSECONDS, sequence=step)
 
     @contextlib.contextmanager
     def _guard(self) -> Iterator[None]:

@@ -19,9 +19,9 @@ from pathlib import Path
 
 from recorder.writer import LogWriter
 
-N_STEPS = 40
-"""Last step of what the children record."""
-RUN = ("run", "quick", "--policy", "chief", "--steps", str(N_STEPS), "--record")
+N_STEPS = {"writer": 120, "run": 40}
+"""Last step of what the children record, by kind; a step of the writer alone takes a tenth of a millisecond."""
+RUN = ("run", "quick", "--policy", "chief", "--steps", str(N_STEPS["run"]), "--record")
 
 
 def count_safe_steps(counter: mmap.mmap) -> None:
@@ -39,7 +39,7 @@ def make_writer() -> Callable[[Path], None]:
     from tests.recorder import synthetic
 
     city = synthetic.city()
-    records = synthetic.run(N_STEPS, city_record=city)
+    records = synthetic.run(N_STEPS["writer"], city_record=city)
 
     def record(path: Path) -> None:
         with LogWriter(path, synthetic.header(), city) as log:
@@ -63,10 +63,9 @@ def make_run() -> Callable[[Path], None]:
     return record
 
 
-def kill_one(record: Callable[[Path], None], path: Path, counter: mmap.mmap, generator: random.Random) -> bool:
+def kill_one(record: Callable[[Path], None], path: Path, counter: mmap.mmap, step: int, moment_seconds: float) -> bool:
     """Let a child record and kill it a moment after a step of its; return whether it was still alive."""
     counter[0] = 0
-    step, moment_seconds = generator.randrange(N_STEPS), generator.uniform(0, 0.0005)
     child = os.fork()
     if child == 0:
         record(path)
@@ -89,7 +88,8 @@ def main() -> None:
     record(folder / "whole.mcap")
     generator = random.Random(1)  # noqa: S311
     for number in range(n):
-        killed = kill_one(record, folder / f"{number}.mcap", counter, generator)
+        step, moment_seconds = generator.randrange(N_STEPS[kind]), generator.uniform(0, 0.0005)
+        killed = kill_one(record, folder / f"{number}.mcap", counter, step, moment_seconds)
         output.write(json.dumps({"name": f"{number}.mcap", "killed": killed, "n_safe": counter[0]}) + "\n")
 
 

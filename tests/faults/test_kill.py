@@ -12,6 +12,7 @@ from recorder import open_log
 from recorder.recover import recover
 from recorder.verify import verify
 from tests.docs.pages import ROOT
+from tests.faults.nursery import N_STEPS
 
 
 def kill(kind, n, folder):
@@ -54,7 +55,7 @@ def check(path, n_safe, whole):
 def test_a_kill_at_a_random_moment_loses_nothing_that_was_safe(tmp_path, kind, n, n_verified):
     children = kill(kind, n, tmp_path)
     whole = steps_of(open_log(tmp_path / "whole.mcap"))
-    assert len(whole) == 41
+    assert len(whole) == N_STEPS[kind] + 1
     rescued = [check(tmp_path / child["name"], child["n_safe"], whole) for child in children]
     assert sum(child["killed"] for child in children) > n * 0.8
     assert len(set(rescued)) > n // 4, "the kills fell into many different steps"

@@ -195,3 +195,29 @@ def test_decoded_arrays_are_aligned_and_writable(records):
                     assert array.flags.aligned
                     assert array.flags.writeable
                     assert array.dtype == DTYPES[item.wire]
+
+
+def test_long_fields_are_found_where_they_are():
+    message = codec.encode(
+        Buildings(
+            temperature=np.zeros(3, np.float32),
+            energy=np.zeros(30),
+            fuel_share=np.zeros(20, np.float32),
+            water_litres=np.zeros(0, np.int32),
+            fieryness=np.zeros(100, np.uint8),
+        )
+    )
+    # tag and length: 2 bytes each, 3 from 128 bytes on
+    ends = np.cumsum([2 + 12, 3 + 240, 2 + 80, 2 + 100]).tolist()
+    assert len(message) == ends[-1]
+    assert codec.long_fields(message, 100) == [(ends[0], ends[1]), (ends[2], ends[3])]
+    assert codec.long_fields(message[:-1], 100) == [(ends[0], ends[1])]
+    assert codec.long_fields(message, 1000) == []
+
+
+@given(st.binary(max_size=60), st.integers(1, 20))
+def test_long_fields_of_any_bytes_lie_inside_them(data, n_bytes):
+    last = 0
+    for start, end in codec.long_fields(data, n_bytes):
+        assert last <= start <= end - n_bytes <= len(data) - n_bytes
+        last = end

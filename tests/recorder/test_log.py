@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tracemalloc
 from pathlib import Path
+from types import SimpleNamespace
 
 import mcap.reader
 import numpy as np
@@ -203,18 +204,16 @@ def test_exception_before_the_first_step_leaves_nothing(tmp_path, city):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_interrupt_inside_a_step_keeps_the_steps_before(tmp_path, records, city, monkeypatch):
-    calls = iter(range(3))
-
-    def interrupted(*arguments):
-        if next(calls, None) is None:
-            raise KeyboardInterrupt
-        add(*arguments)
+@pytest.mark.parametrize("share_written", [0.0, 0.5])
+def test_interrupt_inside_a_step_keeps_the_steps_before(tmp_path, records, city, monkeypatch, share_written):
+    def interrupted(data):
+        write(data[: int(len(data) * share_written)])
+        raise KeyboardInterrupt
 
     with contextlib.suppress(KeyboardInterrupt), LogWriter(tmp_path / "a.mcap", synthetic.header(), city) as log:
         log.write(records[0])
-        add = log._file._writer.add_message
-        monkeypatch.setattr(log._file._writer, "add_message", interrupted)
+        write = log._file._file.write
+        monkeypatch.setattr(log._file._writer, "_file", SimpleNamespace(write=interrupted))
         log.write(records[1])
     assert not (tmp_path / "a.mcap").exists()
     assert open_log(tmp_path / "a.mcap.partial", partial=True).steps.tolist() == [0]
