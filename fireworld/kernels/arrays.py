@@ -67,9 +67,10 @@ class FireState(NamedTuple):
     fieryness: Array  # (n,) uint8, official code
     air: Array  # (nx + 2, pitch) float64, degrees; a border of zeros around the nx * ny cells
     warm: Array  # (4,) int64, box of the air that may differ from zero: first row, end, first cell, end
+    span: Array  # (2, nx + 2) uint64, cells of each row of the air that may differ from zero: first, end
     rate: Array  # (n,) float64, burn rate of the step where a building burns
     emitted: Array  # (n,) float64, scratch
-    scratch: Array  # (3, pitch) float64, scratch
+    scratch: Array  # (2, pitch) float64, scratch
 
 
 class GeometryTables(NamedTuple):

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from fireworld.kernels.arrays import CityTables, Constants, Learner, PolicyTables, WorldArrays
+from fireworld.kernels.arrays import Array, CityTables, Constants, Learner, PolicyTables, WorldArrays
 from fireworld.kernels.brigades import act, shelter
 from fireworld.kernels.choice import RANK_ALL, RANK_NAMED, choose, keeps_choice, table_state
 from fireworld.kernels.fire import advance_fire, draw_burn_rates
 from fireworld.kernels.health import harm
-from fireworld.kernels.jit import kernel
+from fireworld.kernels.jit import inner, making_arrays
 from fireworld.kernels.learning import choose_and_learn, forget, go_on_and_learn, take_reward, update
 from fireworld.kernels.observation import can_choose, find_target, observe
 from fireworld.kernels.outcome import assess
@@ -20,8 +22,19 @@ FIRST = np.int64(0)
 """Entity number of the first civilian, for the draws; the brigades' follow."""
 
 
-@kernel
-def run_episode(  # noqa: C901, PLR0912, PLR0915 - handing all arrays to functions of its own costs more than the loop
+class EpisodeScratch(NamedTuple):
+    """What the steps of an episode write on; b brigades."""
+
+    features: Array  # (8,) int64
+    action_before: Array  # (b,) int32
+    target_before: Array  # (b,) int32
+    values: Array  # (5,) float64
+    described: Array  # (n, 7) float64; no rows where nobody ranks
+    described_at: Array  # (n,) int64, -1 at first
+
+
+@inner
+def run_steps(  # noqa: C901, PLR0912, PLR0915 - handing all arrays to functions of its own costs more than the loop
     city: CityTables,
     world: WorldArrays,
     constants: Constants,
@@ -30,20 +43,14 @@ def run_episode(  # noqa: C901, PLR0912, PLR0915 - handing all arrays to functio
     seed: int,
     first_step: int,
     last_step: int,
+    scratch: EpisodeScratch,
 ) -> int:
-    """Run steps first_step..last_step, or until nothing burns; return the last step run.
-
-    The phases of `World.step`, without a word to Python in between: for training, comparison and planning. A team that
-    learns ends its episode by learning from its last choices: an episode that terminated is worth nothing more, one
-    that was truncated as much as the choices that would have come next.
-    """
+    """Run the steps of `run_episode`."""
     brigades, fire, people, sites, outcome = world.brigades, world.fire, world.civilians, world.sites, world.outcome
     health, buildings, geometry, streets = constants.health, city.buildings, city.geometry, city.streets
     n_brigades = len(brigades.action)
-    features, before = np.zeros(8, dtype=np.int64), np.zeros(n_brigades, dtype=np.int32)
-    known_before, values = np.full(n_brigades, -1, dtype=np.int32), np.zeros(5)
-    n_described = len(fire.energy) if policy.kind.max() >= RANK_NAMED else 0
-    described, described_at = np.zeros((n_described, N_OF_BUILDING)), np.full(n_described, -1)
+    features, before, known_before = scratch.features, scratch.action_before, scratch.target_before
+    values, described, described_at = scratch.values, scratch.described, scratch.described_at
     learning = learner.learning[0] != 0
     if learning:
         forget(learner)
@@ -116,3 +123,33 @@ def run_episode(  # noqa: C901, PLR0912, PLR0915 - handing all arrays to functio
                     update(brigade, policy.table_of[brigade], 0.0, learner)
             return step
     return last_step
+
+
+@making_arrays
+def run_episode(
+    city: CityTables,
+    world: WorldArrays,
+    constants: Constants,
+    policy: PolicyTables,
+    learner: Learner,
+    seed: int,
+    first_step: int,
+    last_step: int,
+) -> int:
+    """Run steps first_step..last_step, or until nothing burns; return the last step run.
+
+    The phases of `World.step`, without a word to Python in between: for training, comparison and planning. A team that
+    learns ends its episode by learning from its last choices: an episode that terminated is worth nothing more, one
+    that was truncated as much as the choices that would have come next.
+    """
+    n_brigades = len(world.brigades.action)
+    n_described = len(world.fire.energy) if policy.kind.max() >= RANK_NAMED else 0
+    scratch = EpisodeScratch(
+        np.zeros(8, dtype=np.int64),
+        np.zeros(n_brigades, dtype=np.int32),
+        np.zeros(n_brigades, dtype=np.int32),
+        np.zeros(5),
+        np.zeros((n_described, N_OF_BUILDING)),
+        np.full(n_described, -1),
+    )
+    return run_steps(city, world, constants, policy, learner, seed, first_step, last_step, scratch)

@@ -1,4 +1,4 @@
-"""The official fire model: burning, water, air and radiation, one function a phase.
+"""The official fire model: burning, water and radiation, one function a phase; the air is in `air`.
 
 MODEL section 2 in the docs has every equation. All temperatures are degrees above ambient.
 """
@@ -9,6 +9,7 @@ import numpy as np
 from numba import float32
 
 from fireworld.draws import BURN_RATE
+from fireworld.kernels.air import exchange_with_air, spread_air
 from fireworld.kernels.arrays import Array, BuildingTables, CoverTables, FireConstants, FireState, LinkTables
 from fireworld.kernels.draws import normal
 from fireworld.kernels.jit import inner, kernel
@@ -16,9 +17,8 @@ from fireworld.kernels.jit import inner, kernel
 AMBIENT_KELVIN = 293.0
 STEFAN_BOLTZMANN = 5.6704e-8
 LEAST_SHARE = np.float32(0.005)
-ONE, TWO, THREE, FOUR = np.uint32(1), np.uint32(2), np.uint32(3), np.uint32(4)
-PADDING = 5
-"""Cells of a row of air that are no cells of the city: one before, four behind them."""
+BLOCK = np.uint64(64)
+"""Buildings that are passed over at once when they are dry: most are, most of the time."""
 
 
 @inner
@@ -84,131 +84,43 @@ def burn(buildings: BuildingTables, fire: FireState) -> None:
 
 
 @inner
+def is_dry(water: Array, start: int, end: int) -> bool:
+    """Tell whether no water lies on any building of a block."""
+    wet = False
+    for b in range(start, end):
+        wet |= water[b] != 0
+    return not wet
+
+
+@inner
 def cool(buildings: BuildingTables, fire: FireState, constants: FireConstants) -> None:
-    """Let the water lying on hot buildings take heat; MODEL 2.4."""
-    for b in range(len(fire.energy)):
-        litres = fire.water[b]
-        if litres <= 0:
+    """Let the water lying on hot buildings take heat; MODEL 2.4. Whole blocks of dry buildings are passed over."""
+    n = np.uint64(len(fire.energy))
+    for start in range(np.uint64(0), n, BLOCK):
+        end = min(start + BLOCK, n)
+        if is_dry(fire.water, start, end):
             continue
-        heat = fire.energy[b] / buildings.capacity[b] * buildings.capacity[b]  # rounds as T * capacity does
-        if heat > 0.0:
-            burning = is_burning(
-                fire.energy[b],
-                buildings.capacity[b],
-                buildings.ignition_point[b],
-                fire.fuel[b],
-                buildings.inflammable[b],
-            )
-            taken = litres * (constants.water_heat_burning if burning else constants.water_heat_unburnt)
-            used = litres
-            if taken > heat:
-                part = 1.0 - (taken - heat) / taken
-                taken *= part
-                used = int(litres * part)
-            fire.water[b] = litres - used
-            fire.energy[b] -= taken
-
-
-@inner
-def spread_air(fire: FireState, constants: FireConstants) -> None:
-    """Mix every air cell with its eight neighbours and lose some heat; MODEL 2.5. Only the warm rows are touched.
-
-    Heat reaches one cell farther than before, so the warm box first grows by one on every side, within the grid. Works
-    in place: two rows of `scratch` keep the row before and the row itself as they were. Whole rows, one array a row
-    and no bounds but their length: that is what the compiler turns into vector instructions.
-    """
-    air, warm = fire.air, fire.warm
-    if warm[1] <= warm[0]:
-        return
-    flow, kept, flush = constants.air_to_air_flow, constants.air_heat_kept, constants.flush_temperature
-    rows, pitch = air.shape
-    warm[0], warm[1] = max(1, warm[0] - 1), min(rows - 1, warm[1] + 1)
-    warm[2], warm[3] = max(1, warm[2] - 1), min(pitch - PADDING + 1, warm[3] + 1)
-    before, here, sums = fire.scratch[0], fire.scratch[1], fire.scratch[2]
-    for y in range(pitch):
-        before[y] = 0.0
-    for x in range(warm[0], warm[1]):
-        row, after = air[x], air[x + 1]
-        for y in range(len(row)):
-            here[y] = row[y]
-            sums[y] = before[y] + row[y] + after[y]
-        for y in range(len(row) - PADDING):
-            old = here[y + 1]
-            mean = (sums[y] + sums[y + 1] + sums[y + 2] - old) * 0.125
-            warmth = (old + (mean - old) * flow) * kept
-            row[y + 1] = warmth if warmth > flush else 0.0
-        before, here = here, before
-    shrink(air, warm)
-
-
-@inner
-def is_cold(air: Array, x0: int, x1: int, y0: int, y1: int) -> bool:
-    """Tell whether all cells of a block of air are exactly zero."""
-    for x in range(x0, x1):
-        for y in range(y0, y1):
-            if air[x, y] != 0.0:
-                return False
-    return True
-
-
-@inner
-def shrink(air: Array, warm: Array) -> None:
-    """Draw the warm box in to the cells that are not zero."""
-    while warm[0] < warm[1] and is_cold(air, warm[0], warm[0] + 1, warm[2], warm[3]):
-        warm[0] += 1
-    while warm[0] < warm[1] and is_cold(air, warm[1] - 1, warm[1], warm[2], warm[3]):
-        warm[1] -= 1
-    while warm[2] < warm[3] and is_cold(air, warm[0], warm[1], warm[2], warm[2] + 1):
-        warm[2] += 1
-    while warm[2] < warm[3] and is_cold(air, warm[0], warm[1], warm[3] - 1, warm[3]):
-        warm[3] -= 1
-
-
-@inner
-def exchange_with_air(buildings: BuildingTables, cover: CoverTables, fire: FireState, constants: FireConstants) -> None:
-    """Let each building in turn exchange heat with the air cells under it; MODEL 2.6.
-
-    q = (T_cell - T_building) * weight; the cell loses q * cell_share, the building gains the sum. A building without
-    heat over cells without heat is passed over: nothing would change. Four cells go at once, with a sum each, because
-    one sum would make every cell wait for the one before; unsigned indices spare numba's test for negative ones.
-    """
-    energy, air, weight, warm = fire.energy, fire.air, cover.weight, fire.warm
-    share = constants.cell_share
-    first, end, low, high = warm[0], warm[1], warm[2], warm[3]
-    for k in range(len(buildings.order)):
-        b = buildings.order[k]
-        x0, y0 = cover.x0[b], cover.y0[b]
-        x1, y1 = x0 + cover.rows[b], y0 + cover.width[b]
-        if energy[b] == 0.0:
-            if x1 <= first or x0 >= end or y1 <= low or y0 >= high or is_cold(air, x0, x1, y0, y1):
+        for b in range(start, end):
+            litres = fire.water[b]
+            if litres <= 0:
                 continue
-        elif end <= first:
-            first, end, low, high = x0, x1, y0, y1
-        else:
-            first, end, low, high = min(first, x0), max(end, x1), min(low, y0), max(high, y1)
-        temperature = energy[b] / buildings.capacity[b]
-        p = cover.ptr[b]
-        gain_0 = gain_1 = gain_2 = gain_3 = 0.0
-        for x in range(x0, x1):
-            y = y0
-            while y < y1:
-                cell_0, cell_1, cell_2, cell_3 = air[x, y], air[x, y + ONE], air[x, y + TWO], air[x, y + THREE]
-                q_0 = (cell_0 - temperature) * weight[p]
-                q_1 = (cell_1 - temperature) * weight[p + ONE]
-                q_2 = (cell_2 - temperature) * weight[p + TWO]
-                q_3 = (cell_3 - temperature) * weight[p + THREE]
-                air[x, y] = cell_0 - q_0 * share
-                air[x, y + ONE] = cell_1 - q_1 * share
-                air[x, y + TWO] = cell_2 - q_2 * share
-                air[x, y + THREE] = cell_3 - q_3 * share
-                gain_0 += q_0
-                gain_1 += q_1
-                gain_2 += q_2
-                gain_3 += q_3
-                p += FOUR
-                y += FOUR
-        energy[b] += (gain_0 + gain_1) + (gain_2 + gain_3)
-    warm[0], warm[1], warm[2], warm[3] = first, end, low, high
+            heat = fire.energy[b] / buildings.capacity[b] * buildings.capacity[b]  # rounds as T * capacity does
+            if heat > 0.0:
+                burning = is_burning(
+                    fire.energy[b],
+                    buildings.capacity[b],
+                    buildings.ignition_point[b],
+                    fire.fuel[b],
+                    buildings.inflammable[b],
+                )
+                taken = litres * (constants.water_heat_burning if burning else constants.water_heat_unburnt)
+                used = litres
+                if taken > heat:
+                    part = 1.0 - (taken - heat) / taken
+                    taken *= part
+                    used = int(litres * part)
+                fire.water[b] = litres - used
+                fire.energy[b] -= taken
 
 
 @inner

@@ -1,4 +1,4 @@
-"""The two decorators of all kernels: `kernel` for functions that Python calls, `inner` for those only kernels call."""
+"""The decorators of all kernels: `kernel` for functions that Python calls, `inner` for those only kernels call."""
 
 from __future__ import annotations
 
@@ -14,8 +14,13 @@ OPEN: Final = os.environ.get("FIREWORLD_OPEN_KERNELS") == "1"
 
 # float64 as written, kept in the cache folder, without the interpreter's lock. numpy's error model, because a test for
 # zero before each division would keep loops from becoming vector instructions; no kernel divides by what can be zero.
-kernel = njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
-_closed = njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True, no_cpython_wrapper=True)
+_how: Final = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+# Without numba's runtime, `_nrt`, which counts the references to every array: that costs more than a small kernel does,
+# and a kernel makes no arrays. One that did would not compile.
+kernel = njit(**_how, _nrt=False)
+_closed = njit(**_how, _nrt=False, no_cpython_wrapper=True)
+making_arrays = njit(**_how)
+"""For the few kernels that make arrays."""
 
 
 class _Closed(CPUDispatcher):  # type: ignore[misc]  # numba is untyped

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fireworld.draws import RAY
 from fireworld.kernels.draws import hash_key, mix, uniform_of
-from fireworld.kernels.jit import inner, kernel
+from fireworld.kernels.jit import inner, making_arrays
 
 Array = NDArray[Any]
 
@@ -104,7 +104,7 @@ def first_hit(walls: WallTable, grid: WallGrid, source: int, px: int, py: int, r
     return best
 
 
-@kernel
+@making_arrays
 def first_hits(walls: WallTable, grid: WallGrid, source: Array, start: Array, end: Array) -> Array:
     """Find the first wall that each of r given rays meets.
 
@@ -148,7 +148,7 @@ def random_ray(walls: WallTable, w: int, key: np.uint64, range_mm: int) -> tuple
             return px, py, math.floor(x * stretch + 0.5), math.floor(y * stretch + 0.5)
 
 
-@kernel
+@making_arrays
 def count_hits(
     walls: WallTable, grid: WallGrid, building_id: Array, seed: int, range_mm: int
 ) -> tuple[Array, Array, Array]:

@@ -22,16 +22,26 @@ from fireworld.kernels.arrays import (
 from fireworld.parameters import Parameters
 from fireworld.world.tables import air_shape
 
-SCRATCH = {"fire.rate", "fire.emitted", "fire.scratch"} | {
+SCRATCH = {"fire.span", "fire.rate", "fire.emitted", "fire.scratch"} | {
     f"sites.{name}" for name in SiteState._fields if name not in {"counts", "label"}
 }
-"""Arrays whose content does not outlive a step: what a step needs of them, it computes."""
+"""Arrays that no snapshot holds: what a step needs of them, it computes, or `restore_snapshot` makes it anew."""
+
+
+def warm_spans(warm: Array, shape: tuple[int, ...]) -> Array:
+    """Return the spans of the rows of an air array of which only a box may differ from zero; see `FireState`."""
+    rows, pitch = shape
+    span = np.zeros((2, rows), dtype=np.uint64)
+    span[0] = pitch  # a row that is cold: its span starts behind its end
+    span[:, warm[0] : warm[1]] = warm[2:, None]
+    return span
 
 
 def fresh_fire(city: City) -> FireState:
     """Return the fire state of a cold, untouched city."""
     n = city.n_buildings
     rows, pitch = air_shape(city)
+    warm = np.zeros(4, dtype=np.int64)
     return FireState(
         energy=np.zeros(n),
         fuel=city.initial_fuel.astype(np.float32),
@@ -39,10 +49,11 @@ def fresh_fire(city: City) -> FireState:
         watered=np.zeros(n, dtype=np.uint8),
         fieryness=np.zeros(n, dtype=np.uint8),
         air=np.zeros((rows, pitch)),
-        warm=np.zeros(4, dtype=np.int64),
+        warm=warm,
+        span=warm_spans(warm, (rows, pitch)),
         rate=np.zeros(n),
         emitted=np.zeros(n),
-        scratch=np.zeros((3, pitch)),
+        scratch=np.zeros((2, pitch)),
     )
 
 
@@ -196,3 +207,4 @@ def restore_snapshot(world: WorldArrays, snapshot: Mapping[str, Array]) -> None:
             found = "nothing" if held is None else f"{held.dtype} {held.shape}"
             raise LogError(f"snapshot: {name}: expected {array.dtype} {array.shape}, got {found}")
         array[...] = held
+    world.fire.span[...] = warm_spans(world.fire.warm, world.fire.air.shape)
