@@ -32,7 +32,7 @@ N_FIRES_OF_CITY: Final = 8
 LARGER: Final = 1.25
 CURRICULA: Final = {
     "contested": (range(5000, 5010), "Contested fires in ten generated cities, and the same ones a quarter larger."),
-    "unseen": (range(7000, 7005), "The same in five other cities, to test in and not to learn in."),
+    "unseen": (range(7000, 7010), "The same in ten other cities, to test in and not to learn in."),
 }
 """Seeds of the cities and description, by name."""
 

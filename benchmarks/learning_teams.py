@@ -34,6 +34,8 @@ SEED_OF_DISTILLING: Final = 30_000
 """Above the seeds of all tests: the planner that teaches meets other luck."""
 N_BRIGADES: Final = 4
 SEARCH: Final = Search()
+HALF: Final = replace(SEARCH, n_candidates=36, n_best=9, n_fires=32)
+"""A search with half as many fights."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,7 @@ class Size:
     n_trials: int = 3
     """Of the others."""
     search: Search = SEARCH
+    half: Search = HALF
     n_episodes_max: int = 25
     """Of one scenario, where tables learn in many fires."""
     n_scenarios: int | None = None
@@ -54,11 +57,13 @@ class Size:
 
 
 FULL: Final = Size()
+FEW: Final = Search(n_generations=5, n_candidates=16, n_best=4, n_fires=8, n_steps_max=100)
 QUICK: Final = Size(
     n_trainings=2,
     n_rivals=2,
     n_trials=1,
-    search=Search(n_generations=5, n_candidates=16, n_best=4, n_fires=8, n_steps_max=100),
+    search=FEW,
+    half=replace(FEW, n_fires=4),
     n_episodes_max=3,
     n_scenarios=8,
 )
@@ -76,6 +81,11 @@ class Contestant:
     make: Callable[[int, str], KernelPolicy | Policy]
     """From the number of the training, from 1, and the group of fires: the best joint assignment looks at them."""
 
+    @property
+    def rule(self) -> bool:
+        """Whether it neither learns nor plans."""
+        return self.what == RULE_WORDS or self.name == "best-joint"
+
 
 def contestants(size: Size, fires: Fires, folder: Path, grounds: dict[str, Ground]) -> list[Contestant]:
     """List all, rules first.
@@ -90,7 +100,7 @@ def contestants(size: Size, fires: Fires, folder: Path, grounds: dict[str, Groun
     rules = [*ACTIONS, "each-another", "random", "chief"]
     n, some, few = size.n_trainings, size.n_rivals, size.n_trials
     return [
-        *(Contestant(rule, "rule", 1, lambda _, __, rule=rule: BUILT_IN[rule]()) for rule in rules),  # type: ignore[misc]
+        *(Contestant(rule, RULE_WORDS, 1, lambda _, __, rule=rule: BUILT_IN[rule]()) for rule in rules),  # type: ignore[misc]
         Contestant(
             "best-joint",
             "the assignment of one action to each brigade that is best on these very fires",
@@ -106,24 +116,37 @@ def contestants(size: Size, fires: Fires, folder: Path, grounds: dict[str, Groun
         Contestant("distilled-4320", "the planner's values averaged in 4320 states", 1, workshop.distilled(4320)),
         Contestant("linear-270", LINEAR_WORDS.format(270), few, workshop.linear(cooperation=False)),
         Contestant("linear-4320", LINEAR_WORDS.format(4320), few, workshop.linear(cooperation=True)),
-        Contestant(
-            "named-alone",
-            "search, the paper's actions, nobody sees the others",
-            some,
-            workshop.ranking("named", "alone"),
+        *(
+            Contestant(
+                f"named-{sight}",
+                f"search with half the fights, the paper's actions{ALONE_WORDS[sight]}",
+                some,
+                workshop.ranking("named", sight, half=True),
+            )
+            for sight in ALONE_WORDS
         ),
-        Contestant("named-cooperative", "search, the paper's actions", some, workshop.ranking("named", "cooperative")),
-        Contestant("own-alone", "search, own targets, nobody sees the others", n, workshop.ranking("own", "alone")),
+        *(
+            Contestant(
+                f"own-half-{sight}",
+                f"search with half the fights, own targets{ALONE_WORDS[sight]}",
+                some,
+                workshop.ranking("own", sight, half=True),
+            )
+            for sight in ALONE_WORDS
+        ),
+        Contestant("own-alone", f"search, own targets{ALONE_WORDS['alone']}", n, workshop.ranking("own", "alone")),
         Contestant(
             "own-cooperative", "search, own targets: how `best` was made", n, workshop.ranking("own", "cooperative")
         ),
     ]
 
 
+RULE_WORDS: Final = "rule"
 SARSA_WORDS: Final = (
     "SARSA in {} states on the contested fires: reward change, one table, alpha .1, gamma .95, 4 steps a choice"
 )
-LINEAR_WORDS: Final = "search for a weighted sum of the paper's features: a table of {} states"
+ALONE_WORDS: Final = {"alone": ", nobody sees the others", "cooperative": ""}
+LINEAR_WORDS: Final = "search with half the fights for a weighted sum of the paper's features: a table of {} states"
 
 
 @dataclass
@@ -147,13 +170,18 @@ class Workshop:
         )
         return replace(whole, stages=stages)
 
-    def ranking(self, targets: str, sight: str) -> Callable[[int, str], KernelPolicy]:
+    def ranking(self, targets: str, sight: str, *, half: bool = False) -> Callable[[int, str], KernelPolicy]:
         """Search as `fireworld train --method search` does."""
-        search = replace(self.size.search, own_targets=targets == "own", cooperation=sight == "cooperative")
+        name = f"{targets}-half-{sight}" if half else f"{targets}-{sight}"
+        search = replace(
+            self.size.half if half else self.size.search,
+            own_targets=targets == "own",
+            cooperation=sight == "cooperative",
+        )
 
         def make(number: int, group: str) -> KernelPolicy:
             del group
-            path = self.folder / f"{targets}-{sight}-{number}.npz"
+            path = self.folder / f"{name}-{number}.npz"
             run = SearchRun(Searcher(self.curriculum(), search, seed=number, grounds=self.grounds), path)
             run.resume()
             run.run(Event(), n_threads=N_THREADS, report=lambda _, __: None)
@@ -198,7 +226,7 @@ class Workshop:
             del group
             path = self.folder / f"linear-{cooperation}-{number}.npy"
             searcher = TableSearcher(
-                self.curriculum(), replace(self.size.search, cooperation=cooperation), seed=number, grounds=self.grounds
+                self.curriculum(), replace(self.size.half, cooperation=cooperation), seed=number, grounds=self.grounds
             )
             if not path.exists():
                 for _ in searcher.run(n_threads=N_THREADS, stop=Event()):

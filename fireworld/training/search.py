@@ -35,11 +35,11 @@ class Search:
     cooperation: bool = True
     """Brigades see what the others go for; if not, the weights of that are 0."""
     n_generations: int = 14
-    n_candidates: int = 36
+    n_candidates: int = 48
     """Rankings tried in a generation."""
-    n_best: int = 9
+    n_best: int = 12
     """Of them, those that the next generation is drawn around."""
-    n_fires: int = 32
+    n_fires: int = 48
     """Fires of the curriculum that each ranking fights in a generation, all the same ones with the same luck."""
     n_steps_max: int = 150
     """Steps of a fight at most: which fights are lost shows early, and lost ones are the slow ones."""

@@ -21,7 +21,7 @@ def test_the_tables_are_made_of_the_figures():
 
 
 def test_as_much_was_measured_as_it_says():
-    assert FOUND["n_fires"] == {"tests": 3, "contested": 40, "larger": 40}
+    assert FOUND["n_fires"] == {"tests": 3, "contested": 80, "larger": 80}
     assert FOUND["n_seeds"] == 20
     assert TEAMS["own-cooperative"]["n_trainings"] == TEAMS["own-alone"]["n_trainings"] == 20
 
@@ -35,7 +35,7 @@ def test_the_best_is_above_every_rule(group, other):
 def test_what_is_said_of_the_others():
     mean = {name: {group: team[group]["mean"] for group in GROUPS} for name, team in TEAMS.items()}
     assert mean["own-cooperative"]["tests"] > 0.99
-    assert mean["own-cooperative"]["contested"] > 0.85
+    assert mean["own-cooperative"]["contested"] > 0.93
     assert mean["planner"]["tests"] > 0.95
     best_rule = max(mean[rule]["contested"] for rule in (*ACTIONS, "each-another", "random", "chief"))
     for failed in ("paper-cooperative", "paper-noncooperative", "sarsa-fires-4320", "distilled-4320"):
@@ -50,8 +50,9 @@ def test_what_is_said_of_cooperation():
         for key in ("low", "mean")
     )
     assert all(value > 0 for value in mean.values())
-    assert {place for place in PLACES if low[place] > 0} == {("own", "tests"), ("named", "tests"), ("named", "larger")}
+    assert {place for place in PLACES if low[place] <= 0} == {("own", "contested")}
     assert max(mean, key=lambda place: mean[place]) == ("named", "tests")
+    assert DIFFERENCES["own-cooperative", "own-half-cooperative"]["contested"]["low"] > 0
 
 
 PLACES = [(kind, group) for kind in ("own", "named") for group in GROUPS]

@@ -161,7 +161,7 @@ def test_from_the_command_line(here, fireworld):
         (("-o", "a.npz", "--set", "alpha=0.1"), "expected one of own_targets, cooperation"),
         (("-o", "a.npz", "--set", "n_fires=many"), "n_fires: expected a whole number, got 'many'"),
         (("-o", "a.npz", "--set", "cooperation=maybe"), "cooperation: expected true or false, got 'maybe'"),
-        (("-o", "a.npz", "--set", "n_best=60"), "n_best: expected at most n_candidates, 36"),
+        (("-o", "a.npz", "--set", "n_best=60"), "n_best: expected at most n_candidates, 48"),
         (("-o", "a.npz", "--resume"), "expected a checkpoint to go on from"),
         (("-o", "nowhere/a.npz"), "expected a file in an existing folder"),
     ],
