@@ -30,10 +30,6 @@ from fireworld.world.stage import Ground  # noqa: E402
 RESULTS: Final = ROOT / "docs" / "science.json"
 PAGE: Final = ROOT / "docs" / "science.md"
 FIRST_SEED: Final = 1001
-SEEDS_OF_SLOW: Final = {"planner": 3}
-SEEDS_OF_RIVALS: Final = 5
-"""Seeds on the generated fires of what takes long: of what plans, and of what learned, `ALL_SEEDS` apart."""
-ALL_SEEDS: Final = ("own-cooperative", "own-alone")
 BEST: Final = "own-cooperative"
 PAIRS: Final = (
     *((BEST, rule) for rule in ("easiest", "nearest-to-civilian", "nearest-to-center", "nearest-to-me")),
@@ -62,20 +58,13 @@ class Scores:
         return self.shares.mean(axis=2) if per_fire else self.shares.mean(axis=1)
 
 
-def seeds_on_generated(contestant: Contestant, n_seeds: int) -> int:
-    """Return how many seeds a contestant meets on each generated fire."""
-    if contestant.name in ALL_SEEDS or contestant.rule:
-        return n_seeds
-    return min(n_seeds, SEEDS_OF_SLOW.get(contestant.name, SEEDS_OF_RIVALS))
-
-
-def measure(contestant: Contestant, fires: Fires, seeds: range, folder: Path, *, quick: bool) -> dict[str, Scores]:
+def measure(contestant: Contestant, fires: Fires, seeds: range, folder: Path) -> dict[str, Scores]:
     """Train and test a contestant, or fetch what was measured before."""
     found = {}
     for group, stages in fires.items():
         path = folder / f"{contestant.name}-{group}.npy"
         if not path.exists():
-            n_seeds = len(seeds) if quick or group == "tests" else seeds_on_generated(contestant, len(seeds))
+            n_seeds = None if group == "tests" else contestant.n_seeds
             teams = [contestant.make(number, group) for number in range(1, contestant.n + 1)]
             np.save(path, np.array([shares(stages, team, seeds[:n_seeds]) for team in teams]))
         found[group] = Scores(np.load(path))
@@ -164,7 +153,7 @@ def main(*, quick: bool, keep: Path | None, write: bool, only: tuple[str, ...]) 
         for team in teams:
             if only and team.name not in only:
                 continue
-            measured[team.name] = measure(team, fires, seeds, folder / "scores", quick=quick)
+            measured[team.name] = measure(team, fires, seeds, folder / "scores")
             means = ", ".join(f"{group} {scores.shares.mean():.3f}" for group, scores in measured[team.name].items())
             click.echo(f"{team.name}: {means}", err=True)
     if only:

@@ -81,10 +81,8 @@ class Contestant:
     make: Callable[[int, str], KernelPolicy | Policy]
     """From the number of the training, from 1, and the group of fires: the best joint assignment looks at them."""
 
-    @property
-    def rule(self) -> bool:
-        """Whether it neither learns nor plans."""
-        return self.what == RULE_WORDS or self.name == "best-joint"
+    n_seeds: int | None = None
+    """Seeds on each generated fire, None for all: fewer of what takes long."""
 
 
 def contestants(size: Size, fires: Fires, folder: Path, grounds: dict[str, Ground]) -> list[Contestant]:
@@ -97,17 +95,12 @@ def contestants(size: Size, fires: Fires, folder: Path, grounds: dict[str, Groun
         grounds: cities built before.
     """
     workshop = Workshop(size, folder, grounds)
-    rules = [*ACTIONS, "each-another", "random", "chief"]
     n, some, few = size.n_trainings, size.n_rivals, size.n_trials
-    return [
-        *(Contestant(rule, RULE_WORDS, 1, lambda _, __, rule=rule: BUILT_IN[rule]()) for rule in rules),  # type: ignore[misc]
-        Contestant(
-            "best-joint",
-            "the assignment of one action to each brigade that is best on these very fires",
-            1,
-            lambda _, group: best_joint(fires[group]),
-        ),
-        Contestant("planner", "rollouts at run time; the upper bound", 1, lambda _, __: planner()),
+    rules = [
+        Contestant(rule, "rule", 1, lambda _, __, rule=rule: BUILT_IN[rule]())  # type: ignore[misc]  # of a lambda
+        for rule in (*ACTIONS, "each-another", "random", "chief")
+    ]
+    rivals = [
         Contestant("paper-noncooperative", "SARSA as in the paper, 270 states", n, workshop.paper("alone")),
         Contestant("paper-cooperative", "SARSA as in the paper, 4320 states", n, workshop.paper()),
         Contestant("sarsa-fires-270", SARSA_WORDS.format(270), few, workshop.sarsa(cooperation=False)),
@@ -118,34 +111,38 @@ def contestants(size: Size, fires: Fires, folder: Path, grounds: dict[str, Groun
         Contestant("linear-4320", LINEAR_WORDS.format(4320), few, workshop.linear(cooperation=True)),
         *(
             Contestant(
-                f"named-{sight}",
-                f"search with half the fights, the paper's actions{ALONE_WORDS[sight]}",
+                f"{name}-{sight}",
+                f"search with half the fights, {what}{words}",
                 some,
-                workshop.ranking("named", sight, half=True),
+                workshop.ranking(targets, sight, half=True),
             )
-            for sight in ALONE_WORDS
+            for name, what, targets in (("named", "the paper's actions", "named"), ("own-half", "own targets", "own"))
+            for sight, words in SIGHT_WORDS.items()
         ),
-        *(
-            Contestant(
-                f"own-half-{sight}",
-                f"search with half the fights, own targets{ALONE_WORDS[sight]}",
-                some,
-                workshop.ranking("own", sight, half=True),
-            )
-            for sight in ALONE_WORDS
+    ]
+    return [
+        *rules,
+        Contestant(
+            "best-joint",
+            "the assignment of one action to each brigade that is best on these very fires",
+            1,
+            lambda _, group: best_joint(fires[group]),
         ),
-        Contestant("own-alone", f"search, own targets{ALONE_WORDS['alone']}", n, workshop.ranking("own", "alone")),
+        Contestant("planner", "rollouts at run time; the upper bound", 1, lambda _, __: planner(), SEEDS_OF_PLANNER),
+        *(replace(rival, n_seeds=SEEDS_OF_RIVALS) for rival in rivals),
+        Contestant("own-alone", f"search, own targets{SIGHT_WORDS['alone']}", n, workshop.ranking("own", "alone")),
         Contestant(
             "own-cooperative", "search, own targets: how `best` was made", n, workshop.ranking("own", "cooperative")
         ),
     ]
 
 
-RULE_WORDS: Final = "rule"
+SEEDS_OF_PLANNER: Final = 3
+SEEDS_OF_RIVALS: Final = 5
 SARSA_WORDS: Final = (
     "SARSA in {} states on the contested fires: reward change, one table, alpha .1, gamma .95, 4 steps a choice"
 )
-ALONE_WORDS: Final = {"alone": ", nobody sees the others", "cooperative": ""}
+SIGHT_WORDS: Final = {"alone": ", nobody sees the others", "cooperative": ""}
 LINEAR_WORDS: Final = "search with half the fights for a weighted sum of the paper's features: a table of {} states"
 
 
