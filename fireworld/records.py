@@ -19,6 +19,8 @@ Wire = Literal["double", "float", "sfixed32", "fixed64", "uint8", "bool", "strin
 
 FORMAT: Final = "fireworld-log/1"
 STEP_SECONDS: Final = 60
+AIR: Final = "fire.air"
+"""Name of the air in a snapshot: degrees above ambient in a grid, x by y, with a border of equal width all around."""
 SNAPSHOT_EVERY_STEPS: Final = 50
 
 ACTIONS: Final = ("easiest", "nearest-to-civilian", "nearest-to-center", "nearest-to-me")

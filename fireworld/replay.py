@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from fireworld.errors import LogError, expected
 from fireworld.placement import CITY_ATTACHMENT, SCENARIO_ATTACHMENT
 from fireworld.policy.protocol import Action, Decision, Observation
-from fireworld.records import Array, CityRecord, Decisions, Recording, RunHeader, StepRecord
+from fireworld.records import AIR, Array, CityRecord, Decisions, Recording, RunHeader, Snapshot, StepRecord
 from fireworld.scenario import parse_scenario
 from fireworld.world.observer import Observer
 from fireworld.world.stage import Stage, build_stage
@@ -65,13 +66,17 @@ def recorded_stage(header: RunHeader) -> Stage:
 class Replay:
     """A recorded run, run again while it is walked through; a `Recording` that can only be iterated over."""
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, recording: Recording, *, with_air: bool = False) -> None:
         """Build the recorded scenario again.
+
+        Args:
+            recording: of a run.
+            with_air: every step has a snapshot, of the air alone, instead of one now and then of everything.
 
         Raises:
             LogError: the recording lacks its scenario.
         """
-        self._recording = recording
+        self._recording, self._with_air = recording, with_air
         self._stage = recorded_stage(recording.header)
         self.city: CityRecord = self._stage.city_record()
 
@@ -92,10 +97,14 @@ class Replay:
         observer = Observer(world)
         policy = RecordedPolicy(self._recording)
         last = int(self.steps[-1]) if len(self.steps) else -1
+
+        def finished(record: StepRecord) -> StepRecord:
+            return replace(record, snapshot=Snapshot({AIR: world.arrays.fire.air.copy()})) if self._with_air else record
+
         if last >= 0:
-            yield observer.record()
+            yield finished(observer.record())
         while world.step_number < last and not (world.terminated or world.truncated):
-            yield observer.record(world.step(policy))
+            yield finished(observer.record(world.step(policy)))
 
     def column(self, topic: str, name: str) -> Array:
         """Refuse: a replay is only walked through."""

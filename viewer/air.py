@@ -1,7 +1,7 @@
 """The heat of the air over the city, as a translucent layer: known at the steps of snapshots only.
 
-The steps of a recording do not hold the air; every fiftieth snapshot does. In between the layer of the last snapshot
-stays, under a label that says of which step it is.
+A recording holds the air in a snapshot at every fiftieth step; in between the layer of the last one stays, under a
+label that says of which step it is. A replay may put one at every step.
 """
 
 from __future__ import annotations
@@ -11,12 +11,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fireworld.records import CityRecord, Recording
+from fireworld.records import AIR, CityRecord, Recording
 from viewer import colors
 from viewer.stage import Stage
 
-ARRAY: Final = "fire.air"
-"""Name of the air in a snapshot: degrees above ambient in a grid, x by y, with a border of equal width all around."""
 ABOVE_ROOFS_M: Final = 4.0
 HOTTEST: Final = 600.0
 """Degrees above ambient at which the color is at its end."""
@@ -37,7 +35,7 @@ def log_air(stage: Stage, recording: Recording, *, height_m: float) -> None:
     import rerun
 
     city = recording.city
-    held = {one.step: one.snapshot.arrays[ARRAY] for one in recording if one.snapshot and ARRAY in one.snapshot.arrays}
+    held = {one.step: one.snapshot.arrays[AIR] for one in recording if one.snapshot and AIR in one.snapshot.arrays}
     if not held or city.air_nx * city.air_ny == 0:
         return
     cells = [air_cells(city, array) for array in held.values()]

@@ -166,8 +166,17 @@ def maps(name: str, prefix: str, recordings: Sequence[Recording], *, aspect: flo
     return rrb.Tabs(
         map_view(name, prefix, frame_fire(recordings, aspect=aspect)),
         map_view("From above", prefix, above),
-        map_view(f"Air (every {SNAPSHOT_EVERY_STEPS} steps)", prefix, above, layers=("city", "air")),
+        map_view(_air_title(recordings), prefix, above, layers=("city", "air")),
         active_tab=0,
+    )
+
+
+def _air_title(recordings: Sequence[Recording]) -> str:
+    steps = [record for recording in recordings for record in recording]
+    return (
+        "Air"
+        if len(steps) > 1 and all(record.snapshot for record in steps)
+        else f"Air (every {SNAPSHOT_EVERY_STEPS} steps)"
     )
 
 

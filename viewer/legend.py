@@ -34,7 +34,8 @@ brigade drives to. Brigades on one spot are drawn side by side. Click a ball to 
 still spread.
 
 **Air**: a recording holds the heat of the air only every 50 steps. The third tab of the map shows the last one that
-there was, and says of which step it is. From purple over pink to white it gets hotter.
+there was, and says of which step it is; `fireworld view --air` works out every step. From purple over pink to white it
+gets hotter.
 
 **The log** tells what happened, and each choice that is new: what a brigade goes for, the value (Q) of that beside the
 best other action's, and the state that it saw. A rule has no values.

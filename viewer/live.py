@@ -12,7 +12,7 @@ from typing import Any, Final
 from urllib.parse import urlsplit
 
 from fireworld.errors import ViewError, expected
-from fireworld.records import CityRecord, MemoryRecording, RunHeader, StepRecord
+from fireworld.records import AIR, CityRecord, MemoryRecording, RunHeader, Snapshot, StepRecord
 from viewer import app
 from viewer.courier import Courier, ViewerPipe
 from viewer.learning import CurveDrawing, Point, Sheet
@@ -103,7 +103,8 @@ class RunView:
 
     def add(self, record: StepRecord) -> None:
         """Hand over a step."""
-        self._courier.put(replace(record, snapshot=None))
+        air = record.snapshot and Snapshot({AIR: record.snapshot.arrays[AIR]})  # the rest would only take memory
+        self._courier.put(replace(record, snapshot=air))
 
     def close(self) -> None:
         """Bring what is left."""

@@ -11,7 +11,7 @@ import click
 from fireworld.cli.opening import open_committed
 
 if TYPE_CHECKING:
-    from fireworld.records import Recording
+    from fireworld.records import MemoryRecording, Recording
     from viewer.outcome import Outcome
 
 
@@ -40,6 +40,7 @@ def _building_ids(context: click.Context, parameter: click.Parameter, value: str
 @click.option("--from", "first", type=click.IntRange(min=0), metavar="N", help="First step to show.")
 @click.option("--to", "last", type=click.IntRange(min=0), metavar="N", help="Last step to show.")
 @click.option("--every", type=click.IntRange(min=1), default=1, metavar="N", help="Show every N-th step.")
+@click.option("--air", is_flag=True, help="Show the air of every step: it is worked out by replaying the run.")
 def command(
     *,
     logs: tuple[Path, ...],
@@ -51,6 +52,7 @@ def command(
     first: int | None,
     last: int | None,
     every: int,
+    air: bool,
 ) -> None:
     """Open one recording in Rerun, or two of the same city side by side.
 
@@ -63,6 +65,7 @@ def command(
     fireworld view out.mcap --focus 369,42         with the temperatures of two buildings
     fireworld view out.mcap --save out.rrd         no screen here: a file, for `rerun out.rrd`
     fireworld view long.mcap --from 100 --every 5  part of a long run
+    fireworld view out.mcap --air                  the heat of the air at every step, not at every 50th
 
     Exit code: 0 shown or saved, 2 could not (no display, no Rerun, not a recording, two cities).
     """  # noqa: D301 - click wants the character
@@ -77,9 +80,9 @@ def command(
     from viewer import app
     from viewer.selection import select_steps
 
-    recordings = [
-        select_steps(open_committed(path, doing="showing"), first=first, last=last, every=every) for path in logs
-    ]
+    held = [open_committed(path, doing="showing") for path in logs]
+    read = [_with_air(recording, path) if air else recording for recording, path in zip(held, logs, strict=True)]
+    recordings = [select_steps(recording, first=first, last=last, every=every) for recording in read]
     outcome = _outcome(logs, recordings)
     if output is not None:
         app.save(recordings, output, focus=focus, outcome=outcome, force=force)
@@ -88,6 +91,31 @@ def command(
         app.serve(recordings, focus=focus, outcome=outcome, port=port or app.WEB_PORT, announce=_announce)
     else:
         app.show(recordings, focus=focus, outcome=outcome)
+
+
+def _with_air(recording: Recording, path: Path) -> MemoryRecording:
+    """Replay a run to know the air of every step.
+
+    Raises:
+        ViewError: this fireworld computes something else than what is recorded.
+    """
+    from dataclasses import replace
+
+    import numpy as np
+
+    from fireworld.cli.compiling import announce_compilation
+    from fireworld.errors import ViewError, expected
+    from fireworld.records import MemoryRecording
+    from fireworld.replay import Replay
+
+    announce_compilation()
+    records = []
+    for record, again in zip(recording, Replay(recording, with_air=True), strict=False):
+        if not np.array_equal(record.buildings.energy, again.buildings.energy):
+            wanted = "what this fireworld computes"
+            raise ViewError(expected(str(path), f"step {record.step}", wanted, "something else", "try without --air"))
+        records.append(replace(record, snapshot=again.snapshot))
+    return MemoryRecording(recording.header, recording.city, records)
 
 
 def _outcome(logs: Sequence[Path], recordings: Sequence[Recording]) -> Outcome:

@@ -6,8 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from fireworld.records import CityRecord, MemoryRecording, Snapshot
+from fireworld.replay import Replay
+from tests import command_line
 from tests.viewer import rrd
 from tests.viewer.conftest import make_recording
 from viewer import air, app, colors
@@ -55,3 +58,32 @@ def test_the_air_of_a_snapshot_lies_over_the_city_and_bears_its_step(tmp_path: P
 def test_a_recording_without_snapshots_has_no_air(small, tmp_path: Path):
     app.save([small], tmp_path / "run.rrd")
     assert not [path for path in rrd.read(tmp_path / "run.rrd") if path.startswith("/air")]
+
+
+def test_a_replay_knows_the_air_of_every_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    log, every, some = (str(tmp_path / name) for name in ("run.mcap", "every.rrd", "some.rrd"))
+    for words in (("run", "quick", "--policy", "chief", "--record", log), ("view", log, "--save", some)):
+        assert command_line.call(monkeypatch, *words).code == 0
+    assert command_line.call(monkeypatch, "view", log, "--air", "--from", "10", "--save", every).code == 0
+    heat = {path: dict(rrd.read(Path(path))["/air/heat"]["GridMap:data"]) for path in (every, some)}
+    assert list(heat[some]) == [0, 50]
+    assert list(heat[every]) == list(range(10, 63))
+    assert heat[every][50] == heat[some][50]
+    assert heat[every][49] != heat[every][50]
+
+
+def test_the_air_of_another_simulator_is_not_made_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    log = tmp_path / "run.mcap"
+    assert command_line.call(monkeypatch, "run", "quick", "--steps", "5", "--record", str(log)).code == 0
+    computed = Replay.__iter__
+
+    def hotter(replay: Replay):
+        for record in computed(replay):
+            buildings = replace(record.buildings, energy=record.buildings.energy + float(record.step == 3))
+            yield replace(record, buildings=buildings)
+
+    monkeypatch.setattr(Replay, "__iter__", hotter)
+    done = command_line.call(monkeypatch, "view", str(log), "--air", "--save", str(tmp_path / "run.rrd"))
+    wanted = f"{log}: step 3: expected what this fireworld computes, got something else; try without --air"
+    assert (done.code, done.err) == (2, f"fireworld: {wanted}\n")
+    assert not (tmp_path / "run.rrd").exists()

@@ -167,7 +167,9 @@ def test_a_watched_run_is_the_same_run(here, fireworld, window):  # noqa: F811
     assert json.loads(done.out) == alone | {"recording": "seen.mcap"}
     assert (here / "seen.mcap").read_bytes() == (here / "alone.mcap").read_bytes()
     assert json.loads(fireworld(*SHORT, "--view").out)["digest"] == alone["digest"]
-    scores = rrd.read(window)["/plots/score"]["Scalars:scalars"]
+    seen = rrd.read(window)
+    assert {step for step, _ in seen["/air/heat"]["GridMap:data"]} == {0}
+    scores = seen["/plots/score"]["Scalars:scalars"]
     assert sorted(step for step, _ in scores) == sorted([*range(10)])
 
 
