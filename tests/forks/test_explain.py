@@ -8,6 +8,7 @@ import signal
 import sys
 from threading import Event
 
+import numpy as np
 import pytest
 
 from fireworld.forks.decisions import RecordedDecisions
@@ -15,6 +16,7 @@ from fireworld.forks.explain import explain
 from fireworld.forks.stretches import Stretch, find_stretches
 from fireworld.forks.worse_run import WorseRun, prepare_worse_run
 from fireworld.policy.names import load_policy
+from fireworld.policy.ranking import Ranking, save_ranking
 from fireworld.records import ACTION_NAMES, ACTIONS
 from fireworld.replay import recorded_stage
 from recorder.reader import open_log
@@ -202,27 +204,32 @@ def test_targets_of_its_own(here, answer, other):
     assert known["together"]["share"] == pytest.approx(1.0, abs=0.1)
 
 
+RANKING = [-0.63, 2.12, 1.59, -0.04, 2.19, 0.94, -0.2, 1.19, 0.83, 0.58, -0.01, 0.01, -0.49, 0.0, 0.0, 0.0, 0.0]
+"""Weights that some search found."""
+
+
 def test_a_stretch_of_one_target_is_what_a_fork_with_that_target_is(here, fireworld, answer):
     """Between two runs of a team that ranks targets: the words of the answer are those that a fork takes."""
-    answer("run", "quick", "--policy", "best", "--record", "best.mcap")
-    answer("fork", "best.mcap", "--at", 5, "--decide", "1=own-target:44", "--record", "f.mcap")
-    known = answer("explain", "best.mcap", "f.mcap")
+    save_ranking(Ranking(np.array([RANKING]), own_targets=True, provenance={}), here / "ranking.npz")
+    answer("run", "quick", "--policy", "ranking.npz", "--record", "ranked.mcap")
+    answer("fork", "ranked.mcap", "--at", 5, "--decide", "1=own-target:44", "--record", "f.mcap")
+    known = answer("explain", "ranked.mcap", "f.mcap")
     assert known["goes_on"] == "policy"
     assert {one["action"] for one in known["stretches"]} == {"own-target"}
-    assert known["worse"]["path"] == "best.mcap"
+    assert known["worse"]["path"] == "ranked.mcap"
     refused = []
     for one in known["stretches"]:
         assert (one["first"], one["action"]) == (one["last"], "own-target")
         (building,) = one["targets"]
         decide = f"{one['brigade']}=own-target:{building}"
-        fork = fireworld("fork", "best.mcap", "--at", one["first"] - 1, "--decide", decide, "--json")
+        fork = fireworld("fork", "ranked.mcap", "--at", one["first"] - 1, "--decide", decide, "--json")
         refused.append("which does not burn" in fork.err)
         score = known["worse"]["score"] if refused[-1] else json.loads(fork.out)["score"]
         assert one["score"] == score, "what cannot be done is decided by the policy"
     assert len(set(refused)) == 2
     (told,) = (one for one in known["stretches"] if one["first"] == 6)
     assert (told["brigade"], told["targets"], told["share"]) == (1, [44], 1.0)
-    assert "own-target:44 instead of" in fireworld("explain", "best.mcap", "f.mcap").out
+    assert "own-target:44 instead of" in fireworld("explain", "ranked.mcap", "f.mcap").out
 
 
 def test_the_decision_of_a_fork_explains_it_all(here, answer):
