@@ -18,7 +18,7 @@ def main() -> int:
     parser.add_argument("--here", action="store_true", help="run the one test named in this process, which it ends")
     parser.add_argument("names", nargs="*", help="only these tests")
     arguments = parser.parse_args()
-    import atheris  # type: ignore[import-not-found]  # not a requirement: see above
+    import atheris  # not a requirement: see above
 
     with atheris.instrument_imports(include=["fireworld", "recorder"]):
         import tests.fuzz.test_files
