@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import io
 import json
 import shutil
 import subprocess
@@ -19,6 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.viewer.pixels import decoded
 from viewer import app
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -76,9 +76,7 @@ class Browser:
 
     def picture(self) -> np.ndarray:
         """Return what is to be seen, (height, width, 3)."""
-        from matplotlib.image import imread
-
-        return (imread(io.BytesIO(self.screenshot()))[..., :3] * 255).round().astype(np.uint8)
+        return decoded(self.screenshot())
 
 
 @contextmanager

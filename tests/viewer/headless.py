@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 import subprocess
 import sys
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from tests.docs.pages import ROOT
+from tests.viewer.pixels import decoded
 from viewer import app
 
 DRIVERS = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d", "/usr/local/share/vulkan/icd.d")
@@ -72,9 +72,7 @@ def screenshot(viewer: Any, step: int) -> bytes:
 
 def picture(viewer: Any, step: int) -> np.ndarray:
     """Return what is to be seen at a step, (height, width, 3)."""
-    from matplotlib.image import imread
-
-    return (imread(io.BytesIO(screenshot(viewer, step)))[..., :3] * 255).round().astype(np.uint8)
+    return decoded(screenshot(viewer, step))
 
 
 def opened(viewer: Any, path: Path) -> Any:

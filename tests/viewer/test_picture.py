@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from tests import command_line
 from tests.viewer.conftest import make_recording
 from tests.viewer.headless import has_driver, headless, loaded, opened, picture
+from tests.viewer.pixels import n_near, part
 from viewer import app, colors
 from viewer.outcome import Outcome
 
@@ -26,18 +26,6 @@ def viewer(tmp_path: Path) -> Iterator[Any]:
     """A viewer without a window that ends with the test."""
     with headless(tmp_path) as (client, _):
         yield client
-
-
-def n_near(image: np.ndarray, rgb: colors.Rgb, *, tolerance: int = 10) -> int:
-    """How many pixels have about a color."""
-    return int(np.all(np.abs(image.astype(int) - rgb) <= tolerance, axis=-1).sum())
-
-
-def part(image: np.ndarray, *, rows: tuple[float, float], columns: tuple[float, float]) -> np.ndarray:
-    """Cut a picture, by shares of its height and width."""
-    height, width = image.shape[:2]
-    (top, bottom), (left, right) = rows, columns
-    return image[int(height * top) : int(height * bottom), int(width * left) : int(width * right)]
 
 
 def test_the_fire_is_seen_to_spread(viewer: Any, tmp_path: Path):

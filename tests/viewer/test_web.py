@@ -16,7 +16,7 @@ import pytest
 from tests import command_line
 from tests.viewer.browser import Browser, browser, executable
 from tests.viewer.headless import CALL
-from tests.viewer.test_picture import n_near, part
+from tests.viewer.pixels import n_near, part
 from viewer import colors
 from viewer.app import free_port
 
