@@ -71,7 +71,7 @@ class Replay:
 
         Args:
             recording: of a run.
-            with_air: every step has a snapshot, of the air alone, instead of one now and then of everything.
+            with_air: every step has a snapshot, those without one of the air alone.
 
         Raises:
             LogError: the recording lacks its scenario.
@@ -99,7 +99,9 @@ class Replay:
         last = int(self.steps[-1]) if len(self.steps) else -1
 
         def finished(record: StepRecord) -> StepRecord:
-            return replace(record, snapshot=Snapshot({AIR: world.arrays.fire.air.copy()})) if self._with_air else record
+            if not self._with_air or record.snapshot is not None:
+                return record
+            return replace(record, snapshot=Snapshot({AIR: world.arrays.fire.air.copy()}))
 
         if last >= 0:
             yield finished(observer.record())

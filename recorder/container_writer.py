@@ -31,7 +31,6 @@ _MESSAGE_OPCODE, _MESSAGE_INDEX_OPCODE = int(Opcode.MESSAGE), int(Opcode.MESSAGE
 _HEAD: Final = struct.Struct("<BQ")
 _MESSAGE: Final = struct.Struct("<BQHIQQ")
 _MESSAGE_BYTES: Final = _MESSAGE.size - _HEAD.size
-_ONE_ENTRY: Final = struct.Struct("<BQHIQQ")
 _COMPRESSION: Final = b"\x04\0\0\0zstd"
 _CHUNK: Final = struct.Struct("<BQQQQI8sQ")
 _SUMMARY: Final = (
@@ -217,5 +216,5 @@ def _packed(record: records.McapRecord) -> bytes:
 def _message_index(channel: int, entries: Sequence[int]) -> bytes:
     """Pack the index of a channel's messages in a chunk; entries: time and position of each."""
     n_bytes = 8 * len(entries)
-    layout = _ONE_ENTRY if len(entries) == 2 else struct.Struct(f"<BQHI{len(entries)}Q")
-    return layout.pack(_MESSAGE_INDEX_OPCODE, 2 + 4 + n_bytes, channel, n_bytes, *entries)
+    head = (_MESSAGE_INDEX_OPCODE, 2 + 4 + n_bytes, channel, n_bytes)
+    return struct.pack(f"<BQHI{len(entries)}Q", *head, *entries)

@@ -15,6 +15,7 @@ from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.explanation_text import Pair, as_json_content, own_targets, show
 from fireworld.cli.interrupt import gentle_interrupt
 from fireworld.cli.progress import BAR, ELAPSED, bar
+from fireworld.cli.replays import check_replay
 
 if TYPE_CHECKING:
     from fireworld.cli.workers import Workers
@@ -128,14 +129,10 @@ def _check_replays(pair: Pair) -> None:
     Raises:
         LogError: one is not; names the first step.
     """
-    from fireworld.errors import LogError
     from fireworld.replay import Replay
-    from recorder.verify import verify
 
     for log in (pair.worse, pair.better):
-        difference = verify(log, Replay(log))
-        if difference is not None and difference.first is not None:
-            raise LogError(f"{log.path}: does not replay to what is recorded: {difference.first.sentence}")
+        check_replay(log, Replay(log), source=str(log.path))
 
 
 def _policy_of(log: Log) -> tuple[MakePolicy | None, str]:

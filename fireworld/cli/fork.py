@@ -11,10 +11,10 @@ import click
 from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.options import record_options
+from fireworld.cli.replays import check_replay
 
 if TYPE_CHECKING:
     from fireworld.forks.fork import Change, Swap
-    from fireworld.forks.resume import Resumed
     from fireworld.policy.names import NamedPolicy
     from fireworld.policy.protocol import Decision
     from fireworld.records import MemoryRecording
@@ -102,7 +102,7 @@ def command(
     remembering = named if policy is None and has_memory(named.policy) else None
     stage = recorded_stage(original.header)
     resumed = resume(stage, beginning, source=str(log), remembering=remembering)
-    check_replay(resumed, source=str(log))
+    check_replay(resumed.recorded, resumed.replayed, source=str(log))
     if remembering is None:
         begin(named.policy, resumed.world.tables, n_brigades=resumed.world.n_brigades, seed=original.header.seed)
     run = prepare_fork(resumed, change, original, list(beginning), digest=original.digest, source=str(log))
@@ -138,22 +138,6 @@ def recorded_up_to(log: Log, step: int) -> MemoryRecording:
         held = f"a step of {log.path}, {log.steps[0]} to {log.steps[-1]}" if len(log) else f"steps in {log.path}"
         raise LogError(expected("--at", "", held, step if len(log) else "none"))
     return MemoryRecording(log.header, log.city, [*takewhile(lambda record: record.step <= step, log)])
-
-
-def check_replay(resumed: Resumed, *, source: str) -> None:
-    """Hold the steps that were computed again against those recorded.
-
-    Raises:
-        LogError: they differ; names the first step.
-    """
-    from fireworld.errors import LogError
-    from recorder.diff import compare
-
-    first = compare(resumed.recorded, resumed.replayed).first
-    if first is not None:
-        raise LogError(
-            f"{source}: does not replay to what is recorded: {first.sentence}; see `fireworld verify {source}`"
-        )
 
 
 def _policy(log: Log, name: str | None) -> NamedPolicy:

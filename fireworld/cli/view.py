@@ -97,25 +97,18 @@ def _with_air(recording: Recording, path: Path) -> MemoryRecording:
     """Replay a run to know the air of every step.
 
     Raises:
-        ViewError: this fireworld computes something else than what is recorded.
+        LogError: this fireworld computes something else than what is recorded.
     """
-    from dataclasses import replace
-
-    import numpy as np
-
     from fireworld.cli.compiling import announce_compilation
-    from fireworld.errors import ViewError, expected
+    from fireworld.cli.replays import check_replay
     from fireworld.records import MemoryRecording
     from fireworld.replay import Replay
 
     announce_compilation()
-    records = []
-    for record, again in zip(recording, Replay(recording, with_air=True), strict=False):
-        if not np.array_equal(record.buildings.energy, again.buildings.energy):
-            wanted = "what this fireworld computes"
-            raise ViewError(expected(str(path), f"step {record.step}", wanted, "something else", "try without --air"))
-        records.append(replace(record, snapshot=again.snapshot))
-    return MemoryRecording(recording.header, recording.city, records)
+    again = Replay(recording, with_air=True)
+    replayed = MemoryRecording(recording.header, again.city, list(again))
+    check_replay(recording, replayed, source=str(path), hint="try without --air")
+    return replayed
 
 
 def _outcome(logs: Sequence[Path], recordings: Sequence[Recording]) -> Outcome:
