@@ -52,7 +52,7 @@ format: install  ## Format the code and mend what the linter can mend.
 	$(BIN)/ruff check --fix .
 
 docs: install  ## Renew what is made from the code in docs/, and the transcripts in the README.
-	$(BIN)/python -m recorder.schema --write
+	$(BIN)/python -m fireworld_recorder.schema --write
 	$(BIN)/python -m fireworld.scenario.reference
 	$(BIN)/python -m fireworld.cli.reference
 	$(BIN)/python -m tests.docs.transcripts

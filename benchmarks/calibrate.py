@@ -18,7 +18,7 @@ from fireworld.evaluation.runs import evaluate
 from fireworld.evaluation.statistics import mean
 from fireworld.policy.names import BUILT_IN
 from fireworld.scenario import load_scenario, scenario_names
-from fireworld.world.stage import build_stage
+from fireworld.simulation.built import build_scenario
 
 POLICIES: Final = ("easiest", "nearest-to-civilian", "nearest-to-center", "nearest-to-me", "each-another", "random")
 FIRST_SEED: Final = 1000
@@ -30,14 +30,14 @@ def rows(scenarios: Iterable[str], counts: Iterable[int | None], *, n_seeds: int
     for name in scenarios:
         for count in counts:
             settings = {} if count is None else {"fires.0.n_buildings": str(count)}
-            stage = build_stage(load_scenario(name).with_settings(settings))
-            outcomes = [evaluate(stage, BUILT_IN[policy](), seeds) for policy in POLICIES]
+            built = build_scenario(load_scenario(name).with_settings(settings))
+            outcomes = [evaluate(built, BUILT_IN[policy](), seeds) for policy in POLICIES]
             cells = [
                 f"{mean(found.score_share):.2f} {mean(found.burnt_out):3.0f} {mean(found.steps):3.0f}"
                 for found in outcomes
             ]
             of_all = fmean(mean(found.score_share) for found in outcomes)
-            yield [name, str(len(stage.setup.ignited)), f"{of_all:.2f}", *cells]
+            yield [name, str(len(built.placement.ignited)), f"{of_all:.2f}", *cells]
 
 
 def parse_counts(text: str | None) -> list[int | None]:

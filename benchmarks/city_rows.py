@@ -15,8 +15,8 @@ from fireworld.city.walls import walls_of
 from fireworld.parameters import PAPER
 from fireworld.policy.kernel import each_another
 from fireworld.scenario import load_scenario
-from fireworld.world.stage import build_stage
-from fireworld.world.world import World
+from fireworld.simulation.built import build_scenario
+from fireworld.simulation.world import World
 
 RAYS_COMPARED = 20_000
 
@@ -73,9 +73,9 @@ def first_step_row(*, seconds: float) -> Row:
     policy = each_another()
 
     def run(_: None) -> World:
-        stage = build_stage(load_scenario("default"))
-        world = stage.world(seed=1)
-        policy.begin(world.tables, world.n_brigades, world.seed)
+        built = build_scenario(load_scenario("default"))
+        world = built.world(seed=1)
+        policy.begin(world.city_arrays, world.n_brigades, world.seed)
         world.step(policy)
         return world
 

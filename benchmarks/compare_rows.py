@@ -13,7 +13,7 @@ from fireworld.evaluation.runs import evaluate, run_step_by_step
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.names import BUILT_IN
 from fireworld.scenario import load_scenario
-from fireworld.world.stage import Stage, build_stage
+from fireworld.simulation.built import BuiltScenario, build_scenario
 
 POLICIES: Final = ("chief", "nearest-to-civilian")
 SCENARIO: Final = "test-2"
@@ -21,17 +21,17 @@ SCENARIO: Final = "test-2"
 N_THREADS: Final = 2
 
 
-def step_by_step(stage: Stage, policies: tuple[KernelPolicy, ...], seeds: range, _: None) -> None:
+def step_by_step(built: BuiltScenario, policies: tuple[KernelPolicy, ...], seeds: range, _: None) -> None:
     """Ask the policies in every step."""
     for policy in policies:
         for seed in seeds:
-            run_step_by_step(stage, policy, seed=seed)
+            run_step_by_step(built, policy, seed=seed)
 
 
-def compiled(stage: Stage, policies: tuple[KernelPolicy, ...], seeds: range, _: None) -> None:
+def compiled(built: BuiltScenario, policies: tuple[KernelPolicy, ...], seeds: range, _: None) -> None:
     """Run whole episodes in compiled code."""
     for policy in policies:
-        evaluate(stage, policy, seeds, n_threads=N_THREADS)
+        evaluate(built, policy, seeds, n_threads=N_THREADS)
 
 
 def rows(*, quick: bool) -> Iterator[Row]:
@@ -39,15 +39,15 @@ def rows(*, quick: bool) -> Iterator[Row]:
     seeds = range(1, 3 if quick else 21)
     words = f"compare {' '.join(POLICIES)} --seeds {2 if quick else 100}"
     yield replace(process_row(words, IMPORT_NUMBA, seconds=1.0 if quick else 40.0), group="compare")
-    stage = build_stage(load_scenario(SCENARIO))
+    built = build_scenario(load_scenario(SCENARIO))
     contenders = [
-        Contender(name, partial(run, stage, tuple(BUILT_IN[name]() for name in POLICIES), seeds), parts=2 * len(seeds))
+        Contender(name, partial(run, built, tuple(BUILT_IN[name]() for name in POLICIES), seeds), parts=2 * len(seeds))
         for name, run in ((f"compiled, {N_THREADS} threads", compiled), ("World.step", step_by_step))
     ]
     yield compare(
         "compare",
         f"one run of {SCENARIO}",
-        f"{stage.city.n_buildings} buildings",
+        f"{built.city.n_buildings} buildings",
         contenders[0],
         contenders[1],
         seconds=1.0 if quick else 20.0,

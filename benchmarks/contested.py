@@ -21,7 +21,7 @@ from fireworld.evaluation.runs import evaluate
 from fireworld.policy.names import BUILT_IN
 from fireworld.records import ACTIONS
 from fireworld.scenario import load_scenario
-from fireworld.world.stage import Ground, build_stage
+from fireworld.simulation.built import CityCache
 
 FOLDER: Final = Path(__file__).parents[1] / "scenarios" / "curricula"
 RULES: Final = (*ACTIONS, "each-another", "random")
@@ -63,14 +63,14 @@ class Fire:
 
 def contested_fires(city: int) -> Iterator[Fire]:
     """Yield the contested fires of a city, as many as are wanted, from four times as many places at most."""
-    grounds: dict[str, Ground] = {}
+    cities = CityCache()
     n_found = 0
     for place in range(4 * N_FIRES_OF_CITY):
         x, y = (0.12 + 0.76 * uniform(city, PLACEMENT, place, axis) for axis in (1, 2))
         n_civilians = 8 + below(city, PLACEMENT, place, 3, bound=4)
         for n_buildings in SIZES:
             fire = Fire(city, (x, y), n_buildings, n_civilians)
-            share = mean_share(fire, grounds)
+            share = mean_share(fire, cities)
             if share < HELD_ABOVE:
                 break
         if LOST_BELOW < share < HELD_ABOVE:
@@ -80,11 +80,11 @@ def contested_fires(city: int) -> Iterator[Fire]:
             return
 
 
-def mean_share(fire: Fire, grounds: dict[str, Ground]) -> float:
+def mean_share(fire: Fire, cities: CityCache) -> float:
     """Return the mean score of the rules, as a share of the maximum."""
     scenario = load_scenario("test-2").with_settings({**fire.settings(), "steps": "400"})
-    stage = build_stage(scenario, grounds=grounds)
-    shares = [evaluate(stage, BUILT_IN[rule](), SEEDS).score_share.mean() for rule in RULES]
+    built = cities.build(scenario)
+    shares = [evaluate(built, BUILT_IN[rule](), SEEDS).score_share.mean() for rule in RULES]
     return float(sum(shares)) / len(shares)
 
 

@@ -14,11 +14,11 @@ from fireworld.city.build import build_city
 from fireworld.city.city import Array, City, Plan
 from fireworld.city.generator import generate_plan
 from fireworld.kernels import fire as kernels
-from fireworld.kernels.arrays import CityTables, FireConstants, FireState
+from fireworld.kernels.arrays import CityArrays, FireConstants, FireState
 from fireworld.parameters import PAPER
 from fireworld.records import MATERIALS
-from fireworld.world.state import fresh_fire
-from fireworld.world.tables import city_tables, fire_constants
+from fireworld.simulation.city_arrays import city_arrays, fire_constants
+from fireworld.simulation.state import fresh_fire
 from tests.reference import fire as plain
 
 Kind = Literal["small", "hot"]
@@ -46,9 +46,9 @@ def city_of(size: int) -> City:
 
 
 @cache
-def tables_of(size: int) -> CityTables:
+def tables_of(size: int) -> CityArrays:
     """Build the kernels' tables of a city once."""
-    return city_tables(city_of(size), PAPER.fire)
+    return city_arrays(city_of(size), PAPER.fire)
 
 
 def every_eighth(city: City) -> Array:
@@ -69,7 +69,7 @@ class Blaze:
 
     plain_tables: plain.FireTables
     plain_fire: plain.FireState
-    tables: CityTables
+    tables: CityArrays
     constants: FireConstants
     compiled_fire: FireState
     rate: Array  # (n,)

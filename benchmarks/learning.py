@@ -25,7 +25,7 @@ from benchmarks.learning_fires import Fires, fires_by_group, shares  # noqa: E40
 from benchmarks.learning_teams import FULL, QUICK, Contestant, contestants  # noqa: E402
 from fireworld.evaluation.statistics import Estimate, estimate, paired_difference  # noqa: E402
 from fireworld.kernels.arrays import Array  # noqa: E402
-from fireworld.world.stage import Ground  # noqa: E402
+from fireworld.simulation.built import CityCache  # noqa: E402
 
 RESULTS: Final = ROOT / "docs" / "science.json"
 PAGE: Final = ROOT / "docs" / "science.md"
@@ -145,10 +145,10 @@ def main(*, quick: bool, keep: Path | None, write: bool, only: tuple[str, ...]) 
         folder = keep or Path(passing)
         (folder / "teams").mkdir(parents=True, exist_ok=True)
         (folder / "scores").mkdir(exist_ok=True)
-        grounds: dict[str, Ground] = {}
-        fires = fires_by_group(grounds, n_fires=4 if quick else None)
+        cities = CityCache()
+        fires = fires_by_group(cities, n_fires=4 if quick else None)
         seeds = range(FIRST_SEED, FIRST_SEED + (2 if quick else 20))
-        teams = contestants(QUICK if quick else FULL, fires, folder / "teams", grounds)
+        teams = contestants(QUICK if quick else FULL, fires, folder / "teams", cities)
         measured = {}
         for team in teams:
             if only and team.name not in only:

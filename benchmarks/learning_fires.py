@@ -12,26 +12,25 @@ from fireworld.kernels.arrays import Array
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.protocol import Policy
 from fireworld.scenario import Scenario, load_scenario
+from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.training.curriculum import load_curriculum
-from fireworld.world.stage import Ground, Stage, build_stage
 
 TESTS = ("test-1", "test-2", "test-3")
 N_THREADS = 2
-Fires = dict[str, list[Stage]]
+Fires = dict[str, list[BuiltScenario]]
 
 
-def fires_by_group(grounds: dict[str, Ground], *, n_fires: int | None = None) -> Fires:
+def fires_by_group(cities: CityCache, *, n_fires: int | None = None) -> Fires:
     """Build the paper's tests, contested fires of cities that no team learned in, and the same a quarter larger.
 
     Args:
-        grounds: cities built before.
+        cities: cities built before.
         n_fires: of each group at most, spread over the cities.
     """
     groups = {"tests": [load_scenario(name) for name in TESTS]}
-    groups |= {stage.name: list(stage.scenarios) for stage in load_curriculum("unseen").stages}
+    groups |= {built.name: list(built.scenarios) for built in load_curriculum("unseen").stages}
     return {
-        name: [build_stage(scenario, grounds=grounds) for scenario in _some(scenarios, n_fires)]
-        for name, scenarios in groups.items()
+        name: [cities.build(scenario) for scenario in _some(scenarios, n_fires)] for name, scenarios in groups.items()
     }
 
 
@@ -39,15 +38,15 @@ def _some(items: list[Scenario], n: int | None) -> list[Scenario]:
     return items if n is None or n >= len(items) else items[:: len(items) // n][:n]
 
 
-def shares(stages: Sequence[Stage], policy: KernelPolicy | Policy, seeds: Sequence[int]) -> Array:
+def shares(stages: Sequence[BuiltScenario], policy: KernelPolicy | Policy, seeds: Sequence[int]) -> Array:
     """Return the score of every run as a share of its maximum, (fires, seeds)."""
 
-    def share(stage: Stage, seed: int) -> float:
+    def share(built: BuiltScenario, seed: int) -> float:
         run = run_compiled if isinstance(policy, KernelPolicy) else run_step_by_step
-        row = dict(zip(QUANTITIES, run(stage, policy, seed=seed), strict=True))  # type: ignore[arg-type]
+        row = dict(zip(QUANTITIES, run(built, policy, seed=seed), strict=True))  # type: ignore[arg-type]
         return row["score"] / row["score_max"]
 
     n_threads = N_THREADS if isinstance(policy, KernelPolicy) else 1  # the planner has a memory
     with ThreadPoolExecutor(n_threads) as pool:
-        runs = [pool.submit(share, stage, seed) for stage in stages for seed in seeds]
+        runs = [pool.submit(share, built, seed) for built in stages for seed in seeds]
         return np.array([run.result() for run in runs]).reshape(len(stages), len(seeds))

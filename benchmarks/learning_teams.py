@@ -23,12 +23,12 @@ from fireworld.policy.protocol import Policy
 from fireworld.policy.team import load_team, save_team
 from fireworld.policy.words import N_FLAG_VALUES, N_OWN, N_STATES, RADIX, features_of
 from fireworld.records import ACTIONS
+from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import Curriculum, CurriculumStage, load_curriculum
 from fireworld.training.method import PAPER, Method
 from fireworld.training.search import Search, Searcher
 from fireworld.training.searches import SearchRun
 from fireworld.training.trainer import Trainer
-from fireworld.world.stage import Ground
 
 SEED_OF_DISTILLING: Final = 30_000
 """Above the seeds of all tests: the planner that teaches meets other luck."""
@@ -85,16 +85,16 @@ class Contestant:
     """Seeds on each generated fire, None for all: fewer of what takes long."""
 
 
-def contestants(size: Size, fires: Fires, folder: Path, grounds: dict[str, Ground]) -> list[Contestant]:
+def contestants(size: Size, fires: Fires, folder: Path, cities: CityCache) -> list[Contestant]:
     """List all, rules first.
 
     Args:
         size: how much work.
         fires: by group.
         folder: where teams are kept.
-        grounds: cities built before.
+        cities: cities built before.
     """
-    workshop = Workshop(size, folder, grounds)
+    workshop = Workshop(size, folder, cities)
     n, some, few = size.n_trainings, size.n_rivals, size.n_trials
     rules = [
         Contestant(rule, "rule", 1, lambda _, __, rule=rule: BUILT_IN[rule]())  # type: ignore[misc]  # of a lambda
@@ -152,7 +152,7 @@ class Workshop:
 
     size: Size
     folder: Path
-    grounds: dict[str, Ground]
+    cities: CityCache
 
     def curriculum(self, *, cooperation: bool = True) -> Curriculum:
         """Return the contested fires, both stages; without cooperation their tables have 270 states."""
@@ -179,7 +179,7 @@ class Workshop:
         def make(number: int, group: str) -> KernelPolicy:
             del group
             path = self.folder / f"{name}-{number}.npz"
-            run = SearchRun(Searcher(self.curriculum(), search, seed=number, grounds=self.grounds), path)
+            run = SearchRun(Searcher(self.curriculum(), search, seed=number, cities=self.cities), path)
             run.resume()
             run.run(Event(), n_threads=N_THREADS, report=lambda _, __: None)
             assert run.ranking is not None
@@ -208,7 +208,7 @@ class Workshop:
             del group
             path = self.folder / f"{name}-{number}.npz"
             if not path.exists():
-                trainer = Trainer(curriculum, method, seed=number, grounds=self.grounds)
+                trainer = Trainer(curriculum, method, seed=number, cities=self.cities)
                 for _ in trainer:
                     pass
                 save_team(trainer.team(), path)
@@ -223,7 +223,7 @@ class Workshop:
             del group
             path = self.folder / f"linear-{cooperation}-{number}.npy"
             searcher = TableSearcher(
-                self.curriculum(), replace(self.size.half, cooperation=cooperation), seed=number, grounds=self.grounds
+                self.curriculum(), replace(self.size.half, cooperation=cooperation), seed=number, cities=self.cities
             )
             if not path.exists():
                 for _ in searcher.run(n_threads=N_THREADS, stop=Event()):
@@ -240,7 +240,7 @@ class Workshop:
             del number, group
             path = self.folder / "planned.npy"
             if not path.exists():
-                np.save(path, planned_values(self.curriculum(), self.grounds))
+                np.save(path, planned_values(self.curriculum(), self.cities))
             return from_tables(averaged(np.load(path), n_states)[np.newaxis], commit=4)
 
         return make
@@ -283,15 +283,13 @@ def indicators() -> Array:
     return np.array(columns, dtype=np.float64).T
 
 
-def planned_values(curriculum: Curriculum, grounds: dict[str, Ground]) -> Array:
+def planned_values(curriculum: Curriculum, cities: CityCache) -> Array:
     """Let the planner fight and note what it thinks: rows of a state and the values of the four actions, (k, 5)."""
-    from fireworld.world.stage import build_stage
-
     rows = []
     for number, scenario in enumerate(curriculum.stages[0].scenarios):
-        world = build_stage(scenario, grounds=grounds).world(seed=SEED_OF_DISTILLING + number)
+        world = cities.build(scenario).world(seed=SEED_OF_DISTILLING + number)
         teacher = planner()
-        begin(teacher, world.tables, n_brigades=world.n_brigades, seed=world.seed)
+        begin(teacher, world.city_arrays, n_brigades=world.n_brigades, seed=world.seed)
         while not (world.terminated or world.truncated):
             choices = world.step(teacher)
             rows += [
@@ -325,7 +323,7 @@ def averaged(planned: Array, n_states: int) -> Array:
 JOINT_SEEDS: Final = (101,)
 
 
-def best_joint(stages: Sequence) -> KernelPolicy:  # type: ignore[type-arg]  # of Stage
+def best_joint(stages: Sequence) -> KernelPolicy:  # type: ignore[type-arg]  # of BuiltScenario
     """Return the best of all 256 assignments of one action to each of four brigades, on these fires."""
 
     def policy(assignment: tuple[int, ...]) -> KernelPolicy:

@@ -16,6 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from fireworld_recorder.reader import open_log
+from fireworld_recorder.writer import LogWriter
 
 from benchmarks.fires import city_of, tables_of
 from benchmarks.runs import (
@@ -33,9 +35,7 @@ from benchmarks.timing import Contender, Row, compare, duration, measure
 from fireworld.parameters import PAPER
 from fireworld.policy.kernel import each_another
 from fireworld.records import STEP_TOPICS, StepRecord
-from fireworld.world.world import World
-from recorder.reader import open_log
-from recorder.writer import LogWriter
+from fireworld.simulation.world import World
 
 
 def as_json(record: StepRecord) -> bytes:
@@ -131,7 +131,7 @@ def other_world(size: int, n_steps: int) -> World:
     """Set up the same world as `new_world`, in which one building less burns at first."""
     city = city_of(size)
     start = start_of(size, from_the_corner(city)[1:])
-    return World(city, PAPER, **start, seed=SEED, n_steps_max=n_steps, tables=tables_of(size))
+    return World(city, PAPER, **start, seed=SEED, n_steps_max=n_steps, arrays=tables_of(size))
 
 
 def diff_rows(size: int, n_steps: int, folder: Path, *, seconds: float) -> Iterator[Row]:

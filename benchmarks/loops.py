@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from fireworld.kernels.arrays import BuildingTables, CoverTables, FireConstants, FireState, LinkTables
+from fireworld.kernels.arrays import BuildingArrays, CoverArrays, FireConstants, FireState, LinkArrays
 from fireworld.kernels.fire import advance_fire
 from fireworld.kernels.jit import kernel
 
 
 @kernel
 def advance_steps(
-    buildings: BuildingTables,
-    cover: CoverTables,
-    links: LinkTables,
+    buildings: BuildingArrays,
+    cover: CoverArrays,
+    links: LinkArrays,
     fire: FireState,
     constants: FireConstants,
     n_steps: int,
@@ -23,6 +23,6 @@ def advance_steps(
 
 @kernel
 def do_nothing(
-    buildings: BuildingTables, cover: CoverTables, links: LinkTables, fire: FireState, constants: FireConstants
+    buildings: BuildingArrays, cover: CoverArrays, links: LinkArrays, fire: FireState, constants: FireConstants
 ) -> None:
     """Take what a step of the fire takes, and return."""

@@ -18,7 +18,7 @@ from benchmarks.machine import describe
 from fireworld.planning.planner import planner
 from fireworld.policy.asking import begin
 from fireworld.scenario import load_scenario
-from fireworld.world.stage import Ground, Stage, build_stage
+from fireworld.simulation.built import BuiltScenario, CityCache, build_scenario
 
 TESTS: Final = ("test-1", "test-2", "test-3")
 TRAINING: Final = tuple(f"train-{number}" for number in range(1, 9))
@@ -54,35 +54,35 @@ CONTESTED: Final = (
 
 @dataclass(frozen=True)
 class Result:
-    """Means over seeds on one stage."""
+    """Means over seeds on one built."""
 
     score: float  # share of the maximum
     seconds: float  # processor time of an episode
 
 
-def contested(grounds: dict[str, Ground]) -> list[Stage]:
+def contested(cities: CityCache) -> list[BuiltScenario]:
     """Build the contested fires."""
     base = load_scenario("test-1")
     return [
-        build_stage(
+        build_scenario(
             base.with_settings({"city.generated.seed": str(seed), "fires.0.at": at, "fires.0.n_buildings": str(n)}),
-            grounds=grounds,
+            cities=cities,
         )
         for seed, at, n in CONTESTED
     ]
 
 
-def play(stage: Stage, options: str, seeds: Iterable[int]) -> Result:
+def play(built: BuiltScenario, options: str, seeds: Iterable[int]) -> Result:
     """Run the planner on several seeds."""
     scores, seconds = [], []
     for seed in seeds:
-        world, policy = stage.world(seed=seed), planner(options)
+        world, policy = built.world(seed=seed), planner(options)
         started = time.process_time()
-        begin(policy, world.tables, n_brigades=world.n_brigades, seed=seed)
+        begin(policy, world.city_arrays, n_brigades=world.n_brigades, seed=seed)
         while not (world.terminated or world.truncated):
             world.step(policy)
         seconds.append(time.process_time() - started)
-        scores.append(float(world.arrays.outcome.score[0] / world.arrays.outcome.score[1]))
+        scores.append(float(world.state.outcome.score[0] / world.state.outcome.score[1]))
     return Result(fmean(scores), fmean(seconds))
 
 
@@ -95,12 +95,12 @@ def play(stage: Stage, options: str, seeds: Iterable[int]) -> Result:
 @click.option("--options", "chosen", multiple=True, help="Options of the planner; repeatable.  [default: a choice]")
 def main(which: str, n_seeds: int, first_seed: int, chosen: tuple[str, ...]) -> None:
     """Print score / maximum on every fire, their mean, and processor seconds an episode."""
-    grounds: dict[str, Ground] = {}
+    cities = CityCache()
     if which == "contested":
-        stages = contested(grounds)
+        stages = contested(cities)
     else:
         names = TESTS if which == "tests" else TRAINING
-        stages = [build_stage(load_scenario(name), grounds=grounds) for name in names]
+        stages = [cities.build(load_scenario(name)) for name in names]
     play(stages[0], "horizon=1", [0])  # compiles
     machine = describe()
     print(f"{machine['processor']}, {n_seeds} seeds from {first_seed}\n")
@@ -108,7 +108,7 @@ def main(which: str, n_seeds: int, first_seed: int, chosen: tuple[str, ...]) -> 
     print("| options | mean | " + " | ".join(labels) + " | s an episode |")
     print("|---" * (len(stages) + 3) + "|")
     for options in chosen or OPTIONS:
-        results = [play(stage, options, range(first_seed, first_seed + n_seeds)) for stage in stages]
+        results = [play(built, options, range(first_seed, first_seed + n_seeds)) for built in stages]
         cells = " | ".join(f"{result.score:.3f}" for result in results)
         mean, seconds = fmean(result.score for result in results), fmean(result.seconds for result in results)
         print(f"| {options or 'default'} | {mean:.3f} | {cells} | {seconds:.2f} |", flush=True)

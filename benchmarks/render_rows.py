@@ -7,12 +7,13 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from fireworld_recorder.reader import Log, open_log
+from fireworld_viewer.pictures.figure_files import plain_style
+from fireworld_viewer.pictures.film import FILMS, Reel, save_film
+from fireworld_viewer.pictures.moments import Moment, moments_between
+
 from benchmarks.runs import new_world, write_log
 from benchmarks.timing import Contender, Row, compare, measure
-from recorder.reader import Log, open_log
-from viewer.film import FILMS, Reel, save_film
-from viewer.moments import Moment, moments_between
-from viewer.output import plain_style
 
 
 def rows(*, quick: bool) -> Iterator[Row]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from fireworld_recorder.writer import LogWriter
 
 from benchmarks.fires import city_of, tables_of
 from fireworld.city.city import Array, City
@@ -14,9 +15,8 @@ from fireworld.city.record import city_record
 from fireworld.parameters import PAPER
 from fireworld.policy.kernel import KernelPolicy, each_another
 from fireworld.records import CityRecord, RunHeader, StepRecord
-from fireworld.world.observer import Observer
-from fireworld.world.world import World
-from recorder.writer import LogWriter
+from fireworld.simulation.observer import Observer
+from fireworld.simulation.world import World
 
 N_BRIGADES: Final = 4
 N_CIVILIANS: Final = 10
@@ -54,13 +54,13 @@ def new_world(size: int, n_steps: int) -> World:
         **start_of(size, from_the_corner(city)),
         seed=SEED,
         n_steps_max=n_steps,
-        tables=tables_of(size),
+        arrays=tables_of(size),
     )
 
 
 def run_silently(world: World, policy: KernelPolicy) -> None:
     """Run a world step by step without looking at it."""
-    policy.begin(world.tables, world.n_brigades, world.seed)
+    policy.begin(world.city_arrays, world.n_brigades, world.seed)
     while not (world.terminated or world.truncated):
         world.step(policy)
 
@@ -68,7 +68,7 @@ def run_silently(world: World, policy: KernelPolicy) -> None:
 def records(world: World) -> Iterator[StepRecord]:
     """Run a world step by step and tell of every step."""
     policy, observer = each_another(), Observer(world)
-    policy.begin(world.tables, world.n_brigades, world.seed)
+    policy.begin(world.city_arrays, world.n_brigades, world.seed)
     yield observer.record()
     while not (world.terminated or world.truncated):
         yield observer.record(world.step(policy))
@@ -89,7 +89,7 @@ def header(n_steps: int) -> RunHeader:
 
 def record_of(world: World) -> CityRecord:
     """Make the city record of a world."""
-    people = world.arrays.civilians
+    people = world.state.civilians
     return city_record(
         world.city,
         civilian_mm=np.stack([people.x, people.y], axis=1),

@@ -9,14 +9,15 @@ from itertools import cycle
 from pathlib import Path
 from typing import Final
 
+from fireworld_recorder.reader import open_log
+from fireworld_viewer.rerun_view.app import save
+from fireworld_viewer.rerun_view.selection import select_steps
+
 from benchmarks.fires import city_of
 from benchmarks.runs import new_world, write_log
 from benchmarks.timing import Contender, Row, compare
 from fireworld.records import MemoryRecording
-from recorder.reader import open_log
 from tests.viewer.headless import has_driver, headless, opened, screenshot
-from viewer.app import save
-from viewer.selection import select_steps
 
 N_STEPS: Final = 300
 VISITED: Final = (1, 5, 3, 4, 2)
@@ -58,8 +59,7 @@ def _to_file(what: str, log_path: Path, size: int, *, n_runs: int, seconds: floa
 def _by_steps(log_path: Path, size: int, *, seconds: float) -> Row:
     """Send a run step by step, as a live view does, beside all steps at once."""
     import rerun
-
-    from viewer.mapping import Feed
+    from fireworld_viewer.rerun_view.mapping import Feed
 
     whole = select_steps(open_log(log_path))
     parts = [MemoryRecording(whole.header, whole.city, [record]) for record in whole]

@@ -16,8 +16,8 @@ from fireworld.city.city import Array
 from fireworld.parameters import PAPER, Parameters
 from fireworld.policy.kernel import KernelPolicy, always
 from fireworld.records import ACTIONS
-from fireworld.world.state import copy_into, copy_world
-from fireworld.world.world import World
+from fireworld.simulation.state import copy_into, copy_world
+from fireworld.simulation.world import World
 from tests.reference import episode
 
 N_STEPS = 100
@@ -49,7 +49,7 @@ def world_of(size: int, kind: Kind, ignited: Array) -> World:
         **start_of(size, ignited),
         seed=SEED,
         n_steps_max=N_STEPS,
-        tables=tables_of(size),
+        arrays=tables_of(size),
     )
 
 
@@ -66,7 +66,7 @@ def smallest_fire(size: int) -> int:
         for last in range(10, N_STEPS + 1, 10):
             world.n_steps_max = last
             world.run(ready)
-            total += int(world.arrays.outcome.counts[0])
+            total += int(world.state.outcome.counts[0])
         if not world.terminated and total < fewest:
             best, fewest = building, total
     assert best >= 0, "some fire outlasts the episode"
@@ -96,10 +96,10 @@ def episode_row(size: int, kind: Kind, *, seconds: float) -> Row:
 
 def again(world: World) -> partial[World]:
     """Return what sets a world back to where it is now."""
-    start, step = copy_world(world.arrays), world.step_number
+    start, step = copy_world(world.state), world.step_number
 
     def reset() -> World:
-        copy_into(world.arrays, start)
+        copy_into(world.state, start)
         world.step_number = step
         return world
 

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any, Final
 import pytest
 
 if TYPE_CHECKING:
-    from fireworld.cli.goldens import Checked
-    from fireworld.golden import Order
     from fireworld.policy.names import NamedPolicy
     from fireworld.policy.protocol import Policy
+    from fireworld.recording.golden.check import Checked
+    from fireworld.recording.golden.order import Order
     from fireworld.records import MemoryRecording
-    from fireworld.world.stage import Ground
+    from fireworld.simulation.built import CityCache
 
 UPDATE: Final = "--fireworld-update"
 FOLDER_INI: Final = "fireworld_recordings"
@@ -50,34 +50,34 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 
 @pytest.fixture(scope="session")
-def _fireworld_grounds() -> dict[str, Ground]:
+def _fireworld_cities() -> CityCache:
     """Cities that were built, to be built once."""
-    return {}
+    from fireworld.simulation.built import CityCache
+
+    return CityCache()
 
 
 @pytest.fixture
 def recording(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, _fireworld_grounds: dict[str, Ground]
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, _fireworld_cities: CityCache
 ) -> Recorder:
     """Run a policy in a scenario and compare every step with the golden recording of this test.
 
     recording(scenario="test-1", policy="mine:Policy", seed=3) fails at the first difference. `--fireworld-update`
     stores the golden anew, and the first time.
     """
-    return Recorder(request, tmp_path_factory, _fireworld_grounds)
+    return Recorder(request, tmp_path_factory, _fireworld_cities)
 
 
 class Recorder:
     """What the fixture `recording` is: call it to run and compare."""
 
-    def __init__(
-        self, request: pytest.FixtureRequest, factory: pytest.TempPathFactory, grounds: dict[str, Ground]
-    ) -> None:
+    def __init__(self, request: pytest.FixtureRequest, factory: pytest.TempPathFactory, cities: CityCache) -> None:
         self._node = request.node
         self._update = bool(request.config.getoption(UPDATE))
         self._folder = request.path.parent / request.config.getini(FOLDER_INI)
         self._factory = factory
-        self._grounds = grounds
+        self._cities = cities
         self._paths: set[Path] = set()
 
     def __call__(
@@ -111,7 +111,7 @@ class Recorder:
             The new run, for what else a test may expect: `run.column("score", "n_burnt_out")[-1] == 0`.
         """
         from fireworld.errors import FireworldError
-        from fireworld.golden import given_policy, place_order
+        from fireworld.recording.golden.order import given_policy, place_order
 
         path = self._path(name)
         if not (self._update or path.exists()):
@@ -143,10 +143,10 @@ class Recorder:
 
     def _run(self, path: Path, order: Order, named: NamedPolicy | None) -> MemoryRecording:
         """Run an order; compare with the golden, or store it."""
-        from fireworld.cli.goldens import carry_out, compare_golden
-        from fireworld.golden import prepare_golden
+        from fireworld.recording.golden.check import carry_out, compare_golden
+        from fireworld.recording.golden.order import prepare_golden
 
-        fresh = carry_out(prepare_golden(order, path.parent, policy=named, grounds=self._grounds))
+        fresh = carry_out(prepare_golden(order, path.parent, policy=named, cities=self._cities))
         if self._update:
             self._store(path, fresh, order)
         else:
@@ -157,7 +157,7 @@ class Recorder:
 
     def _store(self, path: Path, fresh: MemoryRecording, order: Order) -> None:
         """Store a golden, unless it is there already and the same."""
-        from fireworld.cli.goldens import is_current, make_golden_folder, store_golden, store_text
+        from fireworld.recording.golden.check import is_current, make_golden_folder, store_golden, store_text
 
         if is_current(path, fresh, order):
             store_text(path)
@@ -168,7 +168,7 @@ class Recorder:
 
     def _complaint(self, checked: Checked) -> str:
         """Say what differs, and keep the new run where it can be looked at."""
-        from fireworld.cli.goldens import changes, store_recording
+        from fireworld.recording.golden.check import changes, store_recording
 
         lines = [f"{_shown(checked.path)}: the run is not the same any more", checked.sentence]
         if checked.difference is not None and checked.fresh is not None and not checked.difference.same:

@@ -22,18 +22,18 @@ import numpy as np
 from fireworld.policy.asking import begin
 from fireworld.policy.protocol import Decision, Observation, Policy
 from fireworld.scenario import load_scenario
-from fireworld.world.stage import Stage, build_stage
-from fireworld.world.state import named_arrays
-from fireworld.world.world import World
+from fireworld.simulation.built import BuiltScenario, build_scenario
+from fireworld.simulation.state import named_arrays
+from fireworld.simulation.world import World
 
 SCENARIO: Final = "quick"
 STEPS: Final = 30
 
 
 @lru_cache(maxsize=4)
-def _stage(n_brigades: int) -> Stage:
+def _stage(n_brigades: int) -> BuiltScenario:
     """Build the scenario of the tests once for every size of team."""
-    return build_stage(load_scenario(SCENARIO).with_settings({"brigades.n": str(n_brigades)}))
+    return build_scenario(load_scenario(SCENARIO).with_settings({"brigades.n": str(n_brigades)}))
 
 
 class _Watched:
@@ -84,7 +84,7 @@ def _play(policy: Policy, *, n_brigades: int = 3, seed: int = 1) -> Sequence[Dec
     """Run a short episode and return the decisions."""
     world: World = _stage(n_brigades).world(seed=seed, n_steps_max=STEPS)
     watched = _Watched(policy)
-    begin(policy, world.tables, n_brigades=n_brigades, seed=seed)
+    begin(policy, world.city_arrays, n_brigades=n_brigades, seed=seed)
     decisions: list[Decision] = []
     while not (world.terminated or world.truncated):
         choices = world.step(watched)

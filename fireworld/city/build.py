@@ -11,9 +11,9 @@ from fireworld.city.city import Array, City, Links, Plan
 from fireworld.city.freeze import freeze
 from fireworld.city.links import radiation_links
 from fireworld.city.near import near_relation
-from fireworld.city.order import visiting_order
 from fireworld.city.physics import physics_of
 from fireworld.city.streets import streets_of
+from fireworld.city.visiting_order import visiting_order
 from fireworld.parameters import FireParameters
 
 

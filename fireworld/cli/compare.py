@@ -13,16 +13,16 @@ import click
 from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.installed import check_matplotlib
-from fireworld.cli.interrupt import gentle_interrupt
 from fireworld.cli.options import SEED_MAX
 from fireworld.cli.progress import BAR, COUNT, DESCRIPTION, LEFT, bar
+from fireworld.interrupt import gentle_interrupt
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from fireworld.cli.comparison_text import Comparison
-    from fireworld.cli.contest import Contest
-    from fireworld.world.stage import Stage
+    from fireworld.evaluation.contest import Contest
+    from fireworld.simulation.built import BuiltScenario
 
 TESTS: Final = "test-1,test-2,test-3"
 METRIC_NAMES: Final = ("score", "burnt-out", "time", "civilians")
@@ -95,7 +95,7 @@ def command(
     Exit code: 0; with --gate 0 not worse (the interval does not reach below -margin), 1 worse (it lies wholly below
     zero, and reaches below -margin), 3 cannot tell; 2 could not compare; 130 interrupted (--results keeps every run
     that is done).
-    """  # noqa: D301 - click wants the character
+    """
     if not (gate or junit) and (margin is not None or gate_metric is not None):
         raise click.UsageError("--margin and --gate-metric go with --gate or --junit.")
     if margin is not None and not math.isfinite(margin):
@@ -150,24 +150,24 @@ def _prepare(
     jobs: int,
 ) -> Contest:
     """Find policies, scenarios and earlier results."""
-    from fireworld.cli.contest import Contest, enter
-    from fireworld.evaluation.archive import open_archive
+    from fireworld.evaluation.contest import Contest, enter
+    from fireworld.evaluation.results import open_archive
     from fireworld.policy.names import note_on_team
 
     contestants = enter(policies[0]), enter(policies[1])
     archive = open_archive(results)
-    stages = _build_stages(scenarios, settings)
+    stages = _build_scenarios(scenarios, settings)
     said = {
-        note_on_team(contestant.named, stage.scenario.brigades.n, choices=stage.scenario.choices): None
+        note_on_team(contestant.named, built.scenario.brigades.n, choices=built.scenario.choices): None
         for contestant in contestants
-        for stage in stages.values()
+        for built in stages.values()
     }
     for note in filter(None, said):
         click.echo(note, err=True)
     return Contest(stages=stages, contestants=contestants, seeds=seeds, archive=archive, jobs=jobs)
 
 
-def _build_stages(names: str, settings: Sequence[str]) -> dict[str, Stage]:
+def _build_scenarios(names: str, settings: Sequence[str]) -> dict[str, BuiltScenario]:
     """Build the scenarios, each once.
 
     Raises:
@@ -175,11 +175,11 @@ def _build_stages(names: str, settings: Sequence[str]) -> dict[str, Stage]:
     """
     from fireworld.errors import ScenarioError, expected
     from fireworld.scenario import load_scenario, split_settings
-    from fireworld.world.stage import Ground, build_stage
+    from fireworld.simulation.built import CityCache
 
     values = split_settings(settings)
-    grounds: dict[str, Ground] = {}
-    stages: dict[str, Stage] = {}
+    cities = CityCache()
+    stages: dict[str, BuiltScenario] = {}
     seen: dict[str, str] = {}
     for name in (part.strip() for part in names.split(",")):
         scenario = load_scenario(name).with_settings(values)
@@ -187,7 +187,7 @@ def _build_stages(names: str, settings: Sequence[str]) -> dict[str, Stage]:
             got = f"{name} a second time" if name in stages else f"{name}, which is the same as {seen[scenario.digest]}"
             raise ScenarioError(expected("--scenarios", "", "each scenario once", got))
         seen[scenario.digest] = name
-        stages[name] = build_stage(scenario, grounds=grounds)
+        stages[name] = cities.build(scenario)
     return stages
 
 
@@ -216,15 +216,15 @@ def _carry_out(contest: Contest) -> bool:
 
 def _compare(contest: Contest, *, metric: str, margin: float) -> Comparison:
     from fireworld.cli.comparison_text import Comparison, Gate
-    from fireworld.evaluation.archive import simulator_version
     from fireworld.evaluation.paired import compare_outcomes, judge, over_all
+    from fireworld.evaluation.results import simulator_version
 
     a, b = contest.contestants
     pairings = compare_outcomes(contest.outcomes(a), contest.outcomes(b), same_policy=contest.same_policy)
     return Comparison(
         policies=(a.text, b.text),
         digests=(a.identity, b.identity),
-        scenarios=[(name, stage.scenario.digest) for name, stage in contest.stages.items()],
+        scenarios=[(name, built.scenario.digest) for name, built in contest.stages.items()],
         seeds=contest.seeds,
         version=simulator_version(),
         same_policy=contest.same_policy,
@@ -245,9 +245,10 @@ def _write(found: Comparison, *, junit: Path | None, plot: Path | None, force: b
 
         write_file(junit, to_junit(found))
     if plot is not None:
+        from fireworld_viewer.pictures.maps import save_figure
+
         from fireworld.cli.comparison_text import scopes
         from fireworld.evaluation.paired_figure import draw_differences
-        from viewer.maps import save_figure
 
         title = f"{found.policies[1]} (B) against {found.policies[0]} (A), {len(found.seeds)} seeds"
         save_figure(draw_differences(scopes(found), title=title), plot, force=force)

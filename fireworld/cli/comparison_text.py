@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 from xml.etree import ElementTree as Xml
 
-from fireworld.cli.junit import report
 from fireworld.errors import one_line
-from fireworld.evaluation.findings import spread
 from fireworld.evaluation.paired import METRICS, N_SEEDS_ENOUGH, Judgement, Metric, Pairing, Side, over_all
 from fireworld.evaluation.statistics import Estimate
+from fireworld.junit import report
+from fireworld.reproduction.findings import spread
 
 if TYPE_CHECKING:
     from rich.table import Table

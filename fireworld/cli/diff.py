@@ -14,9 +14,9 @@ from fireworld.cli.difference_text import show, show_header
 from fireworld.cli.installed import check_matplotlib
 
 if TYPE_CHECKING:
-    from recorder.diff import Difference, Steps
-    from recorder.reader import Log
-    from recorder.spread import SpreadRow
+    from fireworld_recorder.diff import Difference, Steps
+    from fireworld_recorder.reader import Log
+    from fireworld_recorder.spread import SpreadRow
 
 __all__ = ["command", "show", "write_json"]
 
@@ -95,7 +95,7 @@ def command(
     fireworld diff golden.mcap new.mcap --html diff.html --junit diff.xml
 
     Exit code: 0 the same, 1 different, 2 could not compare (no file is written).
-    """  # noqa: D301 - click wants the character
+    """
     if first_step is not None and last_step is not None and first_step > last_step:
         raise click.UsageError(f"--from and --to: expected a range of steps, got {first_step} to {last_step}")
     outputs = [path for path in (junit, html) if path is not None]
@@ -134,8 +134,9 @@ def command(
 
 
 def _parse_tolerance(text: str) -> tuple[str, float]:
+    from fireworld_recorder.match import check_field_name
+
     from fireworld.errors import LogError
-    from recorder.match import check_field_name
 
     name, _, number = text.partition("=")
     try:
@@ -152,8 +153,9 @@ def _parse_tolerance(text: str) -> tuple[str, float]:
 
 def _checked_names(names: Sequence[str]) -> Sequence[str]:
     if names:
+        from fireworld_recorder.match import check_field_name
+
         from fireworld.errors import LogError
-        from recorder.match import check_field_name
 
         try:
             for name in names:
@@ -200,8 +202,9 @@ def _open(order: Order) -> tuple[Log, Log]:
 
 
 def _open_one(path: Path, *, partial: bool) -> Log:
+    from fireworld_recorder.reader import open_log
+
     from fireworld.errors import LogError
-    from recorder.reader import open_log
 
     log = open_log(path, partial=True)
     if log.damage is not None and not partial:
@@ -221,7 +224,7 @@ def _same_bytes(first: Path, second: Path) -> bool:
 
 def _tell_same(logs: tuple[Log, Log]) -> None:
     """Tell of two runs of one digest; they need no comparison, and no library for tables."""
-    from recorder.comparable import header_differences
+    from fireworld_recorder.comparable import header_differences
 
     click.echo(f"the same: {len(logs[0])} steps, digest {logs[0].digest}")
     show_header(header_differences(logs[0].header, logs[1].header))
@@ -233,9 +236,10 @@ def _compare(order: Order, logs: tuple[Log, Log]) -> Difference:
     Raises:
         LogError: the scenarios or the cities are not the same, or no step is to be compared.
     """
+    from fireworld_recorder.comparable import check_same_scenario
+    from fireworld_recorder.diff import compare
+
     from fireworld.errors import LogError
-    from recorder.comparable import check_same_scenario
-    from recorder.diff import compare
 
     if not order.any_scenario and logs[0].digest != logs[1].digest:
         check_same_scenario(logs[0].header, logs[1].header, names=order.names)
@@ -254,7 +258,7 @@ def _compare(order: Order, logs: tuple[Log, Log]) -> Difference:
 
 def _steps(order: Order, logs: tuple[Log, Log]) -> Steps:
     """Return the steps to compare: those asked for, and none beyond the good part of a cut-off recording."""
-    from recorder.diff import Steps
+    from fireworld_recorder.diff import Steps
 
     ends = [order.last_step] if order.last_step is not None else []
     ends += [int(log.steps.max(initial=-1)) for log in logs if log.damage is not None]
@@ -262,19 +266,21 @@ def _steps(order: Order, logs: tuple[Log, Log]) -> Steps:
 
 
 def _write_junit(path: Path, order: Order, difference: Difference) -> None:
+    from fireworld_recorder.match import Rules
+
     from fireworld.cli.difference_junit import junit_xml
     from fireworld.files import write_file
-    from recorder.match import Rules
 
     write_file(path, junit_xml(difference, Rules(order.tolerances, order.ignore), paths=order.paths))
     click.echo(f"wrote {path}", err=True)
 
 
 def _write_page(path: Path, order: Order, logs: tuple[Log, Log], difference: Difference) -> None:
-    from fireworld.cli.difference_page import difference_page
-    from fireworld.cli.difference_pictures import draw_all
+    from fireworld_recorder.match import Rules
+
     from fireworld.files import write_file
-    from recorder.match import Rules
+    from fireworld.recording.pages.difference_page import difference_page
+    from fireworld.recording.pages.difference_pictures import draw_all
 
     rules = Rules(order.tolerances, order.ignore)
     images = draw_all(logs, difference, rules, order.rows or [])
@@ -289,6 +295,6 @@ def _write_recordings_json(difference: Difference, logs: tuple[Log, Log]) -> Non
 
 def write_json(difference: Difference, *, digests: Sequence[str], **more: Any) -> None:
     """Write a comparison as JSON; `more` stands before it. docs/comparing-recordings.md has every key."""
-    from recorder.plain import plain
+    from fireworld_recorder.plain import plain
 
     click.echo(json.dumps({"same": difference.same, "digests": list(digests)} | more | plain(difference), indent=2))

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 from xml.etree.ElementTree import Element, SubElement
 
-from fireworld.cli.junit import clean, report
+from fireworld.junit import clean, report
 from fireworld.records import STEP_TOPICS, Snapshot
 
 if TYPE_CHECKING:
-    from recorder.diff import Difference
-    from recorder.match import Rules
+    from fireworld_recorder.diff import Difference
+    from fireworld_recorder.match import Rules
 
 COMMIT: Final = "/commit"
 LENGTH: Final = "length"

@@ -10,8 +10,8 @@ import click
 from fireworld.cli.tables import print_table
 
 if TYPE_CHECKING:
-    from recorder.diff import Difference
-    from recorder.spread import Pair, SpreadRow
+    from fireworld_recorder.diff import Difference
+    from fireworld_recorder.spread import Pair, SpreadRow
 
 DIGEST_SHOWN: Final = 12
 TOTALS: Final = {

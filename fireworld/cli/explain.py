@@ -13,16 +13,17 @@ import click
 from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.explanation_text import Pair, as_json_content, own_targets, show
-from fireworld.cli.interrupt import gentle_interrupt
 from fireworld.cli.progress import BAR, ELAPSED, bar
 from fireworld.cli.replays import check_replay
+from fireworld.interrupt import gentle_interrupt
 
 if TYPE_CHECKING:
-    from fireworld.cli.workers import Workers
-    from fireworld.forks.explain import ScoreAll
-    from fireworld.forks.stretches import Stretch
-    from fireworld.forks.worse_run import MakePolicy, WorseRun
-    from recorder.reader import Log
+    from fireworld_recorder.reader import Log
+
+    from fireworld.executors import Workers
+    from fireworld.recording.explanation.search import ScoreAll
+    from fireworld.recording.explanation.stretches import Stretch
+    from fireworld.recording.explanation.worse_run import MakePolicy, WorseRun
 
 BUDGET: Final = 200
 SHOWN_MAX: Final = 20
@@ -63,14 +64,14 @@ def command(context: click.Context, *, first: Path, second: Path, budget: int, l
 
     Exit code: 0 explained, or the scores are equal; 2 could not explain (another scenario or seed, a run that has not
     ended, a recording that does not replay); 130 interrupted (what is known so far is shown).
-    """  # noqa: D301 - click wants the character
+    """
     announce_compilation()
-    from fireworld.cli.workers import Workers
-    from fireworld.forks.decisions import RecordedDecisions
-    from fireworld.forks.explain import explain
-    from fireworld.forks.stretches import find_stretches
-    from fireworld.forks.worse_run import prepare_worse_run
-    from fireworld.replay import recorded_stage
+    from fireworld.executors import Workers
+    from fireworld.recording.decisions import RecordedDecisions
+    from fireworld.recording.explanation.search import explain
+    from fireworld.recording.explanation.stretches import find_stretches
+    from fireworld.recording.explanation.worse_run import prepare_worse_run
+    from fireworld.recording.replay import build_recorded
 
     pair = _open_pair(first, second)
     if pair.worse_score == pair.better_score:
@@ -79,7 +80,7 @@ def command(context: click.Context, *, first: Path, second: Path, budget: int, l
     _check_replays(pair)
     make_policy, why_recorded = _policy_of(pair.worse)
     better = RecordedDecisions(pair.better)
-    run = prepare_worse_run(recorded_stage(pair.worse.header), pair.worse, better, make_policy)
+    run = prepare_worse_run(build_recorded(pair.worse.header), pair.worse, better, make_policy)
     stretches = find_stretches(run.recorded, better, n_brigades=run.n_brigades)
     with gentle_interrupt() as interrupted, bar("explain", budget, REPLAYS, BAR, ELAPSED) as advance:
         workers = Workers(N_THREADS if run.compiled else 1, interrupted)
@@ -105,8 +106,9 @@ def command(context: click.Context, *, first: Path, second: Path, budget: int, l
 
 def _open_pair(first: Path, second: Path) -> Pair:
     """Open two recordings that can be compared; of two equal ones the first counts as the worse."""
-    from fireworld.forks.worse_run import check_comparable
-    from recorder.reader import open_log
+    from fireworld_recorder.reader import open_log
+
+    from fireworld.recording.explanation.worse_run import check_comparable
 
     logs = open_log(first), open_log(second)
     lasts = [log.step(int(log.steps[-1])) if len(log) else None for log in logs]
@@ -129,7 +131,7 @@ def _check_replays(pair: Pair) -> None:
     Raises:
         LogError: one is not; names the first step.
     """
-    from fireworld.replay import Replay
+    from fireworld.recording.replay import Replay
 
     for log in (pair.worse, pair.better):
         check_replay(log, Replay(log), source=str(log.path))
@@ -139,7 +141,7 @@ def _policy_of(log: Log) -> tuple[MakePolicy | None, str]:
     """Return what makes the policy of a recording anew, or why that cannot be."""
     from fireworld.cli.fork import RECORDED
     from fireworld.errors import FireworldError
-    from fireworld.forks.resume import recorded_policy
+    from fireworld.recording.resume import recorded_policy
 
     if log.header.policy == RECORDED:
         return None, f"{log.path} is a fork in which recorded decisions went on"

@@ -11,10 +11,11 @@ import click
 from fireworld.cli.tables import print_table
 
 if TYPE_CHECKING:
-    from fireworld.forks.decisions import RecordedDecisions
-    from fireworld.forks.explain import Explanation, Found
-    from fireworld.forks.stretches import Stretch
-    from recorder.reader import Log
+    from fireworld_recorder.reader import Log
+
+    from fireworld.recording.decisions import RecordedDecisions
+    from fireworld.recording.explanation.search import Explanation, Found
+    from fireworld.recording.explanation.stretches import Stretch
 
 APART: Final = 0.05
 """Shares whose sum is farther than this from what all do together do not add up."""

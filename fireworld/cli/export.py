@@ -40,15 +40,16 @@ def command(*, log: Path, folder: Path, tables: str | None, force: bool, as_json
     A recording that was cut off or damaged is exported as far as it is good.
 
     Exit code: 0 exported, 2 could not export, 130 interrupted (nothing is left of it).
-    """  # noqa: D301 - click wants the character
+    """
+    from fireworld_recorder.reader import open_log
+
     from fireworld.errors import OutputError
-    from recorder.reader import open_log
 
     if find_spec("pyarrow") is None:
         raise OutputError("--parquet: pyarrow is not installed; try pip install 'fireworld[archive]'")
     chosen = _chosen(tables)
     recording = open_log(log, partial=True)
-    from recorder.parquet import SUFFIX, export
+    from fireworld_recorder.parquet import SUFFIX, export
 
     with bar("export", len(recording), quiet=as_json) as advance:
         n_rows = export(recording, folder, tables=chosen, force=force, on_step=lambda _: advance())
@@ -69,7 +70,7 @@ def command(*, log: Path, folder: Path, tables: str | None, force: bool, as_json
 
 def _chosen(tables: str | None) -> list[str]:
     """Return the names of the tables to write."""
-    from recorder.tables import TABLES
+    from fireworld_recorder.tables import TABLES
 
     names = list(TABLES) if tables is None else [name.strip() for name in tables.split(",")]
     for name in names:

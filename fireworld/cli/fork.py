@@ -14,11 +14,12 @@ from fireworld.cli.options import record_options
 from fireworld.cli.replays import check_replay
 
 if TYPE_CHECKING:
-    from fireworld.forks.fork import Change, Swap
+    from fireworld_recorder.reader import Log
+
     from fireworld.policy.names import NamedPolicy
     from fireworld.policy.protocol import Decision
+    from fireworld.recording.fork import Change, Swap
     from fireworld.records import MemoryRecording
-    from recorder.reader import Log
 
 RECORDED: Final = "recorded"
 """Names the policy that decides as is recorded, whatever happens."""
@@ -82,17 +83,18 @@ def command(
 
     Exit code: 0 forked, 2 could not fork (among others: LOG does not replay to what is recorded), 130 interrupted (the
     recording keeps every step done).
-    """  # noqa: D301 - click wants the character
+    """
     if force and output is None:
         raise click.UsageError("--force goes with --record.")
     announce_compilation()
+    from fireworld_recorder.reader import open_log
+
     from fireworld.cli.run import carry_out, outcome_of, show_outcome
-    from fireworld.forks.fork import Change, prepare_fork
-    from fireworld.forks.resume import has_memory, resume
     from fireworld.policy.asking import begin
     from fireworld.policy.names import note_on_team
-    from fireworld.replay import recorded_stage
-    from recorder.reader import open_log
+    from fireworld.recording.fork import Change, prepare_fork
+    from fireworld.recording.replay import build_recorded
+    from fireworld.recording.resume import has_memory, resume
 
     original = open_log(log)
     beginning = recorded_up_to(original, step)
@@ -100,11 +102,11 @@ def command(
     change = Change(named, decided=_decided(decided, original), swaps=_swaps(swapped))
     _check_told_once(change)
     remembering = named if policy is None and has_memory(named.policy) else None
-    stage = recorded_stage(original.header)
+    stage = build_recorded(original.header)
     resumed = resume(stage, beginning, source=str(log), remembering=remembering)
     check_replay(resumed.recorded, resumed.replayed, source=str(log))
     if remembering is None:
-        begin(named.policy, resumed.world.tables, n_brigades=resumed.world.n_brigades, seed=original.header.seed)
+        begin(named.policy, resumed.world.city_arrays, n_brigades=resumed.world.n_brigades, seed=original.header.seed)
     run = prepare_fork(resumed, change, original, list(beginning), digest=original.digest, source=str(log))
     note = note_on_team(named, resumed.world.n_brigades, choices=stage.scenario.choices)
     if note:
@@ -142,9 +144,9 @@ def recorded_up_to(log: Log, step: int) -> MemoryRecording:
 
 def _policy(log: Log, name: str | None) -> NamedPolicy:
     """Return who goes on."""
-    from fireworld.forks.decisions import RecordedDecisions
-    from fireworld.forks.resume import recorded_policy
     from fireworld.policy.names import NamedPolicy, load_policy
+    from fireworld.recording.decisions import RecordedDecisions
+    from fireworld.recording.resume import recorded_policy
 
     if RECORDED in {name, log.header.policy if name is None else None}:
         return NamedPolicy(RECORDED, log.digest, RecordedDecisions(log))
@@ -197,9 +199,10 @@ def _decision(number: str, order: str, log: Log) -> Decision:
 
 def _swaps(texts: tuple[str, ...]) -> list[Swap]:
     """Read OTHER:BRIGADE and the recordings it names."""
-    from fireworld.forks.decisions import RecordedDecisions
-    from fireworld.forks.fork import Swap
-    from recorder.reader import open_log
+    from fireworld_recorder.reader import open_log
+
+    from fireworld.recording.decisions import RecordedDecisions
+    from fireworld.recording.fork import Swap
 
     logs: dict[str, tuple[Log, RecordedDecisions]] = {}
     swaps: list[Swap] = []

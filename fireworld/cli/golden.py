@@ -13,15 +13,14 @@ import click
 
 from fireworld.cli import USER_ERROR
 from fireworld.cli.compiling import announce_compilation
-from fireworld.cli.interrupt import gentle_interrupt
 from fireworld.cli.options import seed_option, settings_option, steps_option
 from fireworld.cli.progress import bar
 from fireworld.cli.tables import print_table
 from fireworld.errors import OutputError, expected
+from fireworld.interrupt import gentle_interrupt
 
 if TYPE_CHECKING:
-    from fireworld.cli.goldens import Checked
-    from fireworld.world.stage import Ground
+    from fireworld.recording.golden.check import Checked
 
 FOLDER: Final = Path("recordings/golden")
 REASONS: Final = "REASONS.md"
@@ -41,7 +40,7 @@ def command() -> None:
 
     A golden is two files: NAME.mcap, the recording, which says what to run, and NAME.txt, what happened in it, to be
     read in reviews. Both belong under version control.
-    """  # noqa: D301 - click wants the character
+    """
 
 
 @command.command(short_help="Run all again and compare.")
@@ -62,8 +61,8 @@ def check(
     Exit code: 0 all the same, 1 one is different, 2 one cannot be run or compared, or there is none.
     """
     from fireworld.cli.golden_junit import junit_xml
-    from fireworld.cli.goldens import find_goldens, make_golden_folder, store_recording
     from fireworld.files import check_free, write_file
+    from fireworld.recording.golden.check import find_goldens, make_golden_folder, store_recording
 
     if keep is not None and keep.resolve() == folder.resolve():
         raise click.UsageError("--keep: expected another folder than that of the goldens.")
@@ -100,8 +99,8 @@ def update(context: click.Context, *, names: tuple[str, ...], reason: str, folde
 
     Exit code: 0 done, or there was nothing to do; 2 one cannot be run.
     """
-    from fireworld.cli.goldens import find_goldens, store_golden, store_text
     from fireworld.files import write_file
+    from fireworld.recording.golden.check import find_goldens, store_golden, store_text
 
     reason = " ".join(reason.split())
     if not reason:
@@ -153,10 +152,10 @@ def add(
     fireworld golden add quick --policy easiest --set brigades.n=4 --name quick-four
 
     Exit code: 0 done, 2 could not be done.
-    """  # noqa: D301 - click wants the character
+    """
     announce_compilation()
-    from fireworld.cli.goldens import carry_out, make_golden_folder, store_golden, text_path
-    from fireworld.golden import place_order, prepare_golden
+    from fireworld.recording.golden.check import carry_out, make_golden_folder, store_golden, text_path
+    from fireworld.recording.golden.order import place_order, prepare_golden
     from fireworld.scenario import split_settings
 
     path = folder / f"{_checked_name(name) if name is not None else _made_up_name(scenario, policy, seed)}.mcap"
@@ -187,12 +186,13 @@ def _made_up_name(scenario: str, policy: str, seed: int) -> str:
 def _check_all(paths: Sequence[Path], *, quiet: bool = False) -> Iterator[Checked]:
     """Check goldens one after another, under a progress display where people watch."""
     announce_compilation()
-    from fireworld.cli.goldens import check_golden
+    from fireworld.recording.golden.check import check_golden
+    from fireworld.simulation.built import CityCache
 
-    grounds: dict[str, Ground] = {}
+    cities = CityCache()
     with bar("running", len(paths), quiet=quiet) as advance:
         for path in paths:
-            yield check_golden(path, grounds=grounds)
+            yield check_golden(path, cities=cities)
             advance()
 
 
@@ -225,7 +225,7 @@ def _write_json(results: Sequence[Checked]) -> None:
 
 def _difference(checked: Checked) -> dict[str, Any]:
     """Return what is known of a difference as plain values: first a of the golden, then b of the new run."""
-    from recorder.plain import plain
+    from fireworld_recorder.plain import plain
 
     difference = checked.difference
     if difference is None:
@@ -239,7 +239,7 @@ def _difference(checked: Checked) -> dict[str, Any]:
 
 def _show(results: Sequence[Checked], *, keep: Path | None) -> None:
     """Show results as a table; below it, for each that is not the same, what differs."""
-    from fireworld.cli.goldens import changes
+    from fireworld.recording.golden.check import changes
 
     rows = []
     for checked in results:

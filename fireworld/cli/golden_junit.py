@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, SubElement
 
-from fireworld.cli.junit import clean, report
+from fireworld.junit import clean, report
 
 if TYPE_CHECKING:
-    from fireworld.cli.goldens import Checked
+    from fireworld.recording.golden.check import Checked
 
 
 def junit_xml(results: Sequence[Checked]) -> bytes:
@@ -18,7 +18,7 @@ def junit_xml(results: Sequence[Checked]) -> bytes:
 
 
 def _case(checked: Checked) -> Element:
-    from fireworld.cli.goldens import changes
+    from fireworld.recording.golden.check import changes
 
     case = Element("testcase", {"classname": "golden", "name": clean(checked.name), "time": "0"})
     if checked.result != "same":

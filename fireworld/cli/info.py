@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from recorder.reader import Log
+    from fireworld_recorder.reader import Log
 
 
 @click.command()
@@ -27,9 +27,9 @@ def command(context: click.Context, *, log: Path | None, as_json: bool, schema: 
     fireworld info --schema             those that this version writes
 
     Exit code: 0 good, 1 cut off or damaged but good up to a step, 2 not readable.
-    """  # noqa: D301 - click wants the character
-    from recorder.reader import open_log
-    from recorder.schema import PROTO
+    """
+    from fireworld_recorder.reader import open_log
+    from fireworld_recorder.schema import PROTO
 
     if schema and proto:
         raise click.UsageError("--schema and --proto exclude each other.")
@@ -50,12 +50,13 @@ def command(context: click.Context, *, log: Path | None, as_json: bool, schema: 
 
 def _show_schema(log: Log | None, *, as_json: bool) -> None:
     """Say what the messages of a log are, or those that this version writes."""
+    from fireworld_recorder.describe import describe
+    from fireworld_recorder.plain import plain
+    from fireworld_recorder.recover import channels_of
+    from fireworld_recorder.writer import own_channels
+
     from fireworld.errors import LogError, one_line
     from fireworld.records import FORMAT
-    from recorder.describe import describe
-    from recorder.plain import plain
-    from recorder.recover import channels_of
-    from recorder.writer import own_channels
 
     try:
         topics = describe(own_channels() if log is None else channels_of(log))
@@ -81,10 +82,11 @@ def _show_schema(log: Log | None, *, as_json: bool) -> None:
 
 def _summary(log: Log) -> dict[str, Any]:
     """Collect what there is to say."""
+    from fireworld_recorder.header import to_metadata
+    from fireworld_recorder.plain import plain
+    from fireworld_recorder.totals import totals_of
+
     from fireworld.records import FORMAT
-    from recorder.header import to_metadata
-    from recorder.plain import plain
-    from recorder.totals import totals_of
 
     steps = log.steps
     metadata = to_metadata(log.header).items()

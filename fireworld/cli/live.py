@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import click
 
 if TYPE_CHECKING:
+    from fireworld_viewer.rerun_view.live import Screen, Showing
+    from fireworld_viewer.rerun_view.training_curves import Point, Sheet
+
     from fireworld.records import CityRecord, RunHeader, StepRecord
     from fireworld.training.teams import Training
     from fireworld.training.trainer import EpisodeReport
-    from viewer.learning import Point, Sheet
-    from viewer.live import Screen, Showing
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -49,7 +50,7 @@ def find_screen(*, view: bool, url: str | None) -> Screen | None:
         raise click.UsageError("--view and --view-url exclude each other.")
     if not view and url is None:
         return None
-    from viewer.live import own_window, running_viewer
+    from fireworld_viewer.rerun_view.live import own_window, running_viewer
 
     return own_window() if url is None else running_viewer(url)
 
@@ -60,7 +61,7 @@ def watched_run(screen: Screen | None, header: RunHeader, city: CityRecord) -> I
     if screen is None:
         yield lambda _: None
         return
-    from viewer.live import RunView
+    from fireworld_viewer.rerun_view.live import RunView
 
     with closing(RunView(screen, header, city, tell=tell)) as watched:
         yield watched.add
@@ -76,7 +77,7 @@ def watched_training(screen: Screen | None) -> Iterator[Callable[[Training, Epis
     if screen is None:
         yield lambda _, __: None
         return
-    from viewer.live import TrainingView
+    from fireworld_viewer.rerun_view.live import TrainingView
 
     episodes, lock = Episodes(), Lock()
     with closing(TrainingView(screen, _sheet(), tell=tell)) as watched:
@@ -90,7 +91,7 @@ def watched_training(screen: Screen | None) -> Iterator[Callable[[Training, Epis
 
 
 def _sheet() -> Sheet:
-    from viewer.learning import Sheet
+    from fireworld_viewer.rerun_view.training_curves import Sheet
 
     return Sheet(title="training", timeline="episode", plots=CURVES, log="Scenarios")
 
@@ -104,7 +105,7 @@ class Episodes:
 
     def point(self, training: Training, episode: EpisodeReport) -> tuple[Point, Showing | None]:
         """Return an episode as it is drawn, and what is to be played after it."""
-        from viewer.learning import Point
+        from fireworld_viewer.rerun_view.training_curves import Point
 
         seed = training.trainer.seed
         number = self._n_episodes.get(seed, 0)
@@ -147,12 +148,12 @@ def _showing(training: Training, episode: EpisodeReport) -> Showing:
         import msgspec
 
         from fireworld.policy.names import NamedPolicy
-        from fireworld.runs import prepare_run
-        from fireworld.world.stage import build_stage
+        from fireworld.simulation.built import build_scenario
+        from fireworld.simulation.run import prepare_run
 
         policy = team.policy()
         as_trained = msgspec.structs.replace(scenario, choices=trainer.method.choices)
-        run = prepare_run(build_stage(as_trained), NamedPolicy("team in training", policy.digest, policy), seed=1)
+        run = prepare_run(build_scenario(as_trained), NamedPolicy("team in training", policy.digest, policy), seed=1)
         return title, run.header, run.city, [replace(record, snapshot=None) for record in run]
 
     return play

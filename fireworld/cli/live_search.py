@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Final
 from fireworld.cli.live import tell
 
 if TYPE_CHECKING:
+    from fireworld_viewer.rerun_view.live import Screen
+    from fireworld_viewer.rerun_view.training_curves import Point, Sheet
+
     from fireworld.policy.ranking import Weight
     from fireworld.training.search import Generation, Searcher
     from fireworld.training.searches import SearchRun
-    from viewer.learning import Point, Sheet
-    from viewer.live import Screen
 
 SCORE: Final = "score"
 SPREAD: Final = "spread"
@@ -40,7 +41,7 @@ def watched_search(
     if screen is None:
         yield lambda _, __: None
         return
-    from viewer.live import TrainingView
+    from fireworld_viewer.rerun_view.live import TrainingView
 
     with closing(TrainingView(screen, _sheet([run.searcher for run in runs]), tell=tell)) as watched:
         yield lambda run, generation: watched.add(_point(run.searcher, generation))
@@ -48,7 +49,7 @@ def watched_search(
 
 def _sheet(searchers: Sequence[Searcher]) -> Sheet:
     """Return what is drawn: scores and spread of all searches, and a tab with the weights of each."""
-    from viewer.learning import Sheet, Tab
+    from fireworld_viewer.rerun_view.training_curves import Sheet, Tab
 
     return Sheet(
         title="search",
@@ -63,7 +64,7 @@ def _sheet(searchers: Sequence[Searcher]) -> Sheet:
 
 def _point(searcher: Searcher, generation: Generation) -> Point:
     """Return a generation as it is drawn."""
-    from viewer.learning import Point
+    from fireworld_viewer.rerun_view.training_curves import Point
 
     team, mean = f"seed {searcher.seed}", searcher.state.mean.tolist()
     weights = {

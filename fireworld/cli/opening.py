@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from recorder.reader import Log
+    from fireworld_recorder.reader import Log
 
 
 def open_committed(path: Path, *, doing: str) -> Log:
@@ -17,7 +17,7 @@ def open_committed(path: Path, *, doing: str) -> Log:
     Raises:
         LogError: it is not a log.
     """
-    from recorder.reader import open_log
+    from fireworld_recorder.reader import open_log
 
     log = open_log(path, partial=True)
     if log.damage is not None:

@@ -54,7 +54,7 @@ def show(*, team: str, states: tuple[str, ...], limit: int, as_json: bool) -> No
     fireworld policy show paper-cooperative
 
     Exit code: 0 shown, 2 no such team or state.
-    """  # noqa: D301 - click wants the character
+    """
     from fireworld.cli.ranking_text import ranking_as_json, show_ranking
     from fireworld.cli.team_text import origin_lines, short_provenance, show_states, show_team, team_as_json
     from fireworld.errors import PolicyError, expected
@@ -95,7 +95,7 @@ def diff(context: click.Context, *, first: str, second: str, actions_only: bool,
     fireworld policy diff team.npz paper-cooperative
 
     Exit code: 0 the same, 1 different, 2 could not compare.
-    """  # noqa: D301 - click wants the character
+    """
     from fireworld.cli.ranking_text import ranking_difference_as_json, show_ranking_difference
     from fireworld.cli.team_text import difference_as_json, show_difference
     from fireworld.errors import TrainingError, expected

@@ -59,11 +59,11 @@ def command(
     that was cut off or damaged is drawn as far as it is good. docs/pictures.md says what is to be seen.
 
     Exit code: 0 drawn, 2 could not draw, 130 interrupted (no half file is left).
-    """  # noqa: D301 - click wants the character
+    """
     if len(logs) > 2:
         raise click.UsageError(f"Expected one or two recordings, got {len(logs)}.")
-    from viewer.film import FILMS
-    from viewer.output import STILLS, check_output
+    from fireworld_viewer.pictures.figure_files import STILLS, check_output
+    from fireworld_viewer.pictures.film import FILMS
 
     check_output(output, endings=[*STILLS, *FILMS], force=force)
     if output.suffix.lower() in FILMS:
@@ -83,7 +83,7 @@ def command(
 
 def _step_numbers(option: str, text: str) -> list[int]:
     """Turn "0,60,last" into steps."""
-    from viewer.moments import LAST
+    from fireworld_viewer.pictures.moments import LAST
 
     words = [word.strip() for word in text.split(",")]
     if len(words) > _STEPS_MAX:
@@ -94,8 +94,8 @@ def _step_numbers(option: str, text: str) -> list[int]:
 
 
 def _render_still(paths: Sequence[Path], output: Path, steps: Sequence[int], *, force: bool) -> None:
-    from viewer.maps import draw_steps
-    from viewer.output import plain_style, save_figure
+    from fireworld_viewer.pictures.figure_files import plain_style, save_figure
+    from fireworld_viewer.pictures.maps import draw_steps
 
     recordings = [open_committed(path, doing="drawing") for path in paths]
     with plain_style():
@@ -106,9 +106,9 @@ def _render_still(paths: Sequence[Path], output: Path, steps: Sequence[int], *, 
 def _render_film(
     paths: Sequence[Path], output: Path, *, first: int | None, last: int | None, every: int, fps: float | None
 ) -> None:
-    from viewer.film import FPS, save_film
-    from viewer.moments import moments_between
-    from viewer.output import plain_style
+    from fireworld_viewer.pictures.figure_files import plain_style
+    from fireworld_viewer.pictures.film import FPS, save_film
+    from fireworld_viewer.pictures.moments import moments_between
 
     recordings: list[Recording] = [open_committed(path, doing="drawing") for path in paths]
     moments = moments_between(recordings, first=first, last=last, every=every)

@@ -20,8 +20,9 @@ def check_replay(recorded: Recording, replayed: Recording, *, source: str, hint:
     Raises:
         LogError: they differ; names the first step.
     """
+    from fireworld_recorder.diff import compare
+
     from fireworld.errors import LogError
-    from recorder.diff import compare
 
     first = compare(recorded, replayed).first
     if first is not None:

@@ -11,7 +11,7 @@ import click
 from fireworld.cli.opening import open_committed
 
 if TYPE_CHECKING:
-    from recorder.reader import Log
+    from fireworld_recorder.reader import Log
 
 _MAPS: Final = 4
 """Maps in the strip."""
@@ -33,12 +33,13 @@ def command(*, logs: tuple[Path, ...], output: Path, force: bool) -> None:
     as far as it is good.
 
     Exit code: 0 written, 2 could not write, 130 interrupted (nothing is left of it).
-    """  # noqa: D301 - click wants the character
+    """
     if len(logs) > 2:
         raise click.UsageError(f"Expected one or two recordings, got {len(logs)}.")
-    from fireworld.cli.run_page import run_page
+    from fireworld_viewer.pictures.figure_files import check_output
+
     from fireworld.files import write_file
-    from viewer.output import check_output
+    from fireworld.recording.pages.run_page import run_page
 
     check_output(output, endings=(".html", ".htm"), force=force)
     recordings = [open_committed(path, doing="telling of") for path in logs]
@@ -53,11 +54,11 @@ def _draw_all(recordings: Sequence[Log]) -> Mapping[str, bytes]:
     Raises:
         ViewError: matplotlib is not installed, a recording has no steps, or the cities differ.
     """
-    from viewer.curves import draw_curves
-    from viewer.maps import draw_steps
-    from viewer.moments import evenly
-    from viewer.output import plain_style, png_bytes
-    from viewer.timeline import draw_timeline
+    from fireworld_viewer.pictures.curves import draw_curves
+    from fireworld_viewer.pictures.decision_timeline import draw_timeline
+    from fireworld_viewer.pictures.figure_files import plain_style, png_bytes
+    from fireworld_viewer.pictures.maps import draw_steps
+    from fireworld_viewer.pictures.moments import evenly
 
     with plain_style():
         return {

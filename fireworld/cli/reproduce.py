@@ -12,21 +12,21 @@ import click
 from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.installed import check_matplotlib
-from fireworld.cli.interrupt import gentle_interrupt
 from fireworld.cli.progress import BAR, COUNT, DESCRIPTION, ELAPSED, bars
-from fireworld.cli.report_folder import find_folder, make_folder
 from fireworld.files import write_file
+from fireworld.interrupt import gentle_interrupt
+from fireworld.reproduction.folder import find_folder, make_folder
 
 if TYPE_CHECKING:
     from rich.progress import Progress
     from rich.table import Table
 
-    from fireworld.cli.pieces import Workshop
-    from fireworld.cli.repetitions import Repetition
-    from fireworld.cli.workers import Workers
-    from fireworld.evaluation.study import Study
-    from fireworld.evaluation.tables import Tables
-    from fireworld.world.stage import Ground
+    from fireworld.executors import Workers
+    from fireworld.reproduction.paper_tables import Tables
+    from fireworld.reproduction.pieces import Workshop
+    from fireworld.reproduction.repetitions import Repetition
+    from fireworld.reproduction.study import Study
+    from fireworld.simulation.built import CityCache
 
 CURRICULUM: Final = "paper"
 FIRST_SEED: Final = 1000
@@ -91,7 +91,7 @@ def command(
     the same options with --resume go on: what was trained and tested by then is kept in DIR.
 
     Exit code: 0 done, whatever was found; 2 could not be done; 130 interrupted.
-    """  # noqa: D301 - click wants the character
+    """
     if force and resume:
         raise click.UsageError("--force and --resume exclude each other.")
     order = Order(
@@ -106,12 +106,12 @@ def command(
     else:
         make_folder(out, force=force)
     announce_compilation()
-    from fireworld.cli.workers import Workers
+    from fireworld.executors import Workers
 
     with gentle_interrupt() as interrupted, bars(DESCRIPTION, BAR, COUNT, ELAPSED) as progress:
         found = _reproduce(order, Workers(jobs or os.cpu_count() or 1, interrupted), progress)
     if found is None:
-        from fireworld.cli.kept import Kept
+        from fireworld.reproduction.kept import Kept
 
         n_kept = Kept(out).n_trained(order.n_repetitions)
         click.echo(
@@ -124,13 +124,14 @@ def command(
 
 def _reproduce(order: Order, workers: Workers, progress: Progress) -> tuple[Study, Tables] | None:
     """Train, test, judge, record, draw, write; None if interrupted."""
-    from fireworld.cli.pictures import draw_all, runs_to_record
-    from fireworld.evaluation.report import report_page
-    from fireworld.evaluation.sheets import sheets
-    from fireworld.evaluation.tables import make_tables
+    from fireworld.reproduction.paper_tables import make_tables
+    from fireworld.reproduction.pictures import draw_all, runs_to_record
+    from fireworld.reproduction.report_page import report_page
+    from fireworld.reproduction.sheets import sheets
+    from fireworld.simulation.built import CityCache
 
-    grounds: dict[str, Ground] = {}
-    measured = _measure(order, _workshop(order, workers, grounds, progress), workers)
+    cities = CityCache()
+    measured = _measure(order, _workshop(order, workers, cities, progress), workers)
     if measured is None:
         return None
     study, first = measured
@@ -142,7 +143,7 @@ def _reproduce(order: Order, workers: Workers, progress: Progress) -> tuple[Stud
     for run in to_record:
         if workers.stop.is_set():
             return None
-        recorded.append(run(grounds))
+        recorded.append(run(cities))
         progress.advance(bar)
     images = {}
     for name, image in progress.track(draw_all(study, recorded), total=20, description="drawing"):
@@ -152,15 +153,15 @@ def _reproduce(order: Order, workers: Workers, progress: Progress) -> tuple[Stud
     return study, tables
 
 
-def _workshop(order: Order, workers: Workers, grounds: dict[str, Ground], progress: Progress) -> Workshop:
+def _workshop(order: Order, workers: Workers, cities: CityCache, progress: Progress) -> Workshop:
     """Get the work ready.
 
     Raises:
         TrainingError: what is to go on was begun with other settings.
     """
-    from fireworld.cli.kept import Kept
-    from fireworld.cli.pieces import Workshop
-    from fireworld.cli.trials import build_tests
+    from fireworld.reproduction.kept import Kept
+    from fireworld.reproduction.pieces import Workshop
+    from fireworld.reproduction.trials import build_tests
     from fireworld.training.curriculum import load_curriculum
     from fireworld.training.method import PAPER
 
@@ -170,8 +171,8 @@ def _workshop(order: Order, workers: Workers, grounds: dict[str, Ground], progre
         curriculum=load_curriculum(CURRICULUM),
         method=PAPER,
         n_repetitions=order.n_repetitions,
-        tests=build_tests(order.seeds, grounds),
-        grounds=grounds,
+        tests=build_tests(order.seeds, cities),
+        cities=cities,
         stop=workers.stop,
         on_scenario=lambda n: progress.advance(training, n),
         on_trial=lambda n: progress.advance(testing, n),
@@ -187,8 +188,8 @@ def _workshop(order: Order, workers: Workers, grounds: dict[str, Ground], progre
 
 def _measure(order: Order, workshop: Workshop, workers: Workers) -> tuple[Study, Repetition] | None:
     """Train and test all repetitions; return what was measured, and the first repetition. None if interrupted."""
-    from fireworld.cli.trials import collect
-    from fireworld.evaluation.study import Study
+    from fireworld.reproduction.study import Study
+    from fireworld.reproduction.trials import collect
 
     done = workers.run(workshop.pieces())
     if done is None:
@@ -210,7 +211,7 @@ def _show(study: Study, tables: Tables) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from fireworld.evaluation.findings import caveat, findings
+    from fireworld.reproduction.findings import caveat, findings
 
     console = Console(highlight=False)
     console.print(_figures_table(tables))
@@ -228,8 +229,8 @@ def _figures_table(tables: Tables) -> Table:
     from rich.markup import escape
     from rich.table import Table
 
-    from fireworld.evaluation.findings import spread
-    from fireworld.evaluation.tables import APART, NEAR, WITHIN, Cell
+    from fireworld.reproduction.findings import spread
+    from fireworld.reproduction.paper_tables import APART, NEAR, WITHIN, Cell
 
     marks = {WITHIN: "=", NEAR: "~", APART: "x"}
     short = {"convergence episode": "episodes", "time to complete": "time"}

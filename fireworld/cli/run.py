@@ -11,19 +11,20 @@ import click
 
 from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
-from fireworld.cli.interrupt import gentle_interrupt
 from fireworld.cli.live import find_screen, view_options, watched_run
 from fireworld.cli.options import record_options, seed_option, settings_option, steps_option
 from fireworld.cli.progress import BAR, ELAPSED, bars, is_watched
+from fireworld.interrupt import gentle_interrupt
 from fireworld.policy.shipped import team_names
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from fireworld_recorder.writer import Scene
+    from fireworld_viewer.rerun_view.live import Screen
+
     from fireworld.records import CityRecord, RunHeader, StepRecord
-    from fireworld.runs import Run
-    from recorder.writer import Scene
-    from viewer.live import Screen
+    from fireworld.simulation.run import Run
 
 POLICIES_HELP: Final = (
     "easiest, nearest-to-civilian, nearest-to-center, nearest-to-me, each-another, random, chief, "
@@ -72,7 +73,7 @@ def command(
     fireworld run --view                             and shown while it runs
 
     Exit code: 0 run, 2 could not run, 130 interrupted (the recording keeps every step done).
-    """  # noqa: D301 - click wants the character
+    """
     if force and output is None:
         raise click.UsageError("--force goes with --record.")
     if scene is not None and output is None:
@@ -80,16 +81,16 @@ def command(
     screen = find_screen(view=view, url=view_url)
     announce_compilation()
     from fireworld.policy.names import load_policy, note_on_team
-    from fireworld.runs import prepare_run
     from fireworld.scenario import load_scenario, split_settings
-    from fireworld.world.stage import build_stage
+    from fireworld.simulation.built import build_scenario
+    from fireworld.simulation.run import prepare_run
 
     named = load_policy(policy)
     chosen = load_scenario(scenario).with_settings(split_settings(settings))
     note = note_on_team(named, chosen.brigades.n, choices=chosen.choices)
     if note:
         click.echo(note, err=True)
-    run = prepare_run(build_stage(chosen), named, seed=seed, n_steps_max=steps)
+    run = prepare_run(build_scenario(chosen), named, seed=seed, n_steps_max=steps)
     last, digest = carry_out(run, output=output, force=force, quiet=as_json, foxglove=scene is not None, screen=screen)
     outcome = outcome_of(run, last, digest=digest, output=output)
     if as_json:
@@ -123,9 +124,10 @@ def carry_out(
         SystemExit: a second Ctrl-C; likewise.
         OutputError: the recording cannot be written.
     """
+    from fireworld_recorder.chain import Digest
+    from fireworld_recorder.writer import PARTIAL_SUFFIX, LogWriter
+
     from fireworld.errors import PolicyError
-    from recorder.chain import Digest
-    from recorder.writer import PARTIAL_SUFFIX, LogWriter
 
     last: StepRecord | None = None
     try:
@@ -159,7 +161,7 @@ def carry_out(
 
 def make_scene(header: RunHeader, city: CityRecord) -> Scene:
     """Make what is recorded besides for Foxglove."""
-    from fireworld.cli.scene import FoxgloveScene
+    from fireworld.recording.pages.foxglove_scene import FoxgloveScene
 
     return FoxgloveScene(header, city)
 

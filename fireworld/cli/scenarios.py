@@ -59,18 +59,18 @@ def show(*, scenario: str, output: Path | None, force: bool, as_yaml: bool, sett
 def _draw(scenario: Scenario, path: Path, *, force: bool) -> None:
     """Draw the map of a scenario at its start."""
     import numpy as np
+    from fireworld_viewer.pictures.maps import draw_map, save_figure
 
-    from fireworld.world.stage import build_stage
-    from viewer.maps import draw_map, save_figure
+    from fireworld.simulation.built import build_scenario
 
-    stage = build_stage(scenario)
-    fieryness = np.zeros(stage.city.n_buildings, dtype=np.uint8)
-    fieryness[stage.setup.ignited] = 1
-    brigades_xy = stage.city.streets.access_mm[stage.setup.brigade_refuge] / 1000.0
+    built = build_scenario(scenario)
+    fieryness = np.zeros(built.city.n_buildings, dtype=np.uint8)
+    fieryness[built.placement.ignited] = 1
+    brigades_xy = built.city.streets.access_mm[built.placement.brigade_refuge] / 1000.0
     title = ": ".join(part for part in (scenario.name, scenario.description) if part)
-    figure = draw_map(stage.city_record(), fieryness=fieryness, brigades_xy=brigades_xy, title=title)
+    figure = draw_map(built.city_record(), fieryness=fieryness, brigades_xy=brigades_xy, title=title)
     save_figure(figure, path, force=force)
-    click.echo(f"{path}: {stage.city.n_buildings} buildings, {len(stage.setup.ignited)} burning")
+    click.echo(f"{path}: {built.city.n_buildings} buildings, {len(built.placement.ignited)} burning")
 
 
 def _summary(scenario: Scenario) -> dict[str, Any]:

@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fireworld.cli.interrupt import gentle_interrupt
 from fireworld.cli.live_search import watched_search
 from fireworld.cli.progress import BAR, DESCRIPTION, ELAPSED, bars, is_watched
+from fireworld.interrupt import gentle_interrupt
 
 if TYPE_CHECKING:
+    from fireworld_viewer.rerun_view.live import Screen
+
     from fireworld.training.curriculum import Curriculum
     from fireworld.training.search import Generation
     from fireworld.training.searches import SearchRun
-    from viewer.live import Screen
 
 
 def train_by_search(
@@ -40,17 +41,17 @@ def train_by_search(
     Raises:
         FireworldError: as in training.
     """
+    from fireworld.simulation.built import CityCache
     from fireworld.training.checkpoint import begin_all
     from fireworld.training.search import Search, Searcher
     from fireworld.training.searches import SearchRun
     from fireworld.training.teams import numbered
-    from fireworld.world.stage import Ground
 
     search = Search().with_settings(settings)
-    grounds: dict[str, Ground] = {}
+    cities = CityCache()
     runs = [
         SearchRun(
-            Searcher(curriculum, search, seed=seed + number - 1, grounds=grounds),
+            Searcher(curriculum, search, seed=seed + number - 1, cities=cities),
             numbered(output, number, n_all=repetitions),
             force,
         )

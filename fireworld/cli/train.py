@@ -13,10 +13,10 @@ import click
 
 from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
-from fireworld.cli.interrupt import gentle_interrupt
 from fireworld.cli.live import find_screen, view_options, watched_training
 from fireworld.cli.options import SEED_MAX, seed_option
 from fireworld.cli.progress import BAR, DESCRIPTION, ELAPSED, bars, is_watched
+from fireworld.interrupt import gentle_interrupt
 
 if TYPE_CHECKING:
     from fireworld.training.teams import Training
@@ -99,7 +99,7 @@ def command(
     for bit.
 
     Exit code: 0 trained, 2 could not train, 130 interrupted.
-    """  # noqa: D301 - click wants the character
+    """
     if force and resume:
         raise click.UsageError("--force and --resume exclude each other.")
     if output.suffix != ".npz":
@@ -111,12 +111,12 @@ def command(
     screen = find_screen(view=view, url=view_url)
     announce_compilation()
     from fireworld.scenario import split_settings
+    from fireworld.simulation.built import CityCache
     from fireworld.training.checkpoint import begin_all
     from fireworld.training.curriculum import load_curriculum
     from fireworld.training.method import SEARCH, find_method
     from fireworld.training.teams import Training, numbered, train_all
     from fireworld.training.trainer import Trainer
-    from fireworld.world.stage import Ground
 
     figures = split_settings(settings, example="n_fires=20" if method == SEARCH else "alpha=0.1")
     chosen = load_curriculum(curriculum or ("contested" if method == SEARCH else "paper"))
@@ -139,10 +139,10 @@ def command(
         )
         context.exit(0 if done else INTERRUPTED)
     learned = find_method(method).with_settings(figures)
-    grounds: dict[str, Ground] = {}
+    cities = CityCache()
     trainings = [
         Training(
-            trainer=Trainer(chosen, learned, seed=seed + number - 1, grounds=grounds),
+            trainer=Trainer(chosen, learned, seed=seed + number - 1, cities=cities),
             path=numbered(output, number, n_all=repetitions),
             log_path=numbered(log, number, n_all=repetitions) if log is not None else None,
             force=force,

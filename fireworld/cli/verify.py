@@ -20,10 +20,11 @@ def command(context: click.Context, *, log: Path, as_json: bool) -> None:
     """
     import json
 
+    from fireworld_recorder.reader import open_log
+    from fireworld_recorder.verify import verify
+
     from fireworld.cli.diff import show, write_json
-    from fireworld.replay import Replay
-    from recorder.reader import open_log
-    from recorder.verify import verify
+    from fireworld.recording.replay import Replay
 
     recording = open_log(log)
     difference = verify(recording, Replay(recording))

@@ -11,8 +11,9 @@ import click
 from fireworld.cli.opening import open_committed
 
 if TYPE_CHECKING:
+    from fireworld_viewer.rerun_view.outcome_panel import Outcome
+
     from fireworld.records import MemoryRecording, Recording
-    from viewer.outcome import Outcome
 
 
 def _building_ids(context: click.Context, parameter: click.Parameter, value: str | None) -> tuple[int, ...]:
@@ -68,7 +69,7 @@ def command(
     fireworld view out.mcap --air                  the heat of the air at every step, not at every 50th
 
     Exit code: 0 shown or saved, 2 could not (no display, no Rerun, not a recording, two cities).
-    """  # noqa: D301 - click wants the character
+    """
     if len(logs) > 2:
         raise click.UsageError(f"Expected one or two recordings, got {len(logs)}.")
     if web and output is not None:
@@ -77,8 +78,8 @@ def command(
         raise click.UsageError("--port goes with --web.")
     if force and output is None:
         raise click.UsageError("--force goes with --save.")
-    from viewer import app
-    from viewer.selection import select_steps
+    from fireworld_viewer.rerun_view import app
+    from fireworld_viewer.rerun_view.selection import select_steps
 
     held = [open_committed(path, doing="showing") for path in logs]
     read = [_with_air(recording, path) if air else recording for recording, path in zip(held, logs, strict=True)]
@@ -101,8 +102,8 @@ def _with_air(recording: Recording, path: Path) -> MemoryRecording:
     """
     from fireworld.cli.compiling import announce_compilation
     from fireworld.cli.replays import check_replay
+    from fireworld.recording.replay import Replay
     from fireworld.records import MemoryRecording
-    from fireworld.replay import Replay
 
     announce_compilation()
     again = Replay(recording, with_air=True)
@@ -113,11 +114,12 @@ def _with_air(recording: Recording, path: Path) -> MemoryRecording:
 
 def _outcome(logs: Sequence[Path], recordings: Sequence[Recording]) -> Outcome:
     """Work out what the runs came to, and where two first differ, in the steps that are shown."""
+    from fireworld_recorder.diff import Difference, compare
+    from fireworld_recorder.totals import totals_of
+    from fireworld_viewer.rerun_view.comparison import check_same_city
+    from fireworld_viewer.rerun_view.outcome_panel import Outcome
+
     from fireworld.cli.difference_text import totals_rows
-    from recorder.diff import Difference, compare
-    from recorder.totals import totals_of
-    from viewer.comparison import check_same_city
-    from viewer.outcome import Outcome
 
     heads = [path.name for path in logs]
     if len(recordings) == 1:

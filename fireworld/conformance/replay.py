@@ -12,12 +12,12 @@ from fireworld.city.city import Array, City
 from fireworld.conformance.city_file import CityFile, Placement, Request
 from fireworld.conformance.configuration import BRIGADE_KEYS, BURN_KEYS, FIRE_KEYS, RAY_KEYS
 from fireworld.conformance.trace import Trace
-from fireworld.kernels.arrays import BrigadeConstants, BrigadeState, CityTables, FireState
+from fireworld.kernels.arrays import BrigadeConstants, BrigadeState, CityArrays, FireState
 from fireworld.kernels.brigades import ACCEPTED, UNKNOWN_BRIGADE, distance_square, judge_request, refill, spray
 from fireworld.kernels.fire import advance_fire, ignite
 from fireworld.parameters import BrigadeParameters, FireParameters
-from fireworld.world.state import fresh_brigades, fresh_fire
-from fireworld.world.tables import air_inside, brigade_constants, city_tables, fire_constants
+from fireworld.simulation.city_arrays import air_inside, brigade_constants, city_arrays, fire_constants
+from fireworld.simulation.state import fresh_brigades, fresh_fire
 
 RAY_SEED = 1
 """Luck of the rays where a trace has no links."""
@@ -84,7 +84,7 @@ def replay(city_file: CityFile, trace: Trace, setting: Setting) -> Iterator[Mome
             missing.
     """
     inputs, fire_is = city_file.inputs, fire_constants(setting.fire)
-    tables, fire = city_tables(setting.city, setting.fire), fresh_fire(setting.city)
+    tables, fire = city_arrays(setting.city, setting.fire), fresh_fire(setting.city)
     crew = Crew(city_file, trace, tables, setting.city) if inputs.brigade_id or inputs.requests else None
     rates = Rates(trace, setting)
     for b in inputs.ignitions:
@@ -152,7 +152,7 @@ class Crew:
         team: their state, by rising id.
     """
 
-    def __init__(self, city_file: CityFile, trace: Trace, tables: CityTables, city: City) -> None:
+    def __init__(self, city_file: CityFile, trace: Trace, tables: CityArrays, city: City) -> None:
         self._inputs = city_file.inputs
         self._geometry = tables.geometry
         self._index = {identifier: k for k, identifier in enumerate(self._inputs.brigade_id)}

@@ -12,8 +12,8 @@ from fireworld.kernels.arrays import Array
 from fireworld.policy.asking import begin
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.protocol import Policy
-from fireworld.world.stage import Stage
-from fireworld.world.world import World
+from fireworld.simulation.built import BuiltScenario
+from fireworld.simulation.world import World
 
 
 @dataclass(frozen=True)
@@ -45,18 +45,18 @@ Row = tuple[float, ...]
 """How one run ended: QUANTITIES in their order."""
 
 
-def evaluate(stage: Stage, policy: KernelPolicy, seeds: Sequence[int], *, n_threads: int = 1) -> Outcomes:
+def evaluate(built: BuiltScenario, policy: KernelPolicy, seeds: Sequence[int], *, n_threads: int = 1) -> Outcomes:
     """Run a policy once under every seed; policies measured on the same seeds meet the same luck.
 
     Args:
-        stage: the scenario, built.
+        built: the scenario, built.
         policy: what the brigades follow.
         seeds: of the runs' luck.
         n_threads: runs at a time; the outcome does not depend on it.
     """
 
     def run(seed: int) -> Row:
-        return run_compiled(stage, policy, seed=seed)
+        return run_compiled(built, policy, seed=seed)
 
     if n_threads == 1:
         rows = [run(seed) for seed in seeds]
@@ -66,21 +66,21 @@ def evaluate(stage: Stage, policy: KernelPolicy, seeds: Sequence[int], *, n_thre
     return outcomes(seeds, rows)
 
 
-def run_compiled(stage: Stage, policy: KernelPolicy, *, seed: int) -> Row:
+def run_compiled(built: BuiltScenario, policy: KernelPolicy, *, seed: int) -> Row:
     """Run a policy that the kernels follow by themselves, as one compiled episode."""
-    world = stage.world(seed=seed)
+    world = built.world(seed=seed)
     world.run(policy.for_brigades(world.n_brigades))
     return _ending(world)
 
 
-def run_step_by_step(stage: Stage, policy: Policy, *, seed: int) -> Row:
+def run_step_by_step(built: BuiltScenario, policy: Policy, *, seed: int) -> Row:
     """Run any policy: it is asked in every step.
 
     Raises:
         PolicyError: the policy failed.
     """
-    world = stage.world(seed=seed)
-    begin(policy, world.tables, n_brigades=world.n_brigades, seed=seed)
+    world = built.world(seed=seed)
+    begin(policy, world.city_arrays, n_brigades=world.n_brigades, seed=seed)
     while not (world.terminated or world.truncated):
         world.step(policy)
     return _ending(world)
@@ -103,7 +103,7 @@ def outcomes(seeds: Sequence[int], rows: Sequence[Row]) -> Outcomes:
 
 
 def _ending(world: World) -> Row:
-    outcome = world.arrays.outcome
+    outcome = world.state.outcome
     score, score_max = outcome.score[:2].tolist()
     _, _, burnt_out, alive = outcome.counts.tolist()
     steps, total_reward, water = world.step_number, float(outcome.reward[5]), float(outcome.water[0])

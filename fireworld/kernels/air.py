@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fireworld.kernels.arrays import Array, BuildingTables, CoverTables, FireConstants, FireState
+from fireworld.kernels.arrays import Array, BuildingArrays, CoverArrays, FireConstants, FireState
 from fireworld.kernels.jit import inner
 
 ONE, TWO, THREE, FOUR = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(4)
@@ -109,7 +109,7 @@ def are_full(span_low: Array, span_end: Array, pitch: int) -> bool:
 
 
 @inner
-def exchange_with_air(buildings: BuildingTables, cover: CoverTables, fire: FireState, constants: FireConstants) -> None:
+def exchange_with_air(buildings: BuildingArrays, cover: CoverArrays, fire: FireState, constants: FireConstants) -> None:
     """Let each building in turn exchange heat with the air cells under it; MODEL 2.6.
 
     q = (T_cell - T_building) * weight; the cell loses q * cell_share, the building gains the sum. A building without

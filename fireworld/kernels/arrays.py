@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 Array = NDArray[Any]
 
 
-class BuildingTables(NamedTuple):
+class BuildingArrays(NamedTuple):
     """What is fixed of each building, (n,)."""
 
     building_id: Array  # int64, keys the building's luck and breaks ties
@@ -25,7 +25,7 @@ class BuildingTables(NamedTuple):
     inflammable: Array  # uint8
 
 
-class CoverTables(NamedTuple):
+class CoverArrays(NamedTuple):
     """Each building's block of air cells: rows along x, cells along y; rows padded to a multiple of four cells."""
 
     x0: Array  # (n,) uint32, first row in the padded grid
@@ -36,7 +36,7 @@ class CoverTables(NamedTuple):
     weight: Array  # float64, energy per degree of difference: flow * cover * cell size; 0 where not covered
 
 
-class LinkTables(NamedTuple):
+class LinkArrays(NamedTuple):
     """Radiation links as CSR over the emitting buildings."""
 
     ptr: Array  # (n+1,) uint32
@@ -73,7 +73,7 @@ class FireState(NamedTuple):
     scratch: Array  # (2, pitch) float64, scratch
 
 
-class GeometryTables(NamedTuple):
+class GeometryArrays(NamedTuple):
     """Where the buildings are and how big they are, (n,) float64; lengths in millimetres."""
 
     x: Array  # centroid
@@ -87,14 +87,14 @@ class GeometryTables(NamedTuple):
     floor_area: Array  # m2, ground area * floors
 
 
-class NearTables(NamedTuple):
+class NearArrays(NamedTuple):
     """Which buildings belong to one fire site when both burn, as CSR."""
 
     ptr: Array  # (n+1,) uint32
     building: Array  # uint32
 
 
-class StreetTables(NamedTuple):
+class StreetArrays(NamedTuple):
     """The street graph; lengths in whole millimetres."""
 
     node_x: Array  # (m,) float64
@@ -113,15 +113,15 @@ class StreetTables(NamedTuple):
     hydrant_node: Array  # (hydrants,) int32
 
 
-class CityTables(NamedTuple):
+class CityArrays(NamedTuple):
     """Everything fixed of a city."""
 
-    buildings: BuildingTables
-    cover: CoverTables
-    links: LinkTables
-    geometry: GeometryTables
-    near: NearTables
-    streets: StreetTables
+    buildings: BuildingArrays
+    cover: CoverArrays
+    links: LinkArrays
+    geometry: GeometryArrays
+    near: NearArrays
+    streets: StreetArrays
 
 
 class HealthConstants(NamedTuple):
@@ -236,7 +236,7 @@ class Outcome(NamedTuple):
     draws: Array  # (2,) sums of burn rates and of damage draws
 
 
-class WorldArrays(NamedTuple):
+class WorldState(NamedTuple):
     """Everything that a step may change."""
 
     fire: FireState
@@ -246,7 +246,7 @@ class WorldArrays(NamedTuple):
     outcome: Outcome
 
 
-class PolicyTables(NamedTuple):
+class PolicyArrays(NamedTuple):
     """A policy that the kernels can follow by themselves, per brigade."""
 
     kind: Array  # (b,) int32: 0 always one action, 1 random, 2 greedy in a table, 3 and 4 by a ranking of targets

@@ -9,8 +9,8 @@ from fireworld.kernels.arrays import (
     BrigadeConstants,
     BrigadeState,
     FireState,
-    GeometryTables,
-    StreetTables,
+    GeometryArrays,
+    StreetArrays,
 )
 from fireworld.kernels.jit import inner, kernel
 
@@ -48,7 +48,7 @@ def distance_square(x: float, y: float, other_x: float, other_y: float) -> float
 
 
 @inner
-def locate(street: int, offset: int, streets: StreetTables) -> tuple[float, float]:
+def locate(street: int, offset: int, streets: StreetArrays) -> tuple[float, float]:
     """Return the point at an offset along a street, mm."""
     first, second = streets.first[street], streets.second[street]
     part = offset / streets.length[street]
@@ -58,7 +58,7 @@ def locate(street: int, offset: int, streets: StreetTables) -> tuple[float, floa
 
 @inner
 def way(
-    street: int, offset: int, goal_street: int, goal_offset: int, streets: StreetTables
+    street: int, offset: int, goal_street: int, goal_offset: int, streets: StreetArrays
 ) -> tuple[np.int64, np.int64, np.int64]:
     """Return the shortest way to a point of another street: its length, the node to leave by, the node to arrive at.
 
@@ -82,7 +82,7 @@ def way(
 
 
 @inner
-def street_between(node: int, other: int, streets: StreetTables) -> np.int64:
+def street_between(node: int, other: int, streets: StreetArrays) -> np.int64:
     """Return the shortest street that joins two neighbouring nodes (ties: lowest index)."""
     best, best_length = np.int64(-1), NOWHERE
     for k in range(streets.arc_ptr[node], streets.arc_ptr[node + 1]):
@@ -93,7 +93,7 @@ def street_between(node: int, other: int, streets: StreetTables) -> np.int64:
 
 
 @inner
-def end_offset(street: int, node: int, streets: StreetTables) -> np.int64:
+def end_offset(street: int, node: int, streets: StreetArrays) -> np.int64:
     """Return the offset of a street's end at a node."""
     return np.int64(0) if node == streets.first[street] else streets.length[street]
 
@@ -105,8 +105,8 @@ def stop_in_range(
     goal: int,
     target: int,
     range_square: float,
-    geometry: GeometryTables,
-    streets: StreetTables,
+    geometry: GeometryArrays,
+    streets: StreetArrays,
 ) -> int:
     """Return the offset of the first whole millimetre from `offset` towards `goal` within range of the target.
 
@@ -140,8 +140,8 @@ def drive(
     goal_building: int,
     target: int,
     brigades: BrigadeState,
-    streets: StreetTables,
-    geometry: GeometryTables,
+    streets: StreetArrays,
+    geometry: GeometryArrays,
     constants: BrigadeConstants,
 ) -> None:
     """Drive a brigade along the shortest way to where a building is entered, one step's worth at most.
@@ -184,7 +184,7 @@ def drive(
 
 
 @inner
-def refuge_at(street: int, offset: int, streets: StreetTables) -> np.int64:
+def refuge_at(street: int, offset: int, streets: StreetArrays) -> np.int64:
     """Return the refuge building that is entered from a point of a street, -1 if none."""
     for k in range(len(streets.refuge)):
         b = streets.refuge[k]
@@ -194,7 +194,7 @@ def refuge_at(street: int, offset: int, streets: StreetTables) -> np.int64:
 
 
 @inner
-def nearest_refuge(street: int, offset: int, streets: StreetTables) -> np.int64:
+def nearest_refuge(street: int, offset: int, streets: StreetArrays) -> np.int64:
     """Return the refuge building with the shortest way (ties: first listed), -1 if none can be reached."""
     best, best_length = np.int64(-1), NOWHERE
     for k in range(len(streets.refuge)):
@@ -230,7 +230,7 @@ def refill(refuge: Array, hydrant: Array, hp: Array, tank: Array, constants: Bri
 
 
 @inner
-def find_stations(brigades: BrigadeState, streets: StreetTables) -> None:
+def find_stations(brigades: BrigadeState, streets: StreetArrays) -> None:
     """Find the refuge and the hydrant that every brigade stands at."""
     for brigade in range(len(brigades.tank)):
         street, offset = np.int64(brigades.street[brigade]), brigades.offset[brigade]
@@ -257,8 +257,8 @@ def fight(
     target: int,
     brigades: BrigadeState,
     fire: FireState,
-    streets: StreetTables,
-    geometry: GeometryTables,
+    streets: StreetArrays,
+    geometry: GeometryArrays,
     constants: BrigadeConstants,
 ) -> int:
     """Spray the target if it is in range, else drive towards it; return the litres sprayed."""
@@ -278,8 +278,8 @@ def fight(
 def act(
     brigades: BrigadeState,
     fire: FireState,
-    streets: StreetTables,
-    geometry: GeometryTables,
+    streets: StreetArrays,
+    geometry: GeometryArrays,
     constants: BrigadeConstants,
 ) -> int:
     """Let every brigade do what it chose: refill, spray, or drive; return the litres sprayed. MODEL 2.1-2.2 and 4."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fireworld.draws import ACTION, EXPLORE
-from fireworld.kernels.arrays import Array, PolicyTables
+from fireworld.kernels.arrays import Array, PolicyArrays
 from fireworld.kernels.draws import below, uniform
 from fireworld.kernels.jit import inner, kernel
 from fireworld.kernels.observation import N_ACTIONS
@@ -23,14 +23,14 @@ def greedy(values: Array) -> int:
 
 
 @kernel
-def explores(brigade: int, policy: PolicyTables, seed: int, step: int) -> bool:
+def explores(brigade: int, policy: PolicyArrays, seed: int, step: int) -> bool:
     """Tell whether a brigade takes a random action in this step instead of the one its table prefers."""
     epsilon = policy.epsilon[0]
     return policy.kind[brigade] == TABLE and epsilon > 0.0 and uniform(seed, EXPLORE, brigade, step) < epsilon
 
 
 @kernel
-def choose(brigade: int, state: int, policy: PolicyTables, seed: int, step: int) -> int:
+def choose(brigade: int, state: int, policy: PolicyArrays, seed: int, step: int) -> int:
     """Return the action a brigade picks in a state.
 
     Args:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fireworld.kernels.arrays import Array, CityTables, Constants, Learner, PolicyTables, WorldArrays
+from fireworld.kernels.arrays import Array, CityArrays, Constants, Learner, PolicyArrays, WorldState
 from fireworld.kernels.brigades import act, shelter
 from fireworld.kernels.choice import RANK_ALL, RANK_NAMED, choose, keeps_choice, table_state
 from fireworld.kernels.fire import advance_fire, draw_burn_rates
@@ -35,10 +35,10 @@ class EpisodeScratch(NamedTuple):
 
 @inner
 def run_steps(  # noqa: C901, PLR0912, PLR0915 - handing all arrays to functions of its own costs more than the loop
-    city: CityTables,
-    world: WorldArrays,
+    city: CityArrays,
+    world: WorldState,
     constants: Constants,
-    policy: PolicyTables,
+    policy: PolicyArrays,
     learner: Learner,
     seed: int,
     first_step: int,
@@ -127,10 +127,10 @@ def run_steps(  # noqa: C901, PLR0912, PLR0915 - handing all arrays to functions
 
 @making_arrays
 def run_episode(
-    city: CityTables,
-    world: WorldArrays,
+    city: CityArrays,
+    world: WorldState,
     constants: Constants,
-    policy: PolicyTables,
+    policy: PolicyArrays,
     learner: Learner,
     seed: int,
     first_step: int,

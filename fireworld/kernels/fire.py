@@ -10,7 +10,7 @@ from numba import float32
 
 from fireworld.draws import BURN_RATE
 from fireworld.kernels.air import exchange_with_air, spread_air
-from fireworld.kernels.arrays import Array, BuildingTables, CoverTables, FireConstants, FireState, LinkTables
+from fireworld.kernels.arrays import Array, BuildingArrays, CoverArrays, FireConstants, FireState, LinkArrays
 from fireworld.kernels.draws import normal
 from fireworld.kernels.jit import inner, kernel
 
@@ -45,7 +45,7 @@ def fieryness_of(burning: bool, fuel: float, full: float, inflammable: int, wate
 
 @kernel
 def draw_burn_rates(
-    buildings: BuildingTables, fire: FireState, constants: FireConstants, seed: int, step: int
+    buildings: BuildingArrays, fire: FireState, constants: FireConstants, seed: int, step: int
 ) -> float:
     """Draw the burn rate of every burning building from N(mean, sd) and return their sum; MODEL 2.3.
 
@@ -66,7 +66,7 @@ def draw_burn_rates(
 
 
 @inner
-def burn(buildings: BuildingTables, fire: FireState) -> None:
+def burn(buildings: BuildingArrays, fire: FireState) -> None:
     """Turn fuel into heat in every burning building.
 
     used = min(fuel, fuel0 * max(0.005, T/1000 * fuel/fuel0 * rate)); MODEL 2.3. `fire.rate` holds the step's draws.
@@ -93,7 +93,7 @@ def is_dry(water: Array, start: int, end: int) -> bool:
 
 
 @inner
-def cool(buildings: BuildingTables, fire: FireState, constants: FireConstants) -> None:
+def cool(buildings: BuildingArrays, fire: FireState, constants: FireConstants) -> None:
     """Let the water lying on hot buildings take heat; MODEL 2.4. Whole blocks of dry buildings are passed over."""
     n = np.uint64(len(fire.energy))
     for start in range(np.uint64(0), n, BLOCK):
@@ -124,7 +124,7 @@ def cool(buildings: BuildingTables, fire: FireState, constants: FireConstants) -
 
 
 @inner
-def radiate(buildings: BuildingTables, links: LinkTables, fire: FireState) -> None:
+def radiate(buildings: BuildingArrays, links: LinkArrays, fire: FireState) -> None:
     """Send out every building's radiation and share it among the buildings it is linked to; MODEL 2.7.
 
     emitted = min(E, (T + 293)^4 * emission), for all buildings before any receives.
@@ -144,7 +144,7 @@ def radiate(buildings: BuildingTables, links: LinkTables, fire: FireState) -> No
 
 
 @inner
-def settle(buildings: BuildingTables, fire: FireState, constants: FireConstants) -> None:
+def settle(buildings: BuildingArrays, fire: FireState, constants: FireConstants) -> None:
     """Flush tiny heat to zero where asked, then give every building its code; MODEL 2 and its codes."""
     for b in range(len(fire.energy)):
         capacity = buildings.capacity[b]
@@ -156,7 +156,7 @@ def settle(buildings: BuildingTables, fire: FireState, constants: FireConstants)
 
 
 @kernel
-def ignite(b: int, buildings: BuildingTables, fire: FireState) -> bool:
+def ignite(b: int, buildings: BuildingArrays, fire: FireState) -> bool:
     """Set building b on fire: E = capacity * ignition point * 1.5; only from code 0 or 4, and if inflammable."""
     code = fire.fieryness[b]
     if buildings.inflammable[b] == 0 or code not in (0, 4):
@@ -168,7 +168,7 @@ def ignite(b: int, buildings: BuildingTables, fire: FireState) -> bool:
 
 @kernel
 def advance_fire(
-    buildings: BuildingTables, cover: CoverTables, links: LinkTables, fire: FireState, constants: FireConstants
+    buildings: BuildingArrays, cover: CoverArrays, links: LinkArrays, fire: FireState, constants: FireConstants
 ) -> None:
     """Run phases 3 to 8 of a step: burn, cool, air, exchange, radiation, cool; then the codes."""
     burn(buildings, fire)

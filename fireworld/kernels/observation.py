@@ -5,9 +5,9 @@ from __future__ import annotations
 from fireworld.kernels.arrays import (
     Array,
     BrigadeState,
-    BuildingTables,
+    BuildingArrays,
     FireState,
-    GeometryTables,
+    GeometryArrays,
     ObservationConstants,
     SiteState,
 )
@@ -102,9 +102,9 @@ def find_target(
     brigade: int,
     action: int,
     brigades: BrigadeState,
-    buildings: BuildingTables,
+    buildings: BuildingArrays,
     fire: FireState,
-    geometry: GeometryTables,
+    geometry: GeometryArrays,
     sites: SiteState,
 ) -> int:
     """Return the burning building of the brigade's site that an action names (ties: lowest id), -1 without a site."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fireworld.kernels.arrays import CivilianState, FireState, GeometryTables, Outcome
+from fireworld.kernels.arrays import CivilianState, FireState, GeometryArrays, Outcome
 from fireworld.kernels.jit import inner, kernel
 
 SAVED = np.array([1.0, 0.66, 0.33, 0.0, 0.9, 0.75, 0.5, 0.25, 0.0])
@@ -29,7 +29,7 @@ def exp_of_minus(x: float) -> float:
 
 @kernel
 def assess(
-    fire: FireState, civilians: CivilianState, geometry: GeometryTables, reward_change: bool, outcome: Outcome
+    fire: FireState, civilians: CivilianState, geometry: GeometryArrays, reward_change: bool, outcome: Outcome
 ) -> None:
     """Write the reward and the scores of the moment; MODEL 6.
 

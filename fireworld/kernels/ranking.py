@@ -8,11 +8,11 @@ from fireworld.kernels.arrays import (
     Array,
     BrigadeConstants,
     BrigadeState,
-    BuildingTables,
+    BuildingArrays,
     FireConstants,
     FireState,
-    GeometryTables,
-    LinkTables,
+    GeometryArrays,
+    LinkArrays,
     SiteState,
 )
 from fireworld.kernels.jit import inner, kernel
@@ -33,9 +33,9 @@ WATER_HEAT_LEAST = 1e-6
 @inner
 def describe_building(
     b: int,
-    buildings: BuildingTables,
-    links: LinkTables,
-    geometry: GeometryTables,
+    buildings: BuildingArrays,
+    links: LinkArrays,
+    geometry: GeometryArrays,
     fire: FireState,
     sites: SiteState,
     fire_constants: FireConstants,
@@ -85,7 +85,7 @@ def value_of_target(
     weights: Array,
     described: Array,
     brigades: BrigadeState,
-    geometry: GeometryTables,
+    geometry: GeometryArrays,
     range_square: float,
 ) -> float:
     """Return a brigade's value of a building: its weighted features, those of the brigade and the team included.
@@ -136,9 +136,9 @@ def rank(
     described: Array,
     described_at: Array,
     brigades: BrigadeState,
-    buildings: BuildingTables,
-    links: LinkTables,
-    geometry: GeometryTables,
+    buildings: BuildingArrays,
+    links: LinkArrays,
+    geometry: GeometryArrays,
     fire: FireState,
     sites: SiteState,
     fire_constants: FireConstants,

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from fireworld.kernels.arrays import (
     BrigadeState,
-    BuildingTables,
+    BuildingArrays,
     CivilianState,
     FireState,
-    GeometryTables,
-    LinkTables,
-    NearTables,
+    GeometryArrays,
+    LinkArrays,
+    NearArrays,
     SiteState,
 )
 from fireworld.kernels.jit import inner, kernel
@@ -21,7 +21,7 @@ NOWHERE, WAITING = -1, -2
 
 
 @inner
-def gather(fire: FireState, near: NearTables, sites: SiteState) -> None:
+def gather(fire: FireState, near: NearArrays, sites: SiteState) -> None:
     """Group the burning buildings into connected sets, in order of their lowest building index."""
     place, member = sites.place, sites.member
     n_burning = 0
@@ -99,7 +99,7 @@ def number_sites(sites: SiteState) -> None:
 
 
 @inner
-def nearest_burning(x: float, y: float, buildings: BuildingTables, geometry: GeometryTables, sites: SiteState) -> int:
+def nearest_burning(x: float, y: float, buildings: BuildingArrays, geometry: GeometryArrays, sites: SiteState) -> int:
     """Return the burning building whose centroid is nearest to a point (ties: lowest id), -1 if nothing burns."""
     best, best_square = -1, FAR
     for k in range(sites.counts[2]):
@@ -116,7 +116,7 @@ def nearest_burning(x: float, y: float, buildings: BuildingTables, geometry: Geo
 
 @inner
 def assign_brigades(
-    brigades: BrigadeState, buildings: BuildingTables, geometry: GeometryTables, sites: SiteState
+    brigades: BrigadeState, buildings: BuildingArrays, geometry: GeometryArrays, sites: SiteState
 ) -> None:
     """Keep every brigade with its site; follow a site that merged; send it to the nearest fire when its site is out.
 
@@ -151,7 +151,7 @@ def relabel(sites: SiteState) -> None:
 
 
 @inner
-def civilian_squares(civilians: CivilianState, fire: FireState, geometry: GeometryTables, sites: SiteState) -> None:
+def civilian_squares(civilians: CivilianState, fire: FireState, geometry: GeometryArrays, sites: SiteState) -> None:
     """Find each burning building's squared distance to the nearest living civilian who is in no burning building."""
     for k in range(sites.counts[2]):
         sites.building_civilian_square[sites.member[k]] = FAR
@@ -168,7 +168,7 @@ def civilian_squares(civilians: CivilianState, fire: FireState, geometry: Geomet
 
 
 @inner
-def measure_sites(geometry: GeometryTables, sites: SiteState) -> None:
+def measure_sites(geometry: GeometryArrays, sites: SiteState) -> None:
     """Measure every site: volume, bounding box, distance from the centre and from a civilian."""
     for site in range(sites.counts[0]):
         volume, center, civilian = 0.0, FAR, FAR
@@ -199,7 +199,7 @@ def sides_beyond(x: float, y: float, west: float, south: float, east: float, nor
 
 @inner
 def find_free_sides(
-    buildings: BuildingTables, links: LinkTables, geometry: GeometryTables, fire: FireState, sites: SiteState
+    buildings: BuildingArrays, links: LinkArrays, geometry: GeometryArrays, fire: FireState, sites: SiteState
 ) -> None:
     """Find the sides over which a site can spread: the centroid of an unburnt linked building is beyond; MODEL 5.1.
 
@@ -229,10 +229,10 @@ def find_free_sides(
 
 @kernel
 def find_sites(
-    buildings: BuildingTables,
-    links: LinkTables,
-    near: NearTables,
-    geometry: GeometryTables,
+    buildings: BuildingArrays,
+    links: LinkArrays,
+    near: NearArrays,
+    geometry: GeometryArrays,
     fire: FireState,
     civilians: CivilianState,
     brigades: BrigadeState,

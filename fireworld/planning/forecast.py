@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
-from fireworld.kernels.arrays import WorldArrays
+from fireworld.kernels.arrays import WorldState
 from fireworld.policy.kernel import always
 from fireworld.policy.protocol import Observation
-from fireworld.world.state import NO_LEARNER, copy_into
+from fireworld.simulation.state import NO_LEARNER, copy_into
 
 Assignment = tuple[int, ...]
 """(b,) the action of each brigade."""
@@ -30,7 +30,7 @@ class Forecast:
         rollouts: rollouts of each assignment, each with luck of its own.
     """
 
-    def __init__(self, observation: Observation, copy: WorldArrays, *, horizon: int, rollouts: int) -> None:
+    def __init__(self, observation: Observation, copy: WorldState, *, horizon: int, rollouts: int) -> None:
         self._observation = observation
         self._copy = copy
         self._horizon = horizon

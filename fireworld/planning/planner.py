@@ -8,12 +8,12 @@ from difflib import get_close_matches
 from typing import Final, NoReturn
 
 from fireworld.errors import PolicyError, expected
-from fireworld.kernels.arrays import CityTables, WorldArrays
+from fireworld.kernels.arrays import CityArrays, WorldState
 from fireworld.planning.forecast import BURNING_COST, Assignment, Forecast
 from fireworld.planning.search import action_values, climb
 from fireworld.policy.protocol import Decision, Observation
 from fireworld.records import ACTIONS
-from fireworld.world.state import copy_world
+from fireworld.simulation.state import copy_world
 
 OPTION_MAX: Final = 1000
 
@@ -51,7 +51,7 @@ class Planner:
 
     def __init__(self, options: PlannerOptions | None = None) -> None:
         self.options = options if options is not None else PlannerOptions()
-        self._room: WorldArrays | None = None
+        self._room: WorldState | None = None
         self._planned_at = -1
         self._plan: Assignment = ()
         self._values: tuple[tuple[float, ...], ...] = ()
@@ -61,7 +61,7 @@ class Planner:
         """SHA-256 of what the planner does."""
         return hashlib.sha256(repr((astuple(self.options), BURNING_COST)).encode()).hexdigest()
 
-    def begin(self, city: CityTables, n_brigades: int, seed: int) -> None:
+    def begin(self, city: CityArrays, n_brigades: int, seed: int) -> None:
         """Forget the run before."""
         del city, n_brigades, seed  # the seed above all: a plan must not know the luck of the run
         self._room, self._planned_at, self._plan = None, -1, ()

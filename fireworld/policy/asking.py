@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from fireworld.errors import FireworldError, PolicyError, expected
-from fireworld.kernels.arrays import CityTables
+from fireworld.kernels.arrays import CityArrays
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
 from fireworld.records import ACTIONS
 
@@ -24,7 +24,7 @@ LIBRARIES: Final = (
 DETAIL_SHOWN_MAX: Final = 200
 
 
-def begin(policy: Policy, city: CityTables, *, n_brigades: int, seed: int) -> None:
+def begin(policy: Policy, city: CityArrays, *, n_brigades: int, seed: int) -> None:
     """Tell a policy that a run begins, if it wants to know.
 
     Raises:

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from fireworld.kernels.arrays import Array, CityTables, PolicyTables
+from fireworld.kernels.arrays import Array, CityArrays, PolicyArrays
 from fireworld.kernels.choice import (
     FIXED,
     RANDOM,
@@ -45,17 +45,17 @@ class KernelPolicy:
     """Steps that a choice is kept for."""
     rankings: Array = field(default_factory=NO_RANKINGS.copy)
     """(rankings, 17) float64, weights."""
-    _ready: PolicyTables | None = field(default=None, init=False, repr=False, compare=False)
+    _ready: PolicyArrays | None = field(default=None, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Refuse what the compiled episode and single steps would not do alike."""
         if self.commit > 1 and {RANK_NAMED, RANK_ALL} & set(self.kinds):
             raise ValueError("a ranking chooses in every step: commit must be 1")
 
-    def for_brigades(self, n_brigades: int) -> PolicyTables:
+    def for_brigades(self, n_brigades: int) -> PolicyArrays:
         """Spread the policy over a team."""
         turn = np.arange(n_brigades) % len(self.kinds)
-        return PolicyTables(
+        return PolicyArrays(
             kind=np.array(self.kinds, dtype=np.int32)[turn],
             action=np.array(self.actions, dtype=np.int32)[turn],
             table_of=np.array(self.table_of, dtype=np.int32)[turn],
@@ -65,7 +65,7 @@ class KernelPolicy:
             commit=np.array([self.commit], dtype=np.int64),
         )
 
-    def begin(self, city: CityTables, n_brigades: int, seed: int) -> None:
+    def begin(self, city: CityArrays, n_brigades: int, seed: int) -> None:
         """Get ready for a run of a team."""
         del city, seed
         self._ready = self.for_brigades(n_brigades)
@@ -103,7 +103,7 @@ class KernelPolicy:
         return content.hexdigest()
 
 
-def _by_rank(observation: Observation, ready: PolicyTables) -> Decision:
+def _by_rank(observation: Observation, ready: PolicyArrays) -> Decision:
     """Choose the target that a brigade's ranking puts first."""
     brigade, city, world, constants = observation.brigade, observation.city, observation.world, observation.constants
     n = len(world.fire.energy)

@@ -11,7 +11,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from fireworld.kernels.arrays import CityTables, Constants, WorldArrays
+from fireworld.kernels.arrays import CityArrays, Constants, WorldState
 from fireworld.kernels.observation import find_target, site_place
 from fireworld.kernels.ranking import OWN_TARGET
 
@@ -65,9 +65,9 @@ class Observation:
     known_targets: NDArray[np.int32]
     """(b,) index of the building that each brigade goes for, -1 none: those before this one in this step, the others
     in the last step."""
-    city: CityTables
+    city: CityArrays
     """The city's arrays; not to be changed."""
-    world: WorldArrays
+    world: WorldState
     """The world's arrays as they are before the step; not to be changed."""
     constants: Constants
     """The scalars of the world's model."""

@@ -1,11 +1,11 @@
-"""The teams that come with fireworld: the team files in `fireworld/teams`, each named without its suffix."""
+"""The teams that come with fireworld: the team files in `fireworld/shipped/teams`, each named without its suffix."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Final
 
-_FOLDER: Final = Path(__file__).parents[1] / "teams"
+_FOLDER: Final = Path(__file__).parents[1] / "shipped" / "teams"
 _SUFFIX: Final = ".npz"
 
 

@@ -35,7 +35,7 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
 def shipped_folder() -> Path:
     """Return the folder of the shipped scenarios: inside the package, or at the top of a checkout."""
     package = Path(fireworld.__file__).parent
-    inside = package / "scenarios"
+    inside = package / "shipped" / "scenarios"
     return inside if inside.is_dir() else package.parent / "scenarios"
 
 

@@ -19,9 +19,9 @@ from fireworld.kernels.draws import fill_normals
 from fireworld.kernels.ranking import N_OF_TEAM, N_TARGET_FEATURES, N_WEIGHTS
 from fireworld.policy.kernel import KernelPolicy, from_rankings
 from fireworld.policy.ranking import Ranking
+from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.training.curriculum import Curriculum
 from fireworld.training.method import read_figures
-from fireworld.world.stage import Ground, Stage, build_stage
 
 SEED_BITS: Final = 32
 
@@ -103,10 +103,10 @@ class State:
 class Searcher:
     """Searches for one ranking. Iterate over it: every generation is done when its report is yielded."""
 
-    def __init__(self, curriculum: Curriculum, search: Search, *, seed: int, grounds: dict[str, Ground]) -> None:
+    def __init__(self, curriculum: Curriculum, search: Search, *, seed: int, cities: CityCache) -> None:
         self.curriculum, self.search, self.seed = curriculum, search, seed
-        self._grounds = grounds
-        self._stages: list[Stage] = []
+        self._cities = cities
+        self._stages: list[BuiltScenario] = []
         self._free = self.free_weights()
         self.state = State(0, np.zeros(len(self._free)), np.where(self._free, search.spread, 0.0))
 
@@ -161,7 +161,7 @@ class Searcher:
         short = [
             one.with_settings({"steps": steps}) if one.steps > self.search.n_steps_max else one for one in scenarios
         ]
-        self._stages = [build_stage(scenario, grounds=self._grounds) for scenario in short]
+        self._stages = [self._cities.build(scenario) for scenario in short]
 
     def _generation(self, pool: ThreadPoolExecutor, stop: Event) -> Generation | None:
         search, state = self.search, self.state
@@ -200,7 +200,7 @@ class Searcher:
         key = hash_key(self.seed, EPISODE, fire, self.state.generation)
         world = self._stages[fire].world(seed=key >> (64 - SEED_BITS))
         world.run(self.policy_of(weights).for_brigades(world.n_brigades))
-        return float(world.arrays.outcome.score[0] / world.arrays.outcome.score[1])
+        return float(world.state.outcome.score[0] / world.state.outcome.score[1])
 
 
 def _moved(state: State, best: Array, search: Search, free: Array) -> State:

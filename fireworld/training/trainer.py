@@ -17,10 +17,10 @@ from fireworld.policy.team import Team
 from fireworld.policy.words import N_FLAG_VALUES, N_STATES, N_STATES_ALONE
 from fireworld.records import ACTIONS
 from fireworld.scenario import Scenario
+from fireworld.simulation.built import BuiltScenario, CityCache
+from fireworld.simulation.state import fresh_learner
 from fireworld.training.curriculum import Curriculum, CurriculumStage
 from fireworld.training.method import RULES, Method
-from fireworld.world.stage import Ground, Stage, build_stage
-from fireworld.world.state import fresh_learner
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Trainer:
         method: how to learn.
         seed: of all luck of this training.
         progress: where an earlier training stopped.
-        grounds: cities built before, shared between trainings.
+        cities: cities built before, shared between trainings.
     """
 
     def __init__(
@@ -76,12 +76,12 @@ class Trainer:
         *,
         seed: int,
         progress: Progress | None = None,
-        grounds: dict[str, Ground] | None = None,
+        cities: CityCache | None = None,
     ) -> None:
         self.curriculum = curriculum
         self.method = method
         self.seed = seed
-        self._grounds = grounds if grounds is not None else {}
+        self._cities = cities if cities is not None else CityCache()
         self._plan = [(stage, scenario) for stage in curriculum.stages for scenario in stage.scenarios]
         self.progress = progress if progress is not None else self._begin()
         self.graduate: Team | None = None
@@ -137,14 +137,14 @@ class Trainer:
     def _n_tables(self, scenario: Scenario) -> int:
         return 1 if self.method.shared_table else scenario.brigades.n
 
-    def _build(self, scenario: Scenario) -> Stage:
+    def _build(self, scenario: Scenario) -> BuiltScenario:
         varied = msgspec.structs.replace(scenario, reward=self.method.reward, choices=self.method.choices)
-        return build_stage(varied, grounds=self._grounds)
+        return self._cities.build(varied)
 
-    def _run_episode(self, stage: CurriculumStage, ground: Stage) -> EpisodeReport:
+    def _run_episode(self, stage: CurriculumStage, ground: BuiltScenario) -> EpisodeReport:
         method, progress = self.method, self.progress
         number, episode = progress.scenario_number, progress.episode
-        n_brigades = len(ground.setup.brigade_refuge)
+        n_brigades = len(ground.placement.brigade_refuge)
         epsilon = _power(method.epsilon_decay, episode)
         luck = hash_key(self.seed, EPISODE, number, 0 if method.fixed_noise else episode) >> 1
         before = progress.tables.argmax(axis=2)
@@ -163,7 +163,7 @@ class Trainer:
         n_changed = int((progress.tables.argmax(axis=2) != before).sum())
         progress.n_unchanged = 0 if n_changed else progress.n_unchanged + 1
         converged = progress.n_unchanged >= method.n_episodes_unchanged
-        outcome = world.arrays.outcome
+        outcome = world.state.outcome
         report = EpisodeReport(
             stage=stage.name,
             scenario=ground.scenario.name,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fireworld.city.links import radiation_links, walls_hit
-from fireworld.city.order import visiting_order
+from fireworld.city.visiting_order import visiting_order
 from fireworld.city.walls import walls_of
 from fireworld.parameters import FireParameters
 from tests.city.plans import footprints, rectangle

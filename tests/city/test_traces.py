@@ -11,9 +11,9 @@ from fireworld.city.air import cover_cells
 from fireworld.city.build import build_city, with_links, with_order
 from fireworld.city.city import City
 from fireworld.city.links import radiation_links, walls_hit
-from fireworld.city.order import visiting_order
 from fireworld.city.physics import physics_of
 from fireworld.city.plan_file import load_plan
+from fireworld.city.visiting_order import visiting_order
 from fireworld.city.walls import walls_of
 from tests.reference import traces
 

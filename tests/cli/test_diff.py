@@ -12,8 +12,8 @@ from html.parser import HTMLParser
 from xml.etree import ElementTree
 
 import pytest
+from fireworld_recorder.reader import open_log
 
-from recorder.reader import open_log
 from tests.cli.test_help import ask, heavy
 from tests.docs.pages import ROOT
 from tests.recorder import synthetic
@@ -74,7 +74,7 @@ def test_the_same_run_needs_no_table_and_no_simulator(folder):
     code, _, modules = ask("diff", str(folder / "golden.mcap"), str(folder / "golden.mcap"))
     assert code == 0
     assert set(heavy(modules)) == {"numpy", "mcap"}
-    assert "recorder.diff" not in modules
+    assert "fireworld_recorder.diff" not in modules
 
 
 def test_a_difference_and_how_it_spread(diff):

@@ -6,9 +6,8 @@ import json
 import signal
 
 import pytest
-
-from recorder.reader import open_log
-from recorder.writer import StepFile
+from fireworld_recorder.reader import open_log
+from fireworld_recorder.writer import StepFile
 
 RECORD = ("run", "quick", "--record", "a.mcap", "--policy")
 

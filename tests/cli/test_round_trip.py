@@ -6,10 +6,10 @@ import json
 import shutil
 
 import pytest
+from fireworld_recorder.reader import open_log
 
 from fireworld.city.generator import generate_plan
 from fireworld.city.plan_file import dump_plan
-from recorder.reader import open_log
 
 
 def record(fireworld, name, *words):

@@ -3,7 +3,8 @@
 import contextlib
 import re
 
-from recorder.tables import TABLES
+from fireworld_recorder.tables import TABLES
+
 from tests.docs.pages import ROOT
 from tests.recorder import synthetic
 from tests.recorder.conftest import write_log

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fireworld.evaluation import paper
 from fireworld.evaluation.runs import Outcomes
-from fireworld.evaluation.study import ALONE, TEAMS, TOGETHER, TOGETHER_WITHOUT_FLAGS, Lesson, Study
+from fireworld.reproduction import paper
+from fireworld.reproduction.study import ALONE, TEAMS, TOGETHER, TOGETHER_WITHOUT_FLAGS, Lesson, Study
 
 LEARNED = (ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS, "random-tables")
 

@@ -11,8 +11,8 @@ from xml.etree.ElementTree import parse
 
 import pytest
 
-from fireworld.cli import contest
-from fireworld.evaluation.archive import read_results
+from fireworld.evaluation import contest
+from fireworld.evaluation.results import read_results
 from fireworld.policy.names import load_policy
 from fireworld.policy.team import Team, save_team
 from tests.cli.conftest import fireworld, here  # noqa: F401 - fixtures
@@ -198,11 +198,11 @@ def test_team_files_of_one_name_are_told_apart(fireworld, here):  # noqa: F811
 def test_ctrl_c_keeps_what_is_done(fireworld, here, monkeypatch):  # noqa: F811
     runs = []
 
-    def interrupted_run(stage, policy, *, seed):
+    def interrupted_run(built, policy, *, seed):
         runs.append(seed)
         if len(runs) == 4:
             signal.raise_signal(signal.SIGINT)
-        return run(stage, policy, seed=seed)
+        return run(built, policy, seed=seed)
 
     run = contest.run_compiled
     monkeypatch.setattr(signal, "getsignal", lambda _: signal.default_int_handler)

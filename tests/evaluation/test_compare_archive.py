@@ -10,8 +10,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from fireworld.errors import OutputError
-from fireworld.evaluation import archive
-from fireworld.evaluation.archive import COLUMNS, Archive, Result, RunKey, open_archive, policy_identity, read_results
+from fireworld.evaluation import results as archive
+from fireworld.evaluation.results import COLUMNS, Archive, Result, RunKey, open_archive, policy_identity, read_results
 from fireworld.evaluation.runs import QUANTITIES
 from fireworld.policy.kernel import always
 from fireworld.policy.names import NamedPolicy, load_policy

@@ -9,20 +9,21 @@ from threading import Event
 import msgspec
 import numpy as np
 import pytest
+from fireworld_recorder.reader import open_log
 
-from fireworld.cli import kept, reproduce
-from fireworld.cli.repetitions import Training, random_tables, without_flags
-from fireworld.cli.workers import Workers
+from fireworld.cli import reproduce
 from fireworld.errors import OutputError
-from fireworld.evaluation import paper
-from fireworld.evaluation.sheets import SHEETS
-from fireworld.evaluation.study import ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS
+from fireworld.executors import Workers
 from fireworld.policy.team import load_team
+from fireworld.reproduction import kept, paper
+from fireworld.reproduction.repetitions import Training, random_tables, without_flags
+from fireworld.reproduction.sheets import SHEETS
+from fireworld.reproduction.study import ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS
 from fireworld.scenario import load_scenario
+from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import load_curriculum
 from fireworld.training.method import Method
 from fireworld.training.trainer import Trainer
-from recorder.reader import open_log
 from tests.cli.conftest import fireworld  # noqa: F401 - a fixture
 
 CURRICULUM = """
@@ -53,10 +54,10 @@ def small(tmp_path, monkeypatch, curriculum):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(reproduce, "CURRICULUM", curriculum)
     monkeypatch.setattr("fireworld.training.method.PAPER", METHOD)
-    monkeypatch.setattr("fireworld.evaluation.paper.TABLE_1", (paper.Lesson("quick", 50, 4.5, 5),))
+    monkeypatch.setattr("fireworld.reproduction.paper.TABLE_1", (paper.Lesson("quick", 50, 4.5, 5),))
     test = paper.Test("quick", 2, (90, 60), (5, 1), (3.0, 4.0), 5)
-    monkeypatch.setattr("fireworld.evaluation.paper.TABLE_2", (test,))
-    monkeypatch.setattr("fireworld.evaluation.paper.TABLE_3", (test,))
+    monkeypatch.setattr("fireworld.reproduction.paper.TABLE_2", (test,))
+    monkeypatch.setattr("fireworld.reproduction.paper.TABLE_3", (test,))
     return tmp_path
 
 
@@ -66,7 +67,7 @@ def train(curriculum, number=1, **more):
         curriculum=curriculum,
         method=METHOD,
         number=number,
-        grounds={},
+        cities=CityCache(),
         stop=stop,
         on_scenario=lambda: seen.append(1),
         **more,
@@ -163,7 +164,7 @@ class Killed(BaseException):
 @pytest.fixture
 def undrawn(monkeypatch):
     """No images, which take most of the time."""
-    monkeypatch.setattr("fireworld.cli.pictures.draw_all", lambda *_: iter(()))
+    monkeypatch.setattr("fireworld.reproduction.pictures.draw_all", lambda *_: iter(()))
 
 
 WHOLE = {}
@@ -274,7 +275,7 @@ def test_other_settings_are_refused(begun, fireworld, monkeypatch):  # noqa: F81
     monkeypatch.setattr("fireworld.training.method.PAPER", METHOD.with_settings({"gamma": "0.9"}))
     assert refusal(fireworld, begun) == f"{settings}method.gamma: expected 0.9, got 0.5{hint}"
     monkeypatch.setattr("fireworld.training.method.PAPER", METHOD)
-    monkeypatch.setattr("fireworld.cli.pieces.__version__", "9")
+    monkeypatch.setattr("fireworld.reproduction.pieces.__version__", "9")
     assert refusal(fireworld, begun) == f"{settings}fireworld: expected 9, got '0.1.0'{hint}"
 
 

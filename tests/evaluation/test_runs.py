@@ -7,22 +7,22 @@ import pytest
 
 from fireworld.evaluation.runs import QUANTITIES, evaluate
 from fireworld.policy.names import BUILT_IN, load_policy
-from fireworld.runs import prepare_run
 from fireworld.scenario import load_scenario
-from fireworld.world.stage import build_stage
+from fireworld.simulation.built import build_scenario
+from fireworld.simulation.run import prepare_run
 
 SEEDS = [3, 1, 4]
 
 
 @pytest.fixture(scope="module")
-def stage():
-    return build_stage(load_scenario("quick").with_settings({"steps": "60"}))
+def built():
+    return build_scenario(load_scenario("quick").with_settings({"steps": "60"}))
 
 
-def test_outcomes_are_those_of_recorded_runs(stage):
-    found = evaluate(stage, BUILT_IN["nearest-to-me"](), SEEDS)
+def test_outcomes_are_those_of_recorded_runs(built):
+    found = evaluate(built, BUILT_IN["nearest-to-me"](), SEEDS)
     for place, seed in enumerate(SEEDS):
-        last = [*prepare_run(stage, load_policy("nearest-to-me"), seed=seed)][-1]
+        last = [*prepare_run(built, load_policy("nearest-to-me"), seed=seed)][-1]
         assert found.seed[place] == seed
         assert found.score[place] == last.score.score
         assert found.score_max[place] == last.score.score_max == 5
@@ -35,9 +35,9 @@ def test_outcomes_are_those_of_recorded_runs(stage):
     assert found.score_share.tolist() == [score / 5 for score in found.score.tolist()]
 
 
-def test_threads_change_nothing(stage):
-    one = evaluate(stage, BUILT_IN["random"](), range(8))
-    many = evaluate(stage, BUILT_IN["random"](), range(8), n_threads=3)
+def test_threads_change_nothing(built):
+    one = evaluate(built, BUILT_IN["random"](), range(8))
+    many = evaluate(built, BUILT_IN["random"](), range(8), n_threads=3)
     assert len(set(one.total_reward.tolist())) > 4
     for quantity in ("seed", *QUANTITIES):
         np.testing.assert_array_equal(getattr(one, quantity), getattr(many, quantity))

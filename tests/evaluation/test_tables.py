@@ -8,14 +8,14 @@ import re
 
 import pytest
 
-from fireworld.evaluation import paper
-from fireworld.evaluation.figures import draw_policy_changes, draw_returns
-from fireworld.evaluation.findings import caveat, findings, tally
-from fireworld.evaluation.report import report_page
-from fireworld.evaluation.sheets import SHEETS, sheets
 from fireworld.evaluation.statistics import Estimate
-from fireworld.evaluation.study import ALONE, TOGETHER
-from fireworld.evaluation.tables import APART, NEAR, WITHIN, Cell, make_tables
+from fireworld.reproduction import paper
+from fireworld.reproduction.convergence_figures import draw_policy_changes, draw_returns
+from fireworld.reproduction.findings import caveat, findings, tally
+from fireworld.reproduction.paper_tables import APART, NEAR, WITHIN, Cell, make_tables
+from fireworld.reproduction.report_page import report_page
+from fireworld.reproduction.sheets import SHEETS, sheets
+from fireworld.reproduction.study import ALONE, TOGETHER
 from tests.evaluation import synthetic
 
 

@@ -17,7 +17,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from recorder.writer import LogWriter
+from fireworld_recorder.writer import LogWriter
 
 N_STEPS = {"writer": 120, "run": 40}
 """Last step of what the children record, by kind; a step of the writer alone takes a tenth of a millisecond."""

@@ -3,23 +3,23 @@
 import random
 
 import pytest
+from fireworld_recorder.reader import open_log
+from fireworld_recorder.recover import recover
+from fireworld_recorder.verify import verify
+from fireworld_recorder.writer import LogWriter
 
 from fireworld.errors import LogError
 from fireworld.policy.names import load_policy
-from fireworld.replay import Replay
-from fireworld.runs import prepare_run
+from fireworld.recording.replay import Replay
 from fireworld.scenario import load_scenario
-from fireworld.world.stage import build_stage
-from recorder import open_log
-from recorder.recover import recover
-from recorder.verify import verify
-from recorder.writer import LogWriter
+from fireworld.simulation.built import build_scenario
+from fireworld.simulation.run import prepare_run
 
 
 @pytest.fixture(scope="module")
 def clean_logs(tmp_path_factory):
     """The bytes of the logs of one run that ended after 0, 1, ... 8 steps, as if it had been stopped there."""
-    run = prepare_run(build_stage(load_scenario("quick")), load_policy("chief"), seed=1, n_steps_max=8)
+    run = prepare_run(build_scenario(load_scenario("quick")), load_policy("chief"), seed=1, n_steps_max=8)
     records = list(run)
     folder = tmp_path_factory.mktemp("clean")
     for n in range(1, len(records) + 1):

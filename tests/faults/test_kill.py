@@ -5,12 +5,12 @@ import subprocess
 import sys
 
 import pytest
+from fireworld_recorder.reader import open_log
+from fireworld_recorder.recover import recover
+from fireworld_recorder.verify import verify
 
 from fireworld.errors import LogError
-from fireworld.replay import Replay
-from recorder import open_log
-from recorder.recover import recover
-from recorder.verify import verify
+from fireworld.recording.replay import Replay
 from tests.docs.pages import ROOT
 from tests.faults.nursery import N_STEPS
 

@@ -8,12 +8,12 @@ import sys
 from functools import partial
 
 import pytest
+from fireworld_recorder.reader import open_log
+from fireworld_recorder.writer import LogWriter
 
 from fireworld.city.plan_file import dump_plan
-from fireworld.placement import scenario_plan
 from fireworld.scenario import load_scenario
-from recorder.reader import open_log
-from recorder.writer import LogWriter
+from fireworld.simulation.placement import scenario_plan
 from tests import command_line
 
 STEPS = 60

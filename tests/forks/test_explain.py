@@ -10,16 +10,16 @@ from threading import Event
 
 import numpy as np
 import pytest
+from fireworld_recorder.reader import open_log
 
-from fireworld.forks.decisions import RecordedDecisions
-from fireworld.forks.explain import explain
-from fireworld.forks.stretches import Stretch, find_stretches
-from fireworld.forks.worse_run import WorseRun, prepare_worse_run
 from fireworld.policy.names import load_policy
 from fireworld.policy.ranking import Ranking, save_ranking
+from fireworld.recording.decisions import RecordedDecisions
+from fireworld.recording.explanation.search import explain
+from fireworld.recording.explanation.stretches import Stretch, find_stretches
+from fireworld.recording.explanation.worse_run import WorseRun, prepare_worse_run
+from fireworld.recording.replay import build_recorded
 from fireworld.records import ACTION_NAMES, ACTIONS
-from fireworld.replay import recorded_stage
-from recorder.reader import open_log
 from tests import command_line
 
 EARLY, LATE, BAD = (Stretch(0, 1, 8, 3, (0,)), Stretch(1, 5, 5, 1, (0,)), Stretch(1, 9, 10, 2, (0,)))
@@ -102,7 +102,7 @@ def test_no_stretches_no_replays():
 def test_compiled_replays_are_those_step_by_step(recordings, policy):
     log, other = open_log(recordings / f"{policy}.mcap"), open_log(recordings / "chief.mcap")
     better = RecordedDecisions(other)
-    run = prepare_worse_run(recorded_stage(log.header), log, better, lambda: load_policy(policy).policy)
+    run = prepare_worse_run(build_recorded(log.header), log, better, lambda: load_policy(policy).policy)
     assert run.compiled
     assert not run.orders
     stretches = find_stretches(run.recorded, better, n_brigades=run.n_brigades)
@@ -111,7 +111,7 @@ def test_compiled_replays_are_those_step_by_step(recordings, policy):
         world = run._world_before(0)
         run._run_stepwise(world, load_policy(policy).policy, told)
         scores.add(run.score(told))
-        assert run.score(told) == world.arrays.outcome.score[0]
+        assert run.score(told) == world.state.outcome.score[0]
     assert len(scores) > 1
     assert run.score([Stretch(0, 60, 60, 0, (1,))]) == pytest.approx(log.step(60).score.score, abs=0.1)
 
@@ -247,7 +247,7 @@ def test_the_orders_of_a_fork_are_found(here, answer):
     answer("fork", "random.mcap", "--at", 40, "--policy", "easiest", "--record", "f.mcap")
     log = open_log("f.mcap")
     run = prepare_worse_run(
-        recorded_stage(log.header), log, RecordedDecisions(log), lambda: load_policy("easiest").policy
+        build_recorded(log.header), log, RecordedDecisions(log), lambda: load_policy("easiest").policy
     )
     assert run.orders
     assert max(step for step, _ in run.orders) <= 40, "afterwards the policy decided by itself"

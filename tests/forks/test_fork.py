@@ -8,18 +8,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fireworld_recorder.chain import Digest
+from fireworld_recorder.diff import compare
+from fireworld_recorder.reader import open_log
+from fireworld_recorder.writer import StepFile
 
-from fireworld.forks.fork import Change, prepare_fork
-from fireworld.forks.resume import resume
 from fireworld.policy.asking import begin
 from fireworld.policy.names import load_policy
 from fireworld.policy.team import Team, save_team
+from fireworld.recording.fork import Change, prepare_fork
+from fireworld.recording.replay import build_recorded
+from fireworld.recording.resume import resume
 from fireworld.records import ACTION_NAMES, ACTIONS, MemoryRecording
-from fireworld.replay import recorded_stage
-from recorder.chain import Digest
-from recorder.diff import compare
-from recorder.reader import open_log
-from recorder.writer import StepFile
 from tests.forks.conftest import STEPS, write_log
 
 
@@ -38,15 +38,15 @@ def one_deciding(log, *, after):
 def test_without_a_change_the_fork_is_the_run_wherever_it_is_forked(recordings):
     """At every snapshot and at 20 other steps: the same records, so the same digest."""
     log = open_log(recordings / "random.mcap")
-    records, stage = list(log), recorded_stage(log.header)
+    records, built = list(log), build_recorded(log.header)
     assert log.snapshots == [0, 50]
     assert records[-1].step == STEPS
     assert records[-1].truncated
     for step in [*log.snapshots, *np.random.default_rng(1).choice(STEPS, 20, replace=False).tolist()]:
-        resumed = resume(stage, MemoryRecording(log.header, log.city, records[: step + 1]), source="log")
+        resumed = resume(built, MemoryRecording(log.header, log.city, records[: step + 1]), source="log")
         assert compare(resumed.recorded, resumed.replayed).same
         named = load_policy("random")
-        begin(named.policy, resumed.world.tables, n_brigades=resumed.world.n_brigades, seed=resumed.world.seed)
+        begin(named.policy, resumed.world.city_arrays, n_brigades=resumed.world.n_brigades, seed=resumed.world.seed)
         fork = prepare_fork(resumed, Change(named), log, records[: step + 1], digest=log.digest, source="log")
         gone, digest = list(fork), Digest(log.city)
         for record in gone:

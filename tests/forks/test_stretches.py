@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from fireworld.forks.decisions import RecordedDecisions
-from fireworld.forks.stretches import Stretch, find_stretches, holding
+from fireworld.recording.decisions import RecordedDecisions
+from fireworld.recording.explanation.stretches import Stretch, find_stretches, holding
 
 
 def decisions(*brigades, targets=()):

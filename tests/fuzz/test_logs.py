@@ -10,23 +10,23 @@ import numpy as np
 import pytest
 import zstandard
 from click.testing import CliRunner
+from fireworld_recorder.chain import Chain, step_messages
+from fireworld_recorder.codec import encode
+from fireworld_recorder.container import MAGIC
+from fireworld_recorder.describe import describe
+from fireworld_recorder.diff import compare
+from fireworld_recorder.header import to_metadata
+from fireworld_recorder.reader import open_log
+from fireworld_recorder.recover import channels_of, recover
+from fireworld_recorder.schema import Commit, message_of
+from fireworld_recorder.totals import totals_of
+from fireworld_recorder.writer import Channel, StepFile, own_channels
 from hypothesis import given
 from hypothesis import strategies as st
 
 from fireworld.cli.info import command
 from fireworld.errors import FireworldError
 from fireworld.records import DTYPES, STEP_TOPICS
-from recorder import open_log
-from recorder.chain import Chain, step_messages
-from recorder.codec import encode
-from recorder.container import MAGIC
-from recorder.describe import describe
-from recorder.diff import compare
-from recorder.header import to_metadata
-from recorder.recover import channels_of, recover
-from recorder.schema import Commit, message_of
-from recorder.totals import totals_of
-from recorder.writer import Channel, StepFile, own_channels
 from tests.fuzz.support import FOLDER, FUZZ, altered, file_of, only_complaints, target
 from tests.recorder import synthetic
 
@@ -96,7 +96,7 @@ def _info(log):
 
 
 def _export(log):
-    from recorder.parquet import export
+    from fireworld_recorder.parquet import export
 
     export(log, Path(FOLDER.name) / "tables", force=True)
 
@@ -169,7 +169,7 @@ def test_log_frame(city, names, schemas, numbers, texts):
 
 def _sealed(metadata):
     """Give altered metadata a checksum that fits."""
-    from recorder import header
+    from fireworld_recorder import header
 
     return {**metadata, "checksum": header._checksum(metadata)}
 

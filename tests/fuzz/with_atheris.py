@@ -29,7 +29,7 @@ def main() -> int:
     if arguments.here:
         (name,) = names
         limits = [f"-max_total_time={max(1, round(arguments.seconds))}", "-print_final_stats=0", "-verbosity=0"]
-        atheris.Setup([sys.argv[0], *limits], TARGETS[name].hypothesis.fuzz_one_input)
+        atheris.Placement([sys.argv[0], *limits], TARGETS[name].hypothesis.fuzz_one_input)
         atheris.Fuzz()
     share = f"{arguments.seconds / len(names):.0f}"
     for name in names:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from fireworld.cli.goldens import carry_out
-from fireworld.golden import Order, prepare_golden
+from fireworld.recording.golden.check import carry_out
+from fireworld.recording.golden.order import Order, prepare_golden
 from tests import command_line
 
 CACHE = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")

@@ -11,13 +11,13 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from fireworld_recorder.reader import open_log
+from fireworld_recorder.writer import LogWriter
 
-from fireworld.cli import goldens
-from fireworld.cli.goldens import find_goldens, store_text, text_path
 from fireworld.policy.team import Team, save_team
 from fireworld.policy.words import N_STATES
-from recorder.reader import open_log
-from recorder.writer import LogWriter
+from fireworld.recording.golden import check as goldens
+from fireworld.recording.golden.check import find_goldens, store_text, text_path
 from tests import command_line
 
 MINE = ("add", "quick", "--policy", "mine:Policy", "--steps", 8)

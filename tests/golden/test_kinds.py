@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fireworld.golden import kind_of
+from fireworld.recording.golden.order import kind_of
 from fireworld.scenario import load_scenario, parse_scenario
 
 QUICK = load_scenario("quick")

@@ -6,11 +6,11 @@ import subprocess
 import sys
 
 import pytest
+from fireworld_recorder.reader import open_log
 
-from fireworld.cli.goldens import carry_out, check_golden, find_goldens, store_golden
-from fireworld.golden import Order, order_of, prepare_golden
 from fireworld.pytest_plugin import NAME_MAX, golden_name
-from recorder.reader import open_log
+from fireworld.recording.golden.check import carry_out, check_golden, find_goldens, store_golden
+from fireworld.recording.golden.order import Order, order_of, prepare_golden
 from tests.golden.conftest import POLICY
 
 UPDATE = "--fireworld-update"

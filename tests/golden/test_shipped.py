@@ -7,13 +7,14 @@ import shutil
 import subprocess
 
 import pytest
+from fireworld_recorder.reader import open_log
 
-from fireworld.cli.golden_text import golden_text
-from fireworld.cli.goldens import check_golden, find_goldens, text_path
-from fireworld.golden import kind_of, order_of, recorded_scenario
+from fireworld.recording.golden.check import check_golden, find_goldens, text_path
+from fireworld.recording.golden.order import kind_of, order_of, recorded_scenario
+from fireworld.recording.golden.text import golden_text
 from fireworld.records import EVENT_KINDS
 from fireworld.scenario import load_scenario, scenario_names
-from recorder.reader import open_log
+from fireworld.simulation.built import CityCache
 from tests.docs.pages import ROOT
 
 FOLDER = ROOT / "recordings" / "golden"
@@ -23,15 +24,15 @@ GIT = shutil.which("git")
 
 
 @pytest.fixture(scope="module")
-def grounds():
+def cities():
     """Cities that several goldens share."""
-    return {}
+    return CityCache()
 
 
 @pytest.mark.parametrize("path", GOLDENS, ids=lambda path: path.stem)
-def test_the_run_is_what_it_was(path, grounds):
+def test_the_run_is_what_it_was(path, cities):
     """If the change is meant: `fireworld golden update --reason "..."`."""
-    checked = check_golden(path, grounds=grounds)
+    checked = check_golden(path, cities=cities)
     assert checked.result == "same", checked.sentence
 
 

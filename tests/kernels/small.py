@@ -10,7 +10,7 @@ import numpy as np
 from fireworld.city.build import build_city, with_links
 from fireworld.city.city import City, Plan
 from fireworld.parameters import PAPER, Parameters
-from fireworld.world.world import World
+from fireworld.simulation.world import World
 from tests.city.plans import footprints, rectangle, street_map
 
 METRE = 1000
@@ -81,7 +81,7 @@ def make_world(
 
 def burn(world: World, *buildings: int, code: int = 1) -> None:
     """Let these buildings burn, and no others, and look at the fire sites."""
-    fieryness = world.arrays.fire.fieryness
+    fieryness = world.state.fire.fieryness
     fieryness[(fieryness >= 1) & (fieryness <= 3)] = 5
     fieryness[list(buildings)] = code
     world._look()
@@ -89,5 +89,5 @@ def burn(world: World, *buildings: int, code: int = 1) -> None:
 
 def site_numbers(world: World) -> dict[int, int]:
     """The number of the fire site of each burning building."""
-    sites = world.arrays.sites
+    sites = world.state.sites
     return {int(b): int(sites.number[sites.place[b]]) for b in np.flatnonzero(sites.place >= 0)}

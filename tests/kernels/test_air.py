@@ -11,12 +11,12 @@ from fireworld.city.build import build_city
 from fireworld.city.generator import generate_plan
 from fireworld.kernels.fire import advance_fire, ignite
 from fireworld.parameters import PAPER
-from fireworld.world.state import fresh_fire, restore_snapshot, take_snapshot, warm_spans
-from fireworld.world.tables import city_tables, fire_constants
-from tests.world.town import town_world
+from fireworld.simulation.city_arrays import city_arrays, fire_constants
+from fireworld.simulation.state import fresh_fire, restore_snapshot, take_snapshot, warm_spans
+from tests.simulation.town import town_world
 
 CITY = build_city(generate_plan(columns=14, rows=14, seed=3), PAPER.fire, seed=3)
-TABLES = city_tables(CITY, PAPER.fire)
+TABLES = city_arrays(CITY, PAPER.fire)
 CORNER, MIDDLE = 1, 98
 
 
@@ -92,11 +92,11 @@ def test_the_spans_vanish_with_the_heat_and_come_again():
 
 def test_a_restored_fire_has_the_spans_of_its_own_air():
     world, other = town_world(seed=5, n_fires=1), town_world(seed=9, n_fires=8)
-    fire = other.arrays.fire
+    fire = other.state.fire
     fire.span[0], fire.span[1] = 1, fire.air.shape[1]
-    snapshot = take_snapshot(world.arrays)
+    snapshot = take_snapshot(world.state)
     assert "fire.span" not in snapshot
-    restore_snapshot(other.arrays, snapshot)
+    restore_snapshot(other.state, snapshot)
     assert not cell_by_cell(fire).any()
 
 

@@ -11,7 +11,7 @@ from fireworld.kernels import brigades as kernels
 from fireworld.kernels.brigades import DEAD, DRIVING, IDLE, REFILLING, SPRAYING, TO_REFUGE
 from fireworld.parameters import OFFICIAL_2013, PAPER, Parameters
 from fireworld.policy.kernel import always
-from fireworld.world.tables import brigade_constants
+from fireworld.simulation.city_arrays import brigade_constants
 from tests.kernels.small import METRE, burn, make_city, make_world, square
 
 PAPER_BRIGADES = brigade_constants(PAPER.brigades)
@@ -64,7 +64,7 @@ def test_stations_are_found_where_brigades_stand():
         hydrants=[2],
     )
     world = make_world(city, brigades=[0, 1, 1])
-    brigades, streets = world.arrays.brigades, world.tables.streets
+    brigades, streets = world.state.brigades, world.city_arrays.streets
     brigades.street[2], brigades.offset[2] = 1, 100_000
     brigades.x[2], brigades.y[2] = kernels.locate(1, 100_000, streets)
     kernels.find_stations(brigades, streets)
@@ -90,10 +90,10 @@ def test_a_brigade_drives_sprays_runs_dry_refills_and_comes_back():
     """200 m of street, 80 m a step; range 50 m from 12 m aside: it stops 48.538 m before the fire."""
     world = fire_and_refuge(small_tank())
     policy = always(0)
-    policy.begin(world.tables, 1, 1)
-    brigades = world.arrays.brigades
+    policy.begin(world.city_arrays, 1, 1)
+    brigades = world.state.brigades
     told = []
-    fire = world.arrays.fire
+    fire = world.state.fire
     for _ in range(12):
         fire.water[0], fire.energy[0], fire.fieryness[0] = 0, 1e6, 1  # a fire that no water puts out
         world.step(policy)
@@ -112,18 +112,18 @@ def test_a_brigade_drives_sprays_runs_dry_refills_and_comes_back():
         (SPRAYING, 1000, 0),
         (SPRAYING, 0, 0),
     ]
-    assert world.arrays.outcome.water[0] == 6000.0
+    assert world.state.outcome.water[0] == 6000.0
 
 
 def test_sprayed_litres_lie_on_the_target():
     world = fire_and_refuge(small_tank(), refuge_m=30.0)
-    world.arrays.brigades.target[0] = 0
+    world.state.brigades.target[0] = 0
     world._act()
-    assert world.arrays.outcome.water[0] == 2000.0
-    assert world.arrays.fire.water.tolist() == [2000, 0]
-    assert world.arrays.fire.watered.tolist() == [1, 0]
-    assert world.arrays.brigades.sprayed.tolist() == [2000]
-    assert world.arrays.brigades.tank.tolist() == [1000]
+    assert world.state.outcome.water[0] == 2000.0
+    assert world.state.fire.water.tolist() == [2000, 0]
+    assert world.state.fire.watered.tolist() == [1, 0]
+    assert world.state.brigades.sprayed.tolist() == [2000]
+    assert world.state.brigades.tank.tolist() == [1000]
 
 
 @pytest.mark.parametrize(
@@ -132,7 +132,7 @@ def test_sprayed_litres_lie_on_the_target():
 )
 def test_what_else_a_brigade_does(change, expected):
     world = fire_and_refuge(small_tank(refuge_refill_litres=0), refuge_m=30.0)
-    brigades = world.arrays.brigades
+    brigades = world.state.brigades
     brigades.target[0] = 0
     brigades.tank[0] = 2500
     for name, value in change.items():
@@ -153,7 +153,7 @@ def test_a_dry_brigade_goes_to_the_refuge_with_the_shortest_way():
         streets=[(0, 1), (1, 2), (2, 3)],
     )
     world = make_world(city, brigades=[0])
-    brigades = world.arrays.brigades
+    brigades = world.state.brigades
     brigades.tank[0], brigades.refilling[0] = 0, 1
     for _ in range(2):
         world._act()
@@ -172,17 +172,17 @@ def test_a_dry_brigade_without_a_way_to_a_refuge_stays():
         streets=[(0, 1), (2, 3)],
     )
     world = make_world(city, brigades=[0])
-    world.arrays.brigades.tank[0] = 0
-    world.arrays.brigades.refilling[0] = 1
+    world.state.brigades.tank[0] = 0
+    world.state.brigades.refilling[0] = 1
     world._act()
-    assert world.arrays.brigades.activity[0] == IDLE
-    assert world.arrays.brigades.x[0] == 0.0
+    assert world.state.brigades.activity[0] == IDLE
+    assert world.state.brigades.x[0] == 0.0
 
 
 def test_a_refuge_shelters_only_those_who_refill():
     world = make_world(make_city(square(0, 0), square(60, 0), refuges=[1]), brigades=[1, 1])
-    brigades = world.arrays.brigades
-    kernels.find_stations(brigades, world.tables.streets)
+    brigades = world.state.brigades
+    kernels.find_stations(brigades, world.city_arrays.streets)
     brigades.activity[:] = REFILLING, IDLE
     kernels.shelter(brigades)
     assert brigades.inside.tolist() == [1, -1]
@@ -203,7 +203,7 @@ def test_a_hydrant_fills_in_passing_but_the_refuge_is_where_a_dry_brigade_goes()
         hydrants=[1],
     )
     world = make_world(city, brigades=[0])
-    brigades = world.arrays.brigades
+    brigades = world.state.brigades
     brigades.street[0], brigades.offset[0], brigades.x[0] = 0, 60_000, 40_000.0
     brigades.tank[0], brigades.refilling[0] = 0, 1
     burn(world, 0)

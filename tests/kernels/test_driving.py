@@ -33,24 +33,24 @@ def world():
 
 
 def put(world, street, offset_m):
-    brigades = world.arrays.brigades
+    brigades = world.state.brigades
     brigades.street[0], brigades.offset[0] = street, round(offset_m * METRE)
-    brigades.x[0], brigades.y[0] = locate(street, round(offset_m * METRE), world.tables.streets)
+    brigades.x[0], brigades.y[0] = locate(street, round(offset_m * METRE), world.city_arrays.streets)
     brigades.driven[0] = 0
 
 
 def go(world, building, *, target=NO_TARGET, speed_m=80.0):
     """Drive one step; return street, offset, way driven (m) and the place (m)."""
     constants = world.constants.brigades._replace(speed=round(speed_m * METRE))
-    brigades = world.arrays.brigades
+    brigades = world.state.brigades
     brigades.driven[0] = 0
-    drive(0, building, target, brigades, world.tables.streets, world.tables.geometry, constants)
+    drive(0, building, target, brigades, world.city_arrays.streets, world.city_arrays.geometry, constants)
     x, y = brigades.x[0] / METRE, brigades.y[0] / METRE
     return int(brigades.street[0]), brigades.offset[0] / METRE, brigades.driven[0] / METRE, (x, y)
 
 
 def test_the_buildings_are_entered_where_the_tests_say(world):
-    streets = world.tables.streets
+    streets = world.city_arrays.streets
     assert streets.access_street.tolist() == [UP, LAST, ISLAND, EAST]
     assert (streets.access_offset / METRE).tolist() == [60.0, 60.0, 20.0, 12.0]
 
@@ -69,7 +69,7 @@ def test_the_buildings_are_entered_where_the_tests_say(world):
 )
 def test_ways(world, start, goal, expected):
     (street, offset), (goal_street, goal_offset) = start, goal
-    length, leave, arrive = way(street, offset * METRE, goal_street, goal_offset * METRE, world.tables.streets)
+    length, leave, arrive = way(street, offset * METRE, goal_street, goal_offset * METRE, world.city_arrays.streets)
     assert (length // METRE, leave, arrive) == expected
 
 
@@ -77,13 +77,13 @@ def test_of_two_ways_of_one_length_the_one_by_the_first_nodes_is_taken():
     """Halfway along one side of a square, the goal halfway along the opposite one."""
     corners = [(0, 0), (100, 0), (100, 100), (0, 100)]
     city = make_city(square(50, 112), nodes_m=corners, streets=[(0, 1), (1, 2), (3, 2), (3, 0)])
-    streets = make_world(city).tables.streets
+    streets = make_world(city).city_arrays.streets
     assert way(0, 50 * METRE, 2, 50 * METRE, streets) == (200 * METRE, 0, 3)
 
 
 def test_of_two_streets_between_two_nodes_the_first_shortest_is_taken():
     city = make_city(square(50, 12), nodes_m=[(0, 0), (100, 0)], streets=[(0, 1), (1, 0)])
-    assert street_between(0, 1, make_world(city).tables.streets) == 0
+    assert street_between(0, 1, make_world(city).city_arrays.streets) == 0
 
 
 def test_a_way_through_several_streets(world):
@@ -131,27 +131,27 @@ def test_a_way_of_no_length_to_a_crossing_changes_the_street():
     """Standing where two streets meet is being there, from whichever of them the building is entered."""
     city = make_city(square(100, -12), nodes_m=[(0, 0), (100, 0), (200, 50)], streets=[(1, 2), (0, 1)])
     world = make_world(city, brigades=[0])
-    access = int(world.tables.streets.access_street[0])
+    access = int(world.city_arrays.streets.access_street[0])
     other = 1 - access
     put(world, other, 100 if other == 1 else 0)
     street, offset, driven, place = go(world, 0)
-    assert (street, offset * METRE) == (access, float(world.tables.streets.access_offset[0]))
+    assert (street, offset * METRE) == (access, float(world.city_arrays.streets.access_offset[0]))
     assert (driven, place) == (0.0, (100.0, 0.0))
 
 
 def test_it_stops_at_the_first_millimetre_in_range(world):
     """The target at (300, 30): 50 m are reached 40 m before it, exactly at x = 260 m."""
-    world.tables.geometry.x[AT_LAST], world.tables.geometry.y[AT_LAST] = 300_000.0, 30_000.0
+    world.city_arrays.geometry.x[AT_LAST], world.city_arrays.geometry.y[AT_LAST] = 300_000.0, 30_000.0
     put(world, FIRST, 30)
     assert go(world, AT_LAST, target=AT_LAST, speed_m=1000) == (BEYOND, 60.0, 230.0, (260.0, 0.0))
-    world.tables.geometry.y[AT_LAST] = 30_001.0
+    world.city_arrays.geometry.y[AT_LAST] = 30_001.0
     put(world, FIRST, 30)
     assert go(world, AT_LAST, target=AT_LAST, speed_m=1000)[1] == 60.001
 
 
 def test_a_target_in_range_from_a_node_ends_the_way_there(world):
     """At the crossing (100, 0) the target at (100, -50) is in range; before it and on every other street it is not."""
-    world.tables.geometry.x[AT_UP], world.tables.geometry.y[AT_UP] = 100_000.0, -50_000.0
+    world.city_arrays.geometry.x[AT_UP], world.city_arrays.geometry.y[AT_UP] = 100_000.0, -50_000.0
     put(world, FIRST, 30)
     _, _, driven, place = go(world, AT_UP, target=AT_UP, speed_m=1000)
     assert (driven, place) == (70.0, (100.0, 0.0))
@@ -170,7 +170,7 @@ coordinate = st.integers(-120_000, 120_000)
 def test_stopping_is_what_looking_at_every_millimetre_finds(end, target, part, range_mm):
     """Streets at any angle, whose whole lengths are not quite their true ones."""
     nodes_m = [(0, 0), (end[0] / METRE, end[1] / METRE)]
-    tables = SLANTED.tables
+    tables = SLANTED.city_arrays
     length = round(float(np.hypot(*end)))
     streets = tables.streets._replace(
         node_x=np.array([0.0, float(end[0])]), node_y=np.array([0.0, float(end[1])]), length=np.array([length])
@@ -195,7 +195,7 @@ SLANTED = make_world(make_city(square(0, 0), nodes_m=[(0, 0), (100, 0)]))
 @settings(max_examples=60, deadline=None)
 def test_a_brigade_is_always_on_its_street_and_never_too_fast(trips):
     world = make_world(make_city(*BUILDINGS, nodes_m=NODES_M, streets=STREETS), brigades=[AT_UP])
-    streets, brigades = world.tables.streets, world.arrays.brigades
+    streets, brigades = world.city_arrays.streets, world.state.brigades
     for building, speed in trips:
         before = np.array([brigades.x[0], brigades.y[0]])
         go(world, building, speed_m=speed / METRE)

@@ -10,7 +10,7 @@ import pytest
 from fireworld.draws import DAMAGE, uniform
 from fireworld.kernels.health import expose, harm, worsen
 from fireworld.parameters import HealthParameters
-from fireworld.world.tables import health_constants
+from fireworld.simulation.city_arrays import health_constants
 from tests.kernels.small import burn, make_city, make_world, square
 from tests.reference.traces import TRACES
 
@@ -122,7 +122,7 @@ def test_who_is_where_meets_the_fire_of_the_step():
     for step in range(1, 40):
         world.step_number = step
         world._hurt()
-    hp = world.arrays.civilians.hp
+    hp = world.state.civilians.hp
     assert hp[0] == 0
     assert hp[1:].tolist() == [1000, 1000]
-    assert world.arrays.brigades.hp.tolist() == [1000]
+    assert world.state.brigades.hp.tolist() == [1000]

@@ -10,7 +10,7 @@ import pytest
 from fireworld.kernels.observation import can_choose, find_target, level, observe, state_index, volume_class
 from fireworld.policy.protocol import Decision
 from fireworld.policy.words import RADIX
-from fireworld.world.tables import observation_constants
+from fireworld.simulation.city_arrays import observation_constants
 from tests.kernels.small import METRE, burn, make_city, make_world, square
 
 LINE = [square(50.0 * k, 0.0) for k in range(7)]
@@ -21,9 +21,9 @@ def see(world, brigade=0):
     features = np.zeros(8, dtype=np.int64)
     state = observe(
         brigade,
-        world.arrays.brigades.action,
-        world.arrays.brigades,
-        world.arrays.sites,
+        world.state.brigades.action,
+        world.state.brigades,
+        world.state.sites,
         world.constants.observation,
         features,
     )
@@ -31,7 +31,7 @@ def see(world, brigade=0):
 
 
 def target(world, action, brigade=0):
-    arrays, tables = world.arrays, world.tables
+    arrays, tables = world.state, world.city_arrays
     return find_target(brigade, action, arrays.brigades, tables.buildings, arrays.fire, tables.geometry, arrays.sites)
 
 
@@ -96,7 +96,7 @@ def test_free_edges_counts_sides():
     around = [square(0, 0), square(0, 40), square(40, 0), square(0, -40), square(-40, 0)]
     world = make_world(make_city(*around, links={0: [1, 2, 3, 4]}), brigades=[0])
     for n_free in range(4, -1, -1):
-        world.arrays.fire.fieryness[1:] = [0] * n_free + [8] * (4 - n_free)
+        world.state.fire.fieryness[1:] = [0] * n_free + [8] * (4 - n_free)
         burn(world, 0)
         assert see(world)[0][0] == n_free
 
@@ -105,7 +105,7 @@ def test_a_brigade_without_a_fire_sees_nothing():
     world = make_world(make_city(*LINE), brigades=[0])
     burn(world)
     assert see(world) == ([0] * 8, -1)
-    assert not can_choose(0, world.arrays.brigades, world.arrays.sites)
+    assert not can_choose(0, world.state.brigades, world.state.sites)
     assert target(world, 0) == -1
 
 
@@ -113,8 +113,8 @@ def test_a_brigade_without_a_fire_sees_nothing():
 def test_the_dead_and_the_refilling_do_not_choose(hp, refilling, expected):
     world = make_world(make_city(*LINE), brigades=[0])
     burn(world, 0)
-    world.arrays.brigades.hp[0], world.arrays.brigades.refilling[0] = hp, refilling
-    assert can_choose(0, world.arrays.brigades, world.arrays.sites) == expected
+    world.state.brigades.hp[0], world.state.brigades.refilling[0] = hp, refilling
+    assert can_choose(0, world.state.brigades, world.state.sites) == expected
 
 
 class Scripted:
@@ -148,11 +148,11 @@ def test_a_refilling_brigade_counts_as_doing_nothing():
     world = make_world(make_city(*LINE, refuges=[6]), ignited=[0], brigades=[6, 6])
     policy = Scripted({1: [0, 1], 2: [2, 2]})
     world.step(policy)
-    world.arrays.brigades.refilling[0] = 1
+    world.state.brigades.refilling[0] = 1
     world.step(policy)
     assert policy.seen[-1] == (2, 1, (False, False, False, False))
-    assert world.arrays.brigades.action.tolist() == [-1, 2]
-    assert world.arrays.brigades.target[0] == -1
+    assert world.state.brigades.action.tolist() == [-1, 2]
+    assert world.state.brigades.target[0] == -1
 
 
 def targets_world(**others):
@@ -160,23 +160,23 @@ def targets_world(**others):
     outlines = [*LINE[:4], square(600, 0)]
     links = {k: [k + 1] for k in range(3)}
     world = make_world(make_city(*outlines, links=links, **others), brigades=[4], civilians=[(4, 600.0, 0.0)])
-    world.arrays.fire.energy[:4] = world.tables.buildings.capacity[:4] * np.array([300.0, 100.0, 200.0, 400.0])
+    world.state.fire.energy[:4] = world.city_arrays.buildings.capacity[:4] * np.array([300.0, 100.0, 200.0, 400.0])
     burn(world, 0, 1, 2, 3)
     return world
 
 
 def test_the_four_actions_name_their_buildings():
     world = targets_world()
-    brigades = world.arrays.brigades
+    brigades = world.state.brigades
     brigades.x[0], brigades.y[0] = -20.0 * METRE, 0.0
-    world.arrays.sites.building_civilian_square[:4] = 9.0, 9.5, 1.0, 2.0
+    world.state.sites.building_civilian_square[:4] = 9.0, 9.5, 1.0, 2.0
     assert [target(world, action) for action in range(4)] == [1, 2, 3, 0]
 
 
 def test_the_civilian_nearest_to_a_building_counts():
     world = targets_world()
     assert target(world, 1) == 3
-    world.arrays.civilians.x[0], world.arrays.civilians.y[0] = -5.0, 0.0
+    world.state.civilians.x[0], world.state.civilians.y[0] = -5.0, 0.0
     burn(world, 0, 1, 2, 3)
     assert target(world, 1) == 0
 
@@ -184,27 +184,27 @@ def test_the_civilian_nearest_to_a_building_counts():
 @pytest.mark.parametrize("action", range(4))
 def test_ties_go_to_the_lowest_id(action):
     world = targets_world(ids=[9, 4, 8, 3, 1])
-    geometry = world.tables.geometry
+    geometry = world.city_arrays.geometry
     geometry.x[:4] = 0.0
     geometry.center_square[:4] = 5.0
-    world.arrays.sites.building_civilian_square[:4] = 7.0
-    world.arrays.fire.energy[:4] = world.tables.buildings.capacity[:4] * 60.0
+    world.state.sites.building_civilian_square[:4] = 7.0
+    world.state.fire.energy[:4] = world.city_arrays.buildings.capacity[:4] * 60.0
     assert target(world, action) == 3
 
 
 def test_without_civilians_that_action_names_the_lowest_id():
     world = targets_world(ids=[9, 4, 8, 3, 1])
-    world.arrays.civilians.hp[:] = 0
+    world.state.civilians.hp[:] = 0
     burn(world, 0, 1, 2, 3)
     assert target(world, 1) == 3
 
 
 def test_targets_are_of_the_own_site():
     world = make_world(make_city(*LINE), brigades=[0])
-    world.arrays.fire.energy[:] = world.tables.buildings.capacity * 100.0
-    world.arrays.fire.energy[6] = 1.0
+    world.state.fire.energy[:] = world.city_arrays.buildings.capacity * 100.0
+    world.state.fire.energy[6] = 1.0
     burn(world, 0, 6)
-    world.arrays.brigades.site[0] = 1
+    world.state.brigades.site[0] = 1
     assert [target(world, action) for action in range(4)] == [0] * 4
-    world.arrays.brigades.site[0] = 2
+    world.state.brigades.site[0] = 2
     assert [target(world, action) for action in range(4)] == [6] * 4

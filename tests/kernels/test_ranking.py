@@ -37,7 +37,7 @@ def weights(**named):
 
 def describe(world, b=0):
     """The features of a building that all brigades see alike, by name."""
-    tables, arrays, out = world.tables, world.arrays, np.full(N_OF_BUILDING, np.nan)
+    tables, arrays, out = world.city_arrays, world.state, np.full(N_OF_BUILDING, np.nan)
     power = world.constants.brigades.power
     fire_constants = world.constants.fire
     describe_building(
@@ -48,7 +48,7 @@ def describe(world, b=0):
 
 def see(world, name, *, b=0, brigade=0, known=None):
     """A feature of a building as the kernel weighs it: the value of a ranking that knows nothing else."""
-    tables, arrays = world.tables, world.arrays
+    tables, arrays = world.city_arrays, world.state
     known = np.full(world.n_brigades, -1, dtype=np.int32) if known is None else np.array(known, dtype=np.int32)
     described = np.array(list(describe(world, b).values()))
     range_square = world.constants.brigades.range_square
@@ -65,13 +65,13 @@ def one_fire(**others):
 
 
 def heat_up(world, b, degrees):
-    world.arrays.fire.energy[b] = world.tables.buildings.capacity[b] * degrees
+    world.state.fire.energy[b] = world.city_arrays.buildings.capacity[b] * degrees
 
 
 def need_litres(world, b, litres):
     """Let a building be so hot that so much water cools it to its ignition point."""
-    buildings = world.tables.buildings
-    world.arrays.fire.energy[b] = buildings.ignition_point[b] * buildings.capacity[b] + litres * LITRE
+    buildings = world.city_arrays.buildings
+    world.state.fire.energy[b] = buildings.ignition_point[b] * buildings.capacity[b] + litres * LITRE
 
 
 def test_the_names_of_code_and_recordings_are_the_kernels():
@@ -101,7 +101,7 @@ def test_volume(side_m, floors, expected):
 def test_fuel_left():
     world = one_fire()
     assert describe(world)["fuel_left"] == 1.0
-    world.arrays.fire.fuel[0] = world.tables.buildings.initial_fuel[0] / 4
+    world.state.fire.fuel[0] = world.city_arrays.buildings.initial_fuel[0] / 4
     assert describe(world)["fuel_left"] == 0.25
 
 
@@ -115,7 +115,7 @@ def test_civilian_distance(civilians_m, expected):
 
 def test_a_civilian_who_is_in_a_fire_or_dead_is_not_near():
     world = one_fire(civilians=[(0, 0.0, 0.0), (-1, 0.0, 20.0), (-1, 0.0, 120.0)])
-    world.arrays.civilians.hp[1] = 0
+    world.state.civilians.hp[1] = 0
     burn(world, 0)
     assert describe(world)["civilian_distance"] == 1.2
 
@@ -143,7 +143,7 @@ def test_exposure_and_kindling():
 def test_only_what_never_burned_is_exposed(code, counts):
     world = exposed_world()
     heat_up(world, 1, 47)
-    world.arrays.fire.fieryness[1] = code
+    world.state.fire.fieryness[1] = code
     seen = describe(world)
     assert (seen["exposure"], seen["kindling"]) == pytest.approx((2.25, 1.25) if counts else (1.5, 0.0))
 
@@ -168,7 +168,7 @@ def test_without_links_nothing_is_exposed():
 def test_steps_needed(litres, lying, expected):
     world = one_fire()
     need_litres(world, 0, litres)
-    world.arrays.fire.water[0] = lying
+    world.state.fire.water[0] = lying
     assert describe(world)["steps_needed"] == pytest.approx(expected, abs=1e-5)
 
 
@@ -193,7 +193,7 @@ def test_steps_needed_without_pumps():
 def test_range(away_m, in_range, beyond):
     """The pumps reach 50 m, exactly at the range included."""
     world = one_fire()
-    world.arrays.brigades.x[0], world.arrays.brigades.y[0] = 0.6 * away_m * METRE, -0.8 * away_m * METRE
+    world.state.brigades.x[0], world.state.brigades.y[0] = 0.6 * away_m * METRE, -0.8 * away_m * METRE
     assert see(world, "in_range") == in_range
     assert see(world, "beyond_range") == pytest.approx(beyond, abs=1e-12)
 
@@ -201,7 +201,7 @@ def test_range(away_m, in_range, beyond):
 def test_mine_is_what_the_brigade_itself_went_for():
     world = make_world(make_city(square(0, 0), square(60, 0)), brigades=[0, 0])
     burn(world, 0, 1)
-    world.arrays.brigades.target[:] = 0, 1
+    world.state.brigades.target[:] = 0, 1
     assert [[see(world, "mine", b=b, brigade=brigade) for b in (0, 1)] for brigade in (0, 1)] == [[1, 0], [0, 1]]
 
 
@@ -251,7 +251,7 @@ def test_enough(steps, n_others, expected):
 
 def ask(world, weighing, *, own, brigade=0, known=None, step=1, scratch=None):
     """What the brigade puts first, and the five values."""
-    tables, arrays, constants = world.tables, world.arrays, world.constants
+    tables, arrays, constants = world.city_arrays, world.state, world.constants
     n = len(arrays.fire.energy)
     described, described_at = scratch or (np.zeros((n, N_OF_BUILDING)), np.full(n, -1))
     values = np.zeros(5)
@@ -287,7 +287,7 @@ def five_burn(**others):
     for k in range(5):
         heat_up(world, k, 100.0 * (k + 1))
     burn(world, *range(5))
-    world.arrays.brigades.x[:], world.arrays.brigades.y[:] = 41.0 * METRE, 0.0
+    world.state.brigades.x[:], world.state.brigades.y[:] = 41.0 * METRE, 0.0
     return world
 
 
@@ -338,7 +338,7 @@ def test_only_the_own_site_is_ranked():
     hot = weights(temperature=1.0)
     for own in (True, False):
         for site, target in ((1, 0), (2, 1)):
-            world.arrays.brigades.site[0] = site
+            world.state.brigades.site[0] = site
             assert ask(world, hot, own=own)[0][1] == target
 
 

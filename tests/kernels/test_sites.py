@@ -48,7 +48,7 @@ def test_every_burning_code_counts(code):
 
 def test_sites_that_merge_keep_the_lowest_number_and_brigades_follow():
     world = row_world(n_brigades=2)
-    brigades = world.arrays.brigades
+    brigades = world.state.brigades
     burn(world, 0, 2)
     brigades.site[:] = 1, 2
     burn(world, 0, 1, 2)
@@ -63,7 +63,7 @@ def test_the_largest_part_of_a_split_site_keeps_the_number():
     burn(world, 0, 1, 2, 3, 4)
     burn(world, 0, 2, 3, 4)
     assert site_numbers(world) == {0: 2, 2: 1, 3: 1, 4: 1}
-    assert world.arrays.brigades.site.tolist() == [1]
+    assert world.state.brigades.site.tolist() == [1]
     burn(world, 2, 4)
     assert site_numbers(world) == {2: 1, 4: 3}, "equal parts: the lowest building keeps it"
 
@@ -79,7 +79,7 @@ def test_a_smaller_part_of_a_split_site_that_meets_another_keeps_that_ones_numbe
 
 def test_a_brigade_whose_site_is_out_goes_to_the_nearest_fire():
     world = row_world(n_brigades=2)
-    brigades = world.arrays.brigades
+    brigades = world.state.brigades
     brigades.x[:], brigades.y[:] = (0.0, 300.0 * METRE), (0.0, 0.0)
     burn(world, 0, 3, 6)
     assert brigades.site.tolist() == [1, 3]
@@ -94,10 +94,10 @@ def test_a_brigade_whose_site_is_out_goes_to_the_nearest_fire():
 def test_a_tie_for_the_nearest_fire_goes_to_the_lowest_id():
     world = make_world(make_city(square(-100, 0), square(100, 0), ids=[7, 5]))
     burn(world, 0, 1)
-    assert nearest_burning(0.0, 0.0, world.tables.buildings, world.tables.geometry, world.arrays.sites) == 1
-    assert nearest_burning(-1.0, 0.0, world.tables.buildings, world.tables.geometry, world.arrays.sites) == 0
+    assert nearest_burning(0.0, 0.0, world.city_arrays.buildings, world.city_arrays.geometry, world.state.sites) == 1
+    assert nearest_burning(-1.0, 0.0, world.city_arrays.buildings, world.city_arrays.geometry, world.state.sites) == 0
     burn(world)
-    assert nearest_burning(0.0, 0.0, world.tables.buildings, world.tables.geometry, world.arrays.sites) == -1
+    assert nearest_burning(0.0, 0.0, world.city_arrays.buildings, world.city_arrays.geometry, world.state.sites) == -1
 
 
 def test_sites_are_measured():
@@ -105,7 +105,7 @@ def test_sites_are_measured():
     city = make_city(square(0, 0), square(20, 0), square(300, 400), square(600, 0), floors=[1, 2, 3, 1])
     world = make_world(city, civilians=[(3, 600, 0), (-1, 300, 300), (0, 0, 0)])
     burn(world, 0, 1, 2)
-    sites = world.arrays.sites
+    sites = world.state.sites
     assert sites.counts[:1] == 2
     assert sites.volume[:2].tolist() == [900.0, 900.0]
     assert [side[0] for side in (sites.west, sites.south, sites.east, sites.north)] == [-5000, -5000, 25_000, 5000]
@@ -114,7 +114,7 @@ def test_sites_are_measured():
     assert sites.center_square[0] == nearest
     assert sites.civilian_square[0] == 280_000.0**2 + 300_000.0**2, "the one indoors in the fire does not count"
     assert sites.civilian_square[1] == 100_000.0**2
-    world.arrays.civilians.hp[:2] = 0
+    world.state.civilians.hp[:2] = 0
     burn(world, 0, 1, 2)
     assert (sites.civilian_square[:2] > 1e299).all(), "nor do the dead"
 
@@ -133,7 +133,7 @@ def test_sites_are_measured():
 def test_a_side_is_free_where_fire_can_spread(x_m, y_m, sides):
     city = make_city(square(0, 0), square(x_m, y_m), links={0: [1]})
     world = make_world(city)
-    fieryness, free = world.arrays.fire.fieryness, world.arrays.sites.free_sides
+    fieryness, free = world.state.fire.fieryness, world.state.sites.free_sides
     for code, expected in ((0, sides), (4, sides), (5, 0), (6, 0), (7, 0), (8, 0)):
         fieryness[1] = code
         burn(world, 0)
@@ -144,23 +144,23 @@ def test_what_leaves_a_side_closed():
     outlines = [square(0, 0), square(40, 0)]
     there_only = make_world(make_city(*outlines, links={1: [0]}))
     burn(there_only, 0)
-    assert there_only.arrays.sites.free_sides[0] == 0, "links lead from the burning building"
+    assert there_only.state.sites.free_sides[0] == 0, "links lead from the burning building"
     refuge = make_world(make_city(*outlines, links={0: [1]}, refuges=[1]))
     burn(refuge, 0)
-    assert refuge.arrays.sites.free_sides[0] == 0, "it must be inflammable"
+    assert refuge.state.sites.free_sides[0] == 0, "it must be inflammable"
     beside = make_city(square(0, 0), square(30, 30), square(0, 30), links={0: [2], 1: [2]})
     between = make_world(beside)
     burn(between, 0, 1)
-    assert between.arrays.sites.free_sides[0] == 0, "a centroid within the box lies beyond no side"
+    assert between.state.sites.free_sides[0] == 0, "a centroid within the box lies beyond no side"
 
 
 def test_a_building_on_the_edge_of_the_box_is_not_beyond_it():
     city = make_city(square(0, 0), square(40, 0), links={0: [1]})
     world = make_world(city)
-    geometry = world.tables.geometry._replace(east=np.array([40_000.0, 45_000.0]))
-    world.tables = world.tables._replace(geometry=geometry)
+    geometry = world.city_arrays.geometry._replace(east=np.array([40_000.0, 45_000.0]))
+    world.city_arrays = world.city_arrays._replace(geometry=geometry)
     burn(world, 0)
-    assert world.arrays.sites.free_sides[0] == 0
+    assert world.state.sites.free_sides[0] == 0
 
 
 def test_the_order_of_buildings_does_not_matter_to_who_belongs_together():

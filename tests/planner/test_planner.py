@@ -5,20 +5,20 @@ from __future__ import annotations
 import sys
 
 import pytest
+from fireworld_recorder.diff import compare
 
 from fireworld.errors import PolicyError
 from fireworld.planning.planner import Planner, PlannerOptions, planner
 from fireworld.policy.asking import begin
 from fireworld.policy.kernel import always
 from fireworld.policy.names import load_policy
+from fireworld.recording.replay import Replay
 from fireworld.records import MemoryRecording
-from fireworld.replay import Replay
-from fireworld.runs import prepare_run
 from fireworld.scenario import load_scenario
+from fireworld.simulation.built import build_scenario
+from fireworld.simulation.run import prepare_run
 from fireworld.testing import PolicyConformance
-from fireworld.world.stage import build_stage
-from recorder.diff import compare
-from tests.world.town import town_world
+from tests.simulation.town import town_world
 
 SHORT = PlannerOptions(horizon=6, interval=3)
 
@@ -29,18 +29,18 @@ class TestConformance(PolicyConformance):
 
 
 @pytest.fixture(scope="module")
-def stage():
-    return build_stage(load_scenario("quick"))
+def built():
+    return build_scenario(load_scenario("quick"))
 
 
 def decisions_of(world, policy, *, n_steps):
-    begin(policy, world.tables, n_brigades=world.n_brigades, seed=world.seed)
+    begin(policy, world.city_arrays, n_brigades=world.n_brigades, seed=world.seed)
     return [world.step(policy).decisions for _ in range(n_steps)]
 
 
 @pytest.mark.parametrize("interval", [1, 3, 4])
-def test_it_plans_once_a_period_and_keeps_to_the_plan(stage, interval):
-    made = decisions_of(stage.world(seed=3), Planner(PlannerOptions(horizon=5, interval=interval)), n_steps=12)
+def test_it_plans_once_a_period_and_keeps_to_the_plan(built, interval):
+    made = decisions_of(built.world(seed=3), Planner(PlannerOptions(horizon=5, interval=interval)), n_steps=12)
     asked = [step for step, decisions in enumerate(made, start=1) if any(each.action >= 0 for each in decisions)]
     planned = [step for step, decisions in enumerate(made, start=1) if any(each.q_values for each in decisions)]
     assert planned == [
@@ -55,8 +55,8 @@ def test_it_plans_once_a_period_and_keeps_to_the_plan(stage, interval):
             )
 
 
-def test_its_q_values_say_why(stage):
-    made = decisions_of(stage.world(seed=3), Planner(PlannerOptions(horizon=10, interval=1)), n_steps=6)
+def test_its_q_values_say_why(built):
+    made = decisions_of(built.world(seed=3), Planner(PlannerOptions(horizon=10, interval=1)), n_steps=6)
     explained = [each for decisions in made for each in decisions if each.q_values is not None]
     assert len({each.q_values for each in explained}) > 1
     assert all(each.q_values[each.action] == max(each.q_values) for each in explained)
@@ -64,10 +64,10 @@ def test_its_q_values_say_why(stage):
 
 def test_a_brigade_that_comes_back_in_between_follows_the_plan():
     world, policy = town_world(seed=3, n_fires=12, n_brigades=2), Planner(PlannerOptions(horizon=5, interval=1000))
-    begin(policy, world.tables, n_brigades=2, seed=world.seed)
-    world.arrays.brigades.refilling[0] = 1
+    begin(policy, world.city_arrays, n_brigades=2, seed=world.seed)
+    world.state.brigades.refilling[0] = 1
     assert world.step(policy).decisions[0].action == -1
-    world.arrays.brigades.refilling[0] = 0
+    world.state.brigades.refilling[0] = 0
     returned = world.step(policy).decisions[0]
     assert 0 <= returned.action < 4
     assert returned.q_values is None
@@ -79,22 +79,22 @@ def test_teams_of_any_size(n_brigades):
     assert all(len(decisions) == n_brigades for decisions in made)
 
 
-def test_a_recorded_run_of_it_replays(stage):
-    run = prepare_run(stage, load_policy("planner:horizon=8"), seed=4, n_steps_max=20)
+def test_a_recorded_run_of_it_replays(built):
+    run = prepare_run(built, load_policy("planner:horizon=8"), seed=4, n_steps_max=20)
     recording = MemoryRecording(run.header, run.city, list(run))
     difference = compare(recording, Replay(recording))
     assert difference.same
     again = MemoryRecording(
-        run.header, run.city, list(prepare_run(stage, load_policy("planner:horizon=8"), seed=4, n_steps_max=20))
+        run.header, run.city, list(prepare_run(built, load_policy("planner:horizon=8"), seed=4, n_steps_max=20))
     )
     assert compare(recording, again).same
 
 
-def test_it_does_better_than_every_fixed_action(stage):
+def test_it_does_better_than_every_fixed_action(built):
     def score(play):
-        world = stage.world(seed=4)
+        world = built.world(seed=4)
         play(world)
-        return float(world.arrays.outcome.score[0])
+        return float(world.state.outcome.score[0])
 
     def plan(world):
         policy = Planner()

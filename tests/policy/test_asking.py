@@ -9,7 +9,7 @@ from fireworld.errors import LogError, PolicyError
 from fireworld.policy.asking import begin, name_of
 from fireworld.policy.protocol import Action, Decision
 from tests.kernels.small import make_city, make_world, square
-from tests.world.town import town_world
+from tests.simulation.town import town_world
 
 NAME = "policy tests.policy.test_asking:Scripted"
 
@@ -103,7 +103,7 @@ def test_own_targets_are_whole_numbers_of_any_kind(kind):
     world = town_world(seed=1)
     decisions = world.step(Naming(lambda observation: kind(observation.burning[-1]))).decisions
     assert [decision.action for decision in decisions] == [Action.OWN_TARGET] * 3
-    assert [decision.target for decision in decisions] == world.arrays.brigades.target.tolist()
+    assert [decision.target for decision in decisions] == world.state.brigades.target.tolist()
     assert all(type(decision.target) is int for decision in decisions)
     assert [decision.value for decision in decisions] == [0.5] * 3
 
@@ -127,7 +127,7 @@ def test_an_own_target_burns_in_the_brigades_own_site():
 
 def two_sites():
     world = make_world(make_city(square(0, 0), square(500, 0), square(1000, 0)), ignited=[0, 1], brigades=[2])
-    assert not world.arrays.sites.counts[0], "nobody has looked yet"
+    assert not world.state.sites.counts[0], "nobody has looked yet"
     return world
 
 
@@ -180,10 +180,10 @@ def test_what_is_not_the_policys_fault_passes(error):
 
 def test_no_step_is_done_by_a_policy_that_fails():
     world = town_world(seed=1)
-    energy = world.arrays.fire.energy.copy()
+    energy = world.state.fire.energy.copy()
     with pytest.raises(PolicyError):
         world.step(Scripted(fail))
-    assert (world.arrays.fire.energy == energy).all()
+    assert (world.state.fire.energy == energy).all()
 
 
 class Beginner(Scripted):
@@ -198,16 +198,16 @@ class Beginner(Scripted):
 
 def test_begin_is_told_of_the_run():
     world, policy = town_world(seed=5), Beginner()
-    begin(policy, world.tables, n_brigades=3, seed=5)
+    begin(policy, world.city_arrays, n_brigades=3, seed=5)
     assert policy.told == (30, 3, 5)
-    begin(Scripted(None), world.tables, n_brigades=3, seed=5)  # has none, needs none
+    begin(Scripted(None), world.city_arrays, n_brigades=3, seed=5)  # has none, needs none
 
 
 def test_a_begin_that_fails():
     with pytest.raises(PolicyError, match=r"^policy .*:Beginner: begin: RuntimeError: no model \(test_asking.py"):
-        begin(Beginner(RuntimeError("no model")), town_world(seed=1).tables, n_brigades=3, seed=1)
+        begin(Beginner(RuntimeError("no model")), town_world(seed=1).city_arrays, n_brigades=3, seed=1)
     with pytest.raises(LogError):
-        begin(Beginner(LogError("damaged")), town_world(seed=1).tables, n_brigades=3, seed=1)
+        begin(Beginner(LogError("damaged")), town_world(seed=1).city_arrays, n_brigades=3, seed=1)
 
 
 def test_a_policy_is_named_as_on_the_command_line():

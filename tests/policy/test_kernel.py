@@ -9,7 +9,7 @@ from fireworld.draws import ACTION, EXPLORE, below, uniform
 from fireworld.kernels.choice import choose, greedy, table_state
 from fireworld.policy.chief import chief_table
 from fireworld.policy.kernel import always, at_random, each_another, from_tables
-from tests.world.town import begin, town_world
+from tests.simulation.town import begin, town_world
 
 
 def choices(policy, states, *, n_brigades=3, seed=1, step=1):

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from fireworld_recorder.reader import open_log
 
 from fireworld.kernels.choice import RANK_ALL, RANK_NAMED
 from fireworld.kernels.ranking import N_TARGET_FEATURES, N_WEIGHTS
@@ -13,13 +14,12 @@ from fireworld.policy.kernel import from_rankings
 from fireworld.policy.names import load_policy
 from fireworld.policy.protocol import Action, Decision
 from fireworld.policy.ranking import WEIGHTS, Ranking, save_ranking
+from fireworld.recording.replay import RecordedPolicy
 from fireworld.records import MemoryRecording
-from fireworld.replay import RecordedPolicy
-from fireworld.world.observer import Observer
-from recorder.reader import open_log
+from fireworld.simulation.observer import Observer
 from tests.cli.conftest import fireworld  # noqa: F401 - the fixture that calls the command line
 from tests.kernels.small import burn, make_city, make_world, square
-from tests.world.town import begin, play, town_world
+from tests.simulation.town import begin, play, town_world
 
 NAMES = [weight.name for weight in WEIGHTS]
 
@@ -45,7 +45,7 @@ def test_a_step_tells_what_was_chosen_and_why(own_targets):
     world = make_world(make_city(*(square(60 * k, 0) for k in range(4)), links={0: [1], 1: [2]}), brigades=[3, 3])
     burn(world, 0, 1, 2)
     degrees = np.array([200.0, 300.0, 100.0])
-    world.arrays.fire.energy[:3] = world.tables.buildings.capacity[:3] * degrees
+    world.state.fire.energy[:3] = world.city_arrays.buildings.capacity[:3] * degrees
     hot, cold = world.step(begin(policy, world)).decisions
     if own_targets:
         assert [(one.action, one.target) for one in (hot, cold)] == [(4, 1), (4, 2)]
@@ -54,7 +54,7 @@ def test_a_step_tells_what_was_chosen_and_why(own_targets):
         assert (hot.target, cold.target) == (None, None)
         assert hot.q_values == pytest.approx((0.2, 0.4, 0.6, 0.2))
         assert [hot.action, cold.action] == [2, 0]
-        assert world.arrays.brigades.target.tolist() == [1, 2]
+        assert world.state.brigades.target.tolist() == [1, 2]
         assert hot.value == max(hot.q_values)
     assert not hot.explored
 
@@ -67,9 +67,9 @@ def test_step_by_step_and_at_once_are_the_same(own_targets, seed):
     stepped, run = (town_world(seed=seed, n_fires=6) for _ in range(2))
     assert play(stepped, policy) == run.run(policy.for_brigades(3))
     for name in ("energy", "water"):
-        assert getattr(stepped.arrays.fire, name).tobytes() == getattr(run.arrays.fire, name).tobytes()
+        assert getattr(stepped.state.fire, name).tobytes() == getattr(run.state.fire, name).tobytes()
     for name in ("action", "target", "x", "tank"):
-        assert getattr(stepped.arrays.brigades, name).tolist() == getattr(run.arrays.brigades, name).tolist()
+        assert getattr(stepped.state.brigades, name).tolist() == getattr(run.state.brigades, name).tolist()
 
 
 def end_of_four_fires(weights, *, own_targets):
@@ -78,7 +78,7 @@ def end_of_four_fires(weights, *, own_targets):
     for seed in (2, 3, 5, 6):
         world = town_world(seed=seed, n_fires=7)
         world.run(from_rankings(weights, own_targets=own_targets).for_brigades(3))
-        ends.append(world.arrays.fire.energy.tobytes())
+        ends.append(world.state.fire.energy.tobytes())
     return ends
 
 
@@ -149,12 +149,12 @@ def test_other_weights_are_another_run(here, fireworld):  # noqa: F811 - the fix
 def test_what_is_written_is_what_was_recorded(here, fireworld):  # noqa: F811 - the fixture
     """The values of a log are those of the run, bit by bit."""
     fireworld("run", "quick", "--policy", "all.npz", "--record", "a.mcap", "--steps", 9)
-    from fireworld.runs import prepare_run
     from fireworld.scenario import load_scenario
-    from fireworld.world.stage import build_stage
+    from fireworld.simulation.built import build_scenario
+    from fireworld.simulation.run import prepare_run
 
-    stage = build_stage(load_scenario("quick"))
-    records = list(prepare_run(stage, load_policy("all.npz"), seed=1, n_steps_max=9))
+    built = build_scenario(load_scenario("quick"))
+    records = list(prepare_run(built, load_policy("all.npz"), seed=1, n_steps_max=9))
     for told, read in zip(records, open_log(here / "a.mcap"), strict=True):
         assert told.decisions.target_value.tolist() == read.decisions.target_value.tolist()
         assert told.decisions.action.tolist() == read.decisions.action.tolist()
@@ -186,11 +186,11 @@ def chain_world():
 
 def set_fire(world, *burning):
     """Let these burn for long, and no others, whatever happened in the step."""
-    fire = world.arrays.fire
+    fire = world.state.fire
     fire.energy[:] = 0.0
     fire.fuel[:] = 0.0
-    fire.fuel[list(burning)] = world.tables.buildings.initial_fuel[list(burning)]
-    fire.energy[list(burning)] = world.tables.buildings.capacity[list(burning)] * 300.0
+    fire.fuel[list(burning)] = world.city_arrays.buildings.initial_fuel[list(burning)]
+    fire.energy[list(burning)] = world.city_arrays.buildings.capacity[list(burning)] * 300.0
     fire.fieryness[:] = 8
     fire.fieryness[list(burning)] = 1
 
@@ -202,7 +202,7 @@ def test_an_own_target_is_kept_while_it_burns():
         set_fire(world, *burning)
         decision = world.step(policy).decisions[0]
         assert decision.action == Action.OWN_TARGET
-        assert decision.target == world.arrays.brigades.target[0]
+        assert decision.target == world.state.brigades.target[0]
         targets.append(decision.target)
     assert targets == [3, 3, 2, 2, 2, 0], "asked anew when it is out, and not before"
     assert [step for step, _ in policy.asked] == [1, 3, 6]

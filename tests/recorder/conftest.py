@@ -1,8 +1,8 @@
 """A synthetic run and its log, shared by the tests of the recorder."""
 
 import pytest
+from fireworld_recorder.writer import LogWriter
 
-from recorder.writer import LogWriter
 from tests import command_line
 from tests.recorder import synthetic
 

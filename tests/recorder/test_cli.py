@@ -5,12 +5,12 @@ import sys
 import types
 
 import pytest
+from fireworld_recorder.header import to_metadata
+from fireworld_recorder.schema import PROTO
+from fireworld_recorder.writer import Channel
 from google.protobuf import descriptor_pb2
 
 from fireworld.records import MemoryRecording
-from recorder.header import to_metadata
-from recorder.schema import PROTO
-from recorder.writer import Channel
 from tests.recorder import synthetic
 from tests.recorder.conftest import write_log
 from tests.recorder.test_damage import custom_log
@@ -227,9 +227,9 @@ def test_verify(run_cli, log_path, cut_log, records, city, monkeypatch):
         assert recording.header == synthetic.header()
         return MemoryRecording(recording.header, city, next(replays))
 
-    module = types.ModuleType("fireworld.replay")
+    module = types.ModuleType("fireworld.recording.replay")
     module.Replay = replay
-    monkeypatch.setitem(sys.modules, "fireworld.replay", module)
+    monkeypatch.setitem(sys.modules, "fireworld.recording.replay", module)
     code, out, _ = run_cli("verify", log_path)
     assert code == 0
     assert "31 steps" in out

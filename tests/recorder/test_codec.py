@@ -5,14 +5,14 @@ import dataclasses
 
 import numpy as np
 import pytest
+from fireworld_recorder import codec, schema
+from fireworld_recorder.schema import TOPICS, Commit, message_of
 from google.protobuf import descriptor_pool, message_factory
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fireworld.errors import LogError
 from fireworld.records import DTYPES, STEP_TOPICS, Buildings, Civilians, Decisions, Draws, Score
-from recorder import codec, schema
-from recorder.schema import TOPICS, Commit, message_of
 
 FLAT = tuple(topic for topic in TOPICS if message_of(topic).fields)
 SCALARS = {

@@ -4,15 +4,15 @@ import io
 
 import numpy as np
 import pytest
+from fireworld_recorder import container_writer
+from fireworld_recorder.codec import encode, long_fields
+from fireworld_recorder.container_writer import LONG_FIELD_BYTES, ContainerWriter
 from mcap.reader import make_reader
 from mcap.records import Chunk, ChunkIndex, MessageIndex
 from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
 from fireworld.records import Buildings
-from recorder import container_writer
-from recorder.codec import encode, long_fields
-from recorder.container_writer import LONG_FIELD_BYTES, ContainerWriter
 
 CHUNKS = [
     (0, [(1, b"city")]),

@@ -11,18 +11,18 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from fireworld_recorder.chain import Chain, step_messages
+from fireworld_recorder.codec import decode, encode
+from fireworld_recorder.container import MAGIC
+from fireworld_recorder.header import to_metadata
+from fireworld_recorder.reader import open_log
+from fireworld_recorder.recover import recover
+from fireworld_recorder.schema import Commit
+from fireworld_recorder.writer import Channel, LogWriter, StepFile, own_channels
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 from fireworld.errors import LogError, OutputError
-from recorder.chain import Chain, step_messages
-from recorder.codec import decode, encode
-from recorder.container import MAGIC
-from recorder.header import to_metadata
-from recorder.reader import open_log
-from recorder.recover import recover
-from recorder.schema import Commit
-from recorder.writer import Channel, LogWriter, StepFile, own_channels
 from tests.recorder import synthetic
 from tests.recorder.conftest import write_log
 
@@ -169,7 +169,7 @@ def test_a_killed_run_keeps_its_committed_steps(tmp_path):
     code = """
 import sys
 from tests.recorder import synthetic
-from recorder.writer import LogWriter
+from fireworld_recorder.writer import LogWriter
 city = synthetic.city()
 with LogWriter(sys.argv[1], synthetic.header(), city) as log:
     for step in range(10_000):
@@ -420,7 +420,7 @@ def test_a_topic_twice_in_a_step_is_not_accepted(tmp_path, records, city):
 
 
 def test_a_step_too_large_to_be_read_is_not_written(tmp_path, records, city, monkeypatch):
-    monkeypatch.setattr("recorder.writer.CHUNK_PAYLOAD_MAX", 20_000)
+    monkeypatch.setattr("fireworld_recorder.writer.CHUNK_PAYLOAD_MAX", 20_000)
     large = dataclasses.replace(records[1].events, kind=np.full(9000, 2, np.uint8), entity=np.zeros(9000, np.int32))
     with pytest.raises(OutputError, match=r"a\.mcap: step 1: expected at most 20000 bytes in a step, got \d+ bytes"):
         write_log(tmp_path / "a.mcap", [records[0], dataclasses.replace(records[1], events=large)], city=city)

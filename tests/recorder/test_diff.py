@@ -4,14 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
+from fireworld_recorder.diff import compare
+from fireworld_recorder.match import find, unequal_entries
+from fireworld_recorder.reader import open_log
+from fireworld_recorder.schema import TOPICS, message_of
+from fireworld_recorder.verify import verify
 
 from fireworld.errors import LogError
 from fireworld.records import ACTIONS, MemoryRecording, Snapshot
-from recorder.diff import compare
-from recorder.match import find, unequal_entries
-from recorder.reader import open_log
-from recorder.schema import TOPICS, message_of
-from recorder.verify import verify
 from tests.recorder import synthetic
 from tests.recorder.conftest import write_log
 

@@ -5,13 +5,13 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from fireworld_recorder.comparable import check_same_scenario
+from fireworld_recorder.diff import Steps, compare
+from fireworld_recorder.reader import open_log
+from fireworld_recorder.spread import Pair
 
 from fireworld.errors import LogError
 from fireworld.records import MemoryRecording
-from recorder.comparable import check_same_scenario
-from recorder.diff import Steps, compare
-from recorder.reader import open_log
-from recorder.spread import Pair
 from tests.recorder import synthetic
 from tests.recorder.conftest import write_log
 from tests.recorder.test_diff import altered, put

@@ -13,14 +13,14 @@ from types import SimpleNamespace
 import mcap.reader
 import numpy as np
 import pytest
+from fireworld_recorder.chain import Digest
+from fireworld_recorder.reader import open_log
+from fireworld_recorder.schema import message_of
+from fireworld_recorder.writer import LogWriter
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
 from fireworld.errors import LogError, OutputError
 from fireworld.records import STEP_TOPICS, MemoryRecording
-from recorder.chain import Digest
-from recorder.reader import open_log
-from recorder.schema import message_of
-from recorder.writer import LogWriter
 from tests.recorder import synthetic
 from tests.recorder.conftest import write_log
 

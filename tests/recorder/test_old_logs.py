@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fireworld_recorder.chain import Digest
+from fireworld_recorder.reader import open_log
+from fireworld_recorder.schema import message_of
 
 from fireworld.records import STEP_TOPICS, CityRecord
-from recorder.chain import Digest
-from recorder.reader import open_log
-from recorder.schema import message_of
 
 DATA = Path(__file__).with_name("data")
 

@@ -8,15 +8,15 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from fireworld_recorder.reader import open_log
+from fireworld_recorder.tables import TABLES
 
 from fireworld import records
 from fireworld.errors import LogError, OutputError
 from fireworld.records import ACTIONS, EVENT_KINDS, FIERYNESS
-from recorder import open_log
-from recorder.tables import TABLES
 from tests.recorder.conftest import write_log
 
-parquet = pytest.importorskip("recorder.parquet")
+parquet = pytest.importorskip("fireworld_recorder.parquet")
 
 
 @pytest.fixture(scope="module")

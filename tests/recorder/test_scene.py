@@ -7,16 +7,16 @@ from functools import partial
 
 import numpy as np
 import pytest
+from fireworld_recorder import foxglove_schema as schema
+from fireworld_recorder.reader import open_log
+from fireworld_viewer import colors
+from fireworld_viewer.city_mesh import STOREY_M
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
-from fireworld.cli.scene import CITY, FIRE, LOG, POINTS, TEAM
-from recorder import foxglove_schema as schema
-from recorder.reader import open_log
+from fireworld.recording.pages.foxglove_scene import CITY, FIRE, LOG, POINTS, TEAM
 from tests.cli.conftest import here  # noqa: F401 - a folder of its own
 from tests.command_line import call
 from tests.viewer.rrd import rerun_program
-from viewer import colors
-from viewer.city_mesh import STOREY_M
 
 RUN = ("run", "quick", "--steps", 12, "--policy", "easiest", "--json")
 

@@ -1,24 +1,26 @@
 """What is generated from the records is current, and what can never change has not changed."""
 
+from fireworld_recorder import schema
+from fireworld_recorder.schema import TOPICS, message_of
 from google.protobuf import descriptor_pb2
 
 from fireworld.records import DTYPES
-from recorder import schema
-from recorder.schema import TOPICS, message_of
 
 
 def test_checked_in_descriptors_are_those_of_the_records():
     stored = descriptor_pb2.FileDescriptorSet.FromString(schema.DESCRIPTORS.read_bytes())
-    assert stored == schema.build_descriptors(), "run `python -m recorder.schema --write`"
+    assert stored == schema.build_descriptors(), "run `make docs`"
 
 
 def test_checked_in_proto_file_is_current():
-    assert schema.PROTO.read_text(encoding="utf-8") == schema.proto_text(), "run `python -m recorder.schema --write`"
+    assert schema.PROTO.read_text(encoding="utf-8") == schema.proto_text(), (
+        "run `python -m fireworld_recorder.schema --write`"
+    )
 
 
 def test_docs_are_current():
     page = schema.DOCS.read_text(encoding="utf-8")
-    assert page == schema.with_generated_part(page), "run `python -m recorder.schema --write`"
+    assert page == schema.with_generated_part(page), "run `make docs`"
     for topic in TOPICS:
         assert f"### {topic.topic}\n" in page
 

@@ -23,7 +23,7 @@ class Tables:
     parameters: Parameters
     fire: fire.FireTables
     sites: sites.SiteTables
-    streets: team.StreetTables
+    streets: team.StreetArrays
     floor_area: Float64Array  # (n,) m2
     reward_change: bool
     in_turn: bool  # brigades see what those before them have chosen in this step
@@ -43,7 +43,7 @@ class Tables:
             parameters=parameters,
             fire=fire.FireTables.of_city(city, parameters.fire),
             sites=sites.SiteTables.of_city(city, unit_volume_m3=unit_volume_m3),
-            streets=team.StreetTables.of_city(city),
+            streets=team.StreetArrays.of_city(city),
             floor_area=city.footprints.ground_area_m2.astype(np.float64) * city.footprints.floors,
             reward_change=reward_change,
             in_turn=in_turn,
@@ -94,7 +94,7 @@ class World:
     def at_start(
         cls, tables: Tables, *, ignited: Array, civilian_building: Array, civilian_mm: Array, brigade_refuge: Array
     ) -> Self:
-        """Set up the start; arguments as of `fireworld.world.world.World`."""
+        """Set up the start; arguments as of `fireworld.simulation.world.World`."""
         state = fire.FireState.cold(tables.fire)
         fire.ignite(tables.fire, state, np.asarray(ignited, dtype=np.int64))
         streets, parameters = tables.streets, tables.parameters

@@ -40,7 +40,7 @@ class Way(NamedTuple):
 
 
 @dataclass(frozen=True)
-class StreetTables:
+class StreetArrays:
     """The street graph as plain numbers, but for the two tables of all pairs of nodes."""
 
     node_mm: list[tuple[float, float]]
@@ -206,7 +206,7 @@ def find_target(
     return sites.lowest_id(tables, members, measure)
 
 
-def refill(team: list[Brigade], alive: list[bool], streets: StreetTables, parameters: BrigadeParameters) -> None:
+def refill(team: list[Brigade], alive: list[bool], streets: StreetArrays, parameters: BrigadeParameters) -> None:
     """Fill the tanks of those at a refuge, and of the first brigade at each hydrant."""
     taken: set[int] = set()
     for brigade, lives in zip(team, alive, strict=True):
@@ -227,7 +227,7 @@ def act(
     team: list[Brigade],
     alive: list[bool],
     *,
-    streets: StreetTables,
+    streets: StreetArrays,
     tables: sites.SiteTables,
     state: fire.FireState,
     parameters: BrigadeParameters,
@@ -258,7 +258,7 @@ def act(
     return sum(brigade.sprayed_litres for brigade in team)
 
 
-def seek_water(brigade: Brigade, streets: StreetTables, parameters: BrigadeParameters) -> None:
+def seek_water(brigade: Brigade, streets: StreetArrays, parameters: BrigadeParameters) -> None:
     """Stay at a refuge, or drive to the nearest one; ties: the first."""
     if brigade.refuge >= 0:
         brigade.activity = REFILLING
@@ -273,7 +273,7 @@ def seek_water(brigade: Brigade, streets: StreetTables, parameters: BrigadeParam
 
 def drive(
     brigade: Brigade,
-    streets: StreetTables,
+    streets: StreetArrays,
     goal: Place,
     parameters: BrigadeParameters,
     *,
@@ -299,7 +299,7 @@ def drive(
     brigade.x, brigade.y = streets.locate(here)
 
 
-def next_stretch(here: Place, goal: Place, streets: StreetTables) -> tuple[Place, Place | None]:
+def next_stretch(here: Place, goal: Place, streets: StreetArrays) -> tuple[Place, Place | None]:
     """Turn into the next street where one ends; return the place on it and how far to follow it, None for no way."""
     if here.street == goal.street:
         return here, goal
@@ -319,7 +319,7 @@ def next_stretch(here: Place, goal: Place, streets: StreetTables) -> tuple[Place
 
 
 def first_in_range(
-    here: Place, ahead: Place, way_mm: int, aim: tuple[float, float], range_square: float, streets: StreetTables
+    here: Place, ahead: Place, way_mm: int, aim: tuple[float, float], range_square: float, streets: StreetArrays
 ) -> int | None:
     """Return the first whole millimetre, 1 to way_mm, from which the aim is in range; None if there is none.
 

@@ -17,16 +17,16 @@ from fireworld.kernels import fire as kernels
 from fireworld.kernels.draws import normal, uniform
 from fireworld.kernels.health import harm
 from fireworld.parameters import OFFICIAL_2011, FireParameters, HealthParameters
-from fireworld.world.state import fresh_fire
-from fireworld.world.tables import (
+from fireworld.simulation.city_arrays import (
     air_inside,
     brigade_constants,
-    building_tables,
-    cover_tables,
+    building_arrays,
+    cover_arrays,
     fire_constants,
     health_constants,
-    link_tables,
+    link_arrays,
 )
+from fireworld.simulation.state import fresh_fire
 from tests.reference import brigades, fire, people
 
 PLAN = generate_plan(columns=9, rows=8, seed=4)
@@ -52,7 +52,7 @@ def test_fire(city, parameters, seed):
     n = city.n_buildings
     tables = fire.FireTables.of_city(city, parameters)
     expected = fire.FireState.cold(tables)
-    buildings, cover, links = building_tables(city, parameters), cover_tables(city, parameters), link_tables(city)
+    buildings, cover, links = building_arrays(city, parameters), cover_arrays(city, parameters), link_arrays(city)
     constants, state = fire_constants(parameters), fresh_fire(city)
     for step in range(120):
         if step in (0, 30):
@@ -81,9 +81,9 @@ def test_air_beyond_the_cells_stays_empty(city):
     state = fresh_fire(city)
     state.energy[:] = 1e6
     buildings, cover, links = (
-        building_tables(city, FireParameters()),
-        cover_tables(city, FireParameters()),
-        link_tables(city),
+        building_arrays(city, FireParameters()),
+        cover_arrays(city, FireParameters()),
+        link_arrays(city),
     )
     for _ in range(5):
         kernels.advance_fire(buildings, cover, links, state, fire_constants(FireParameters()))

@@ -21,8 +21,8 @@ from fireworld.parameters import PAPER
 from fireworld.policy.kernel import always, at_random, each_another, from_rankings, from_tables
 from fireworld.records import ACTIVITIES
 from fireworld.scenario import load_scenario
-from fireworld.world.stage import build_stage
-from fireworld.world.world import World
+from fireworld.simulation.built import build_scenario
+from fireworld.simulation.world import World
 from tests.reference import episode, luck, sites, team
 
 RANDOM = np.random.default_rng(5)
@@ -44,13 +44,13 @@ POLICIES = {
 def assert_same(compiled: World, plain: episode.World) -> None:
     """Compare everything that outlives a step."""
     step = f"step {compiled.step_number}"
-    state, brigades, outcome = compiled.arrays.fire, compiled.arrays.brigades, compiled.arrays.outcome
+    state, brigades, outcome = compiled.state.fire, compiled.state.brigades, compiled.state.outcome
     for name in ("fieryness", "fuel", "water", "watered"):
         np.testing.assert_array_equal(getattr(state, name), getattr(plain.fire, name), err_msg=f"{step} {name}")
-    bound = 1e-9 * np.maximum(np.abs(plain.fire.energy), compiled.tables.buildings.capacity)
+    bound = 1e-9 * np.maximum(np.abs(plain.fire.energy), compiled.city_arrays.buildings.capacity)
     assert np.all(np.abs(state.energy - plain.fire.energy) <= bound), step
-    np.testing.assert_array_equal(compiled.arrays.sites.label, plain.memory.label, err_msg=step)
-    assert int(compiled.arrays.sites.counts[1]) == plain.memory.last_number, step
+    np.testing.assert_array_equal(compiled.state.sites.label, plain.memory.label, err_msg=step)
+    assert int(compiled.state.sites.counts[1]) == plain.memory.last_number, step
 
     same_names = ("x", "y", "action", "target", "site", "activity", "refilling", "refuge", "hydrant")
     columns = {name: [getattr(one, name) for one in plain.team] for name in same_names} | {
@@ -63,7 +63,7 @@ def assert_same(compiled: World, plain: episode.World) -> None:
     }
     for name, expected in columns.items():
         assert getattr(brigades, name).tolist() == expected, (step, name)
-    everybody = (compiled.arrays.civilians, brigades)
+    everybody = (compiled.state.civilians, brigades)
     assert np.concatenate([some.hp for some in everybody]).tolist() == plain.people.hp.tolist(), step
     np.testing.assert_allclose(np.concatenate([some.damage for some in everybody]), plain.people.damage, rtol=1e-12)
 
@@ -73,7 +73,7 @@ def assert_same(compiled: World, plain: episode.World) -> None:
 
 def assert_same_outcome(compiled: World, plain: episode.World) -> None:
     """Compare counts, rewards and scores."""
-    step, outcome, told = f"step {compiled.step_number}", compiled.arrays.outcome, plain.outcome
+    step, outcome, told = f"step {compiled.step_number}", compiled.state.outcome, plain.outcome
     counts = [told.n_burning, told.n_water_damaged, told.n_burnt_out, told.n_civilians_alive]
     assert outcome.counts.tolist() == counts, step
     assert outcome.reward.tolist() == [*told.reward, sum(told.reward), told.reward_so_far], step
@@ -129,18 +129,18 @@ def step_both(compiled: World, plain: episode.World, tables: episode.Tables, pol
 def shipped(name: str, *, in_turn: bool = True) -> Play:
     """Build a shipped scenario."""
     scenario = load_scenario(name)
-    stage = build_stage(scenario)
+    built = build_scenario(scenario)
     tables = episode.Tables.of_city(
-        stage.city, scenario.parameters, unit_volume_m3=scenario.unit_volume_m3, in_turn=in_turn
+        built.city, scenario.parameters, unit_volume_m3=scenario.unit_volume_m3, in_turn=in_turn
     )
-    setup = stage.setup
+    setup = built.placement
     start = {
         "ignited": setup.ignited,
         "civilian_building": setup.civilian_building,
         "civilian_mm": setup.civilian_mm,
         "brigade_refuge": setup.brigade_refuge,
     }
-    return Play(stage.city, tables, start)
+    return Play(built.city, tables, start)
 
 
 @pytest.mark.parametrize("policy", POLICIES)
@@ -213,7 +213,7 @@ def lattice() -> StreetMap:
 def place_at(play: Play, compiled: World, plain: episode.World, places: list[team.Place]) -> None:
     """Put the brigades somewhere, in both worlds."""
     for who, place in enumerate(places):
-        brigades, brigade = compiled.arrays.brigades, plain.team[who]
+        brigades, brigade = compiled.state.brigades, plain.team[who]
         brigades.street[who], brigades.offset[who] = place
         brigade.place = place
         brigade.x, brigade.y = play.tables.streets.locate(place)
@@ -235,8 +235,8 @@ def test_driving_where_ways_tie_and_refilling_where_brigades_queue():
         places[2:5] = [play.tables.streets.end(of_hydrant, int(streets.hydrant_node[seed % 2]))] * 3
         place_at(play, compiled, plain, places)
         for brigade, tank in enumerate(random.choice([0, 300, 1700], len(plain.team)).tolist()):
-            compiled.arrays.brigades.tank[brigade] = plain.team[brigade].tank_litres = tank
-            compiled.arrays.brigades.refilling[brigade] = plain.team[brigade].refilling = tank == 0
+            compiled.state.brigades.tank[brigade] = plain.team[brigade].tank_litres = tank
+            compiled.state.brigades.refilling[brigade] = plain.team[brigade].refilling = tank == 0
         for step in (1, 2, 3):
             step_both(compiled, plain, play.tables, "random", step=step)
 
@@ -247,7 +247,7 @@ def test_sites_of_fires_that_jump_about(seed):
     """Far wilder than real fires: sites merge, split and trade numbers at every step."""
     play, random = rough(1), np.random.default_rng(seed)
     compiled, plain = play.worlds(seed=0, n_steps=1)
-    fire, people, found = compiled.arrays.fire, compiled.arrays.civilians, compiled.arrays.sites
+    fire, people, found = compiled.state.fire, compiled.state.civilians, compiled.state.sites
     n = play.city.n_buildings
     share = random.choice([0.03, 0.1, 0.2])  # that burns
     for _ in range(12):
@@ -262,12 +262,12 @@ def test_sites_of_fires_that_jump_about(seed):
             found.label[:] = random.integers(0, last, n)
             plain.memory.label = found.label.astype(np.int64)
             for who, brigade in enumerate(plain.team):
-                brigade.site = compiled.arrays.brigades.site[who] = int(random.integers(0, last))
+                brigade.site = compiled.state.brigades.site[who] = int(random.integers(0, last))
         compiled._look()
         seen = episode.look(play.tables, plain)
         assert found.label.tolist() == plain.memory.label.tolist()
         assert found.counts[1] == plain.memory.last_number
-        assert compiled.arrays.brigades.site.tolist() == [brigade.site for brigade in plain.team]
+        assert compiled.state.brigades.site.tolist() == [brigade.site for brigade in plain.team]
         assert_same_sites(compiled, plain, seen)
         compiled._assess()
         episode.assess(play.tables, plain)
@@ -276,7 +276,7 @@ def test_sites_of_fires_that_jump_about(seed):
 
 def assert_same_sites(compiled: World, plain: episode.World, seen: sites.Sites | None) -> None:
     """Compare the sites of a moment, and what the brigades make of them."""
-    found = compiled.arrays.sites
+    found = compiled.state.sites
     n_sites = found.counts[0]
     assert n_sites == (0 if seen is None else len(seen.number))
     if seen is None:
@@ -291,8 +291,8 @@ def assert_same_sites(compiled: World, plain: episode.World, seen: sites.Sites |
         features = np.zeros(8, dtype=np.int64)
         state = observe(
             who,
-            compiled.arrays.brigades.action,
-            compiled.arrays.brigades,
+            compiled.state.brigades.action,
+            compiled.state.brigades,
             found,
             compiled.constants.observation,
             features,

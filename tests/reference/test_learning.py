@@ -9,9 +9,9 @@ import pytest
 
 from fireworld.policy.kernel import from_tables
 from fireworld.scenario import load_scenario
+from fireworld.simulation.built import build_scenario
+from fireworld.simulation.state import fresh_learner
 from fireworld.training.method import RULES
-from fireworld.world.stage import build_stage
-from fireworld.world.state import fresh_learner
 from tests.reference import episode
 from tests.reference.learning import Learner
 
@@ -28,10 +28,10 @@ def town(choices):
         "fires.0.n_buildings": "12",
         "parameters.brigades.tank_litres": "6000",
     }
-    stage = build_stage(load_scenario("quick").with_settings(settings))
-    scenario, setup = stage.scenario, stage.setup
+    built = build_scenario(load_scenario("quick").with_settings(settings))
+    scenario, setup = built.scenario, built.placement
     tables = episode.Tables.of_city(
-        stage.city, scenario.parameters, unit_volume_m3=scenario.unit_volume_m3, in_turn=choices == "in-turn"
+        built.city, scenario.parameters, unit_volume_m3=scenario.unit_volume_m3, in_turn=choices == "in-turn"
     )
     start = {
         "ignited": setup.ignited,
@@ -39,16 +39,16 @@ def town(choices):
         "civilian_mm": setup.civilian_mm,
         "brigade_refuge": setup.brigade_refuge,
     }
-    return stage, tables, start
+    return built, tables, start
 
 
 def learn_twice(*, rule="sarsa", commit=1, n_steps=40, choices="in-turn", shape=(4, 4320, 4), seed=1):
     """Run an episode compiled and plain; return both learners, and whether it terminated."""
-    stage, tables, start = town(choices)
+    built, tables, start = town(choices)
     begun = np.random.default_rng(seed).normal(scale=50.0, size=shape)
     ready = from_tables(begun.copy(), epsilon=EPSILON, commit=commit).for_brigades(4)
     compiled = fresh_learner(ready.tables, 4, rule=RULES.index(rule), **RATES)
-    world = stage.world(seed=seed, n_steps_max=n_steps)
+    world = built.world(seed=seed, n_steps_max=n_steps)
     world.run(ready, compiled)
     policy = from_tables(begun.copy(), epsilon=EPSILON, commit=commit)
     plain = Learner(policy.tables, rule, epsilon=EPSILON, **RATES)

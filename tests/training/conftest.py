@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import load_curriculum
 from fireworld.training.method import Method
 from fireworld.training.trainer import Trainer
@@ -41,9 +42,9 @@ def curriculum(here):
 
 @pytest.fixture
 def make_trainer(curriculum):
-    grounds = {}
+    cities = CityCache()
 
     def make(seed=1, method=SHORT, **changes):
-        return Trainer(curriculum, method.with_settings(changes), seed=seed, grounds=grounds)
+        return Trainer(curriculum, method.with_settings(changes), seed=seed, cities=cities)
 
     return make

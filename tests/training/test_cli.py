@@ -8,10 +8,10 @@ import time
 
 import numpy as np
 import pytest
+from fireworld_recorder.reader import open_log
 
 from fireworld.policy.team import FORMAT, load_team
 from fireworld.training.trainer import Trainer
-from recorder.reader import open_log
 from tests.training.conftest import SHORT_WORDS
 
 TRAIN = ("train", "tiny.yaml", *SHORT_WORDS, "-o")

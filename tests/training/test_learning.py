@@ -9,9 +9,9 @@ from fireworld.kernels import learning
 from fireworld.kernels.learning import choose_and_learn, forget, go_on_and_learn, take_reward, update, value_of
 from fireworld.policy.kernel import from_tables
 from fireworld.scenario import load_scenario
+from fireworld.simulation.built import build_scenario
+from fireworld.simulation.state import fresh_learner
 from fireworld.training.method import RULES
-from fireworld.world.stage import build_stage
-from fireworld.world.state import fresh_learner
 
 ALPHA, GAMMA = 0.5, 0.5
 
@@ -112,7 +112,7 @@ def test_the_rules_are_numbered_alike():
 
 def world_of(*, n_steps_max, seed=1, **settings):
     scenario = load_scenario("quick").with_settings({"brigades.n": "1", **settings})
-    return build_stage(scenario).world(seed=seed, n_steps_max=n_steps_max)
+    return build_scenario(scenario).world(seed=seed, n_steps_max=n_steps_max)
 
 
 def learn(world, tables, *, alpha=ALPHA, commit=1):
@@ -126,7 +126,7 @@ def test_a_truncated_episode_counts_on_what_would_come_next():
     world = world_of(n_steps_max=1)
     learner = learn(world, np.full((1, 4320, 4), 8.0))
     assert world.truncated
-    reward = world.arrays.outcome.reward[4]
+    reward = world.state.outcome.reward[4]
     ((_, state, action),) = np.argwhere(learner.visits)
     assert learner.tables[0, state, action] == 8.0 + ALPHA * (reward + GAMMA * 8.0 - 8.0)
 
@@ -147,7 +147,7 @@ def test_a_terminated_episode_does_not():
     learner = learn(world, np.full((1, 270, 4), 1000.0), alpha=1.0)
     assert world.terminated
     assert learner.discount[0] == GAMMA, "the last choice was made in the last step"
-    assert learner.tables[0, learner.state[0], learner.action[0]] == world.arrays.outcome.reward[4]
+    assert learner.tables[0, learner.state[0], learner.action[0]] == world.state.outcome.reward[4]
 
 
 class Textbook:
@@ -190,8 +190,8 @@ def test_the_compiled_episode_learns_as_the_textbook(seed, n_steps_max, terminat
     n_refilling = 0
     while not (world.terminated or world.truncated):
         world.step(textbook)
-        textbook.take(float(world.arrays.outcome.reward[4]))
-        n_refilling += int(world.arrays.brigades.refilling.sum())
+        textbook.take(float(world.state.outcome.reward[4]))
+        n_refilling += int(world.state.brigades.refilling.sum())
     assert world.terminated == terminated
     if terminated:
         for brigade in range(3):

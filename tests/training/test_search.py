@@ -11,9 +11,9 @@ from fireworld.errors import TrainingError
 from fireworld.kernels.ranking import N_OF_TEAM, N_TARGET_FEATURES, N_WEIGHTS
 from fireworld.policy.kernel import from_rankings
 from fireworld.policy.ranking import WEIGHTS
+from fireworld.simulation.built import CityCache, build_scenario
 from fireworld.training.curriculum import load_curriculum
 from fireworld.training.search import Search, Searcher
-from fireworld.world.stage import build_stage
 
 FIRES = """
 stages:
@@ -40,10 +40,10 @@ def fires(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def make(fires):
-    grounds = {}
+    cities = CityCache()
 
     def make(*, seed=1, **figures):
-        return Searcher(fires, Search(**{**SHORT, **figures}), seed=seed, grounds=grounds)
+        return Searcher(fires, Search(**{**SHORT, **figures}), seed=seed, cities=cities)
 
     return make
 
@@ -140,11 +140,11 @@ def share_of_score(weights, fires, *, seeds=range(50, 58)):
     """The mean score of a ranking, as a share of the maximum, with luck that nobody searched with."""
     shares = []
     for scenario in fires.stages[0].scenarios:
-        stage = build_stage(scenario.with_settings({"steps": "40"}))
+        built = build_scenario(scenario.with_settings({"steps": "40"}))
         for seed in seeds:
-            world = stage.world(seed=seed)
+            world = built.world(seed=seed)
             world.run(from_rankings(weights, own_targets=True).for_brigades(world.n_brigades))
-            shares.append(world.arrays.outcome.score[0] / world.arrays.outcome.score[1])
+            shares.append(world.state.outcome.score[0] / world.state.outcome.score[1])
     return np.mean(shares)
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from fireworld.errors import OutputError, TrainingError
 from fireworld.policy.files import load_team_file
+from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import load_curriculum
 from fireworld.training.search import Search, Searcher
 from fireworld.training.searches import SearchRun
@@ -18,14 +19,14 @@ WORDS = ("train", "tiny.yaml", "--method", "search", *(w for k, v in FIGURES.ite
 
 
 @pytest.fixture(scope="module")
-def grounds():
-    return {}
+def cities():
+    return CityCache()
 
 
 @pytest.fixture
-def make(here, curriculum, grounds):
+def make(here, curriculum, cities):
     def make(name="team.npz", *, seed=1, force=False, **figures):
-        searcher = Searcher(curriculum, Search(**{**FIGURES, **figures}), seed=seed, grounds=grounds)
+        searcher = Searcher(curriculum, Search(**{**FIGURES, **figures}), seed=seed, cities=cities)
         return SearchRun(searcher, here / name, force)
 
     return make

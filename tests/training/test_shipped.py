@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from fireworld_recorder.reader import open_log
 
 from benchmarks.shipped import COMMANDS
 from fireworld.errors import PolicyError
@@ -13,12 +14,12 @@ from fireworld.policy.files import load_team_file
 from fireworld.policy.names import load_policy
 from fireworld.policy.shipped import team_names, team_path
 from fireworld.policy.team import Team, load_team, save_team
+from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import load_curriculum
 from fireworld.training.method import PAPER
 from fireworld.training.search import Search, Searcher
 from fireworld.training.searches import IDENTITY
 from fireworld.training.trainer import Trainer
-from recorder.reader import open_log
 
 SHAPES = {"paper-cooperative": (4, 4320, 4), "paper-noncooperative": (1, 270, 4)}
 CURRICULA = {
@@ -33,7 +34,7 @@ def test_the_papers_teams_are_there():
 
 def test_the_best_comes_from_the_shipped_curriculum():
     ranking = load_team_file(team_path("best"))
-    wanted = Searcher(load_curriculum("contested"), Search(), seed=1, grounds={}).ranking().provenance
+    wanted = Searcher(load_curriculum("contested"), Search(), seed=1, cities=CityCache()).ranking().provenance
     assert {key: ranking.provenance[key] for key in IDENTITY} == {key: wanted[key] for key in IDENTITY}
     assert ranking.provenance["generations_done"] == Search().n_generations
     assert ranking.own_targets

@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fireworld_viewer.rerun_view import app
 
 from tests.viewer.pixels import decoded
-from viewer import app
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 DRIVER = "chromedriver"

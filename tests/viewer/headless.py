@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from fireworld_viewer.rerun_view import app
 
 from tests.docs.pages import ROOT
 from tests.viewer.pixels import decoded
-from viewer import app
 
 DRIVERS = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d", "/usr/local/share/vulkan/icd.d")
 

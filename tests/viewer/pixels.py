@@ -5,8 +5,7 @@ from __future__ import annotations
 import io
 
 import numpy as np
-
-from viewer import colors
+from fireworld_viewer import colors
 
 
 def decoded(png: bytes) -> np.ndarray:

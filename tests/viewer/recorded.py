@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from fireworld_recorder.writer import LogWriter
+
 from fireworld.records import MemoryRecording
-from recorder.writer import LogWriter
 
 
 def write_log(path: Path, recording: MemoryRecording, *, last: int | None = None) -> Path:

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from viewer import app
+from fireworld_viewer.rerun_view import app
 
 Rows = dict[str, list[tuple[int | None, Any]]]
 

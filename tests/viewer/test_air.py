@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fireworld_viewer import colors
+from fireworld_viewer.rerun_view import air, app
 
+from fireworld.recording.replay import Replay
 from fireworld.records import CityRecord, MemoryRecording, Snapshot
-from fireworld.replay import Replay
 from tests import command_line
 from tests.viewer import rrd
 from tests.viewer.conftest import make_recording
-from viewer import air, app, colors
 
 
 def city_with_air(city: CityRecord) -> CityRecord:

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import pytest
 import rerun
+from fireworld_viewer.rerun_view import app
+from fireworld_viewer.rerun_view.blueprint import frame_fire, frame_from_above, title
+from fireworld_viewer.rerun_view.outcome_panel import Outcome
 
 from fireworld.errors import OutputError, ViewError
 from tests.viewer import rrd
 from tests.viewer.conftest import make_recording
-from viewer import app
-from viewer.blueprint import frame_fire, frame_from_above, title
-from viewer.outcome import Outcome
 
 
 def test_rerun_verifies_what_is_saved(small, slower, tmp_path: Path):
@@ -64,7 +64,7 @@ import resource, signal, sys
 from pathlib import Path
 from fireworld.errors import OutputError
 from tests.viewer.conftest import make_recording
-from viewer import app
+from fireworld_viewer.rerun_view import app
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
 try:
@@ -85,7 +85,7 @@ import sys
 from pathlib import Path
 from fireworld.errors import ViewError
 from tests.viewer.conftest import make_recording
-from viewer import app
+from fireworld_viewer.rerun_view import app
 try:
     app.save([make_recording(3, 3, 2)], Path(sys.argv[1]))
 except ViewError as error:
@@ -146,7 +146,7 @@ def test_the_page_is_served_on_this_machine_only_and_ends_when_told(tmp_path: Pa
     port = app.free_port()
     program = f"""
 from tests.viewer.conftest import make_recording
-from viewer import app
+from fireworld_viewer.rerun_view import app
 app.serve([make_recording(3, 3, 2)], port={port}, announce=lambda address: print(address, flush=True))
 """
     environment = {**os.environ, "HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path), "TMPDIR": str(tmp_path)}

@@ -6,10 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh, triangulate
 from hypothesis import given
 from hypothesis import strategies as st
-
-from viewer.city_mesh import SHADES_PERCENT, build_mesh, triangulate
 
 
 def area(x: np.ndarray, y: np.ndarray) -> float:

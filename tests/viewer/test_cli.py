@@ -9,16 +9,16 @@ from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner, Result
+from fireworld_recorder.diff import compare
+from fireworld_viewer.rerun_view import app
 
 from fireworld.cli import root
 from fireworld.errors import FireworldError, OutputError, ViewError
 from fireworld.records import MemoryRecording
-from recorder.diff import compare
 from tests.viewer import rrd
 from tests.viewer.conftest import make_recording
-from viewer import app
 
-reader = pytest.importorskip("recorder.reader")
+reader = pytest.importorskip("fireworld_recorder.reader")
 
 
 class OpenedLog:
@@ -178,7 +178,7 @@ def test_saving_never_imports_the_simulator():
 import sys, tempfile
 from pathlib import Path
 from tests.viewer.conftest import make_recording
-from viewer import app
+from fireworld_viewer.rerun_view import app
 app.save([make_recording(3, 3, 2)], Path(tempfile.mkdtemp()) / "x.rrd")
 assert "numba" not in sys.modules and "matplotlib" not in sys.modules
 parts = {name.split(".")[1] for name in sys.modules if name.startswith("fireworld.")}

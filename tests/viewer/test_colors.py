@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from fireworld_viewer import colors
+from fireworld_viewer.rerun_view import plots
+from fireworld_viewer.story import narration as telling
 
 from fireworld.records import ACTIVITIES, FIERYNESS
-from viewer import colors, plots, telling
 
 
 def test_every_code_and_activity_has_a_color_of_its_own():

@@ -7,15 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fireworld_viewer import colors
+from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh
+from fireworld_viewer.rerun_view import app
+from fireworld_viewer.rerun_view.comparison import AGREEMENT, DAMAGE_ORDER, common_steps, difference
+from fireworld_viewer.rerun_view.outcome_panel import Outcome
 
 from fireworld.errors import ViewError
 from fireworld.records import MemoryRecording
 from tests.viewer import rrd
 from tests.viewer.conftest import make_recording
-from viewer import app, colors
-from viewer.city_mesh import SHADES_PERCENT, build_mesh
-from viewer.comparison import AGREEMENT, DAMAGE_ORDER, common_steps, difference
-from viewer.outcome import Outcome
 
 SCORE_FACTORS = (1, 0.66, 0.33, 0, 0.9, 0.75, 0.5, 0.25, 0)
 

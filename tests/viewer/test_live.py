@@ -13,6 +13,9 @@ from threading import Event
 
 import numpy as np
 import pytest
+from fireworld_viewer.rerun_view import app, live
+from fireworld_viewer.rerun_view import feed as courier
+from fireworld_viewer.rerun_view.feed import Courier
 
 from fireworld.errors import ViewError
 from fireworld.policy.files import load_team_file
@@ -22,8 +25,6 @@ from tests.cli.conftest import here  # noqa: F401 - a folder with policies in it
 from tests.command_line import call
 from tests.training.conftest import SHORT_WORDS, TINY
 from tests.viewer import rrd
-from viewer import app, courier, live
-from viewer.courier import Courier
 
 SHORT = ("run", "quick", "--steps", 9, "--json")
 TRAIN = ("train", "tiny.yaml", *SHORT_WORDS, "--stages", "alone", "-o")

@@ -8,14 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rerun
+from fireworld_viewer import colors
+from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh
+from fireworld_viewer.rerun_view import app, mapping
+from fireworld_viewer.rerun_view import people as crews
+from fireworld_viewer.rerun_view.plots import COUNTS, REWARDS, SCORES, first_burning
 
 from fireworld.errors import ViewError
 from fireworld.records import ACTION_NAMES, ACTIVITIES, MemoryRecording
 from tests.viewer import rrd
 from tests.viewer.conftest import make_recording
-from viewer import app, colors, crews, mapping
-from viewer.city_mesh import SHADES_PERCENT, build_mesh
-from viewer.plots import COUNTS, REWARDS, SCORES, first_burning
 
 
 @pytest.fixture(scope="module")

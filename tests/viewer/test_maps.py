@@ -8,16 +8,17 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import pytest
+from fireworld_viewer import colors
+from fireworld_viewer.pictures import maps
+from fireworld_viewer.pictures.city_map import Crews, MapState, contrasting, state_of
+from fireworld_viewer.pictures.figure_files import plain_style
+from fireworld_viewer.pictures.map_legend import LABELS, count_marks
+from fireworld_viewer.pictures.moments import LAST, evenly, moments_at, moments_between
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgba
 
 from fireworld.errors import OutputError, ViewError
 from fireworld.records import FIERYNESS, MemoryRecording
-from viewer import colors, maps
-from viewer.city_map import Crews, MapState, contrasting, state_of
-from viewer.map_legend import LABELS, count_marks
-from viewer.moments import LAST, evenly, moments_at, moments_between
-from viewer.output import plain_style
 
 
 def legend_of(figure):

@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from fireworld_viewer import colors
+from fireworld_viewer.rerun_view import app
+from fireworld_viewer.rerun_view.outcome_panel import Outcome
 
 from tests import command_line
 from tests.viewer.conftest import make_recording
 from tests.viewer.headless import has_driver, headless, loaded, opened, picture
 from tests.viewer.pixels import n_near, part
-from viewer import app, colors
-from viewer.outcome import Outcome
 
 pytestmark = pytest.mark.skipif(
     not has_driver(),

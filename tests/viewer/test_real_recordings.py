@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fireworld_recorder.reader import Log, open_log
+from fireworld_viewer import colors
+from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh
+from fireworld_viewer.rerun_view.air import air_cells, air_pixels
+from fireworld_viewer.rerun_view.plots import COUNTS, REWARDS, SCORES
 
-from recorder.reader import Log, open_log
 from tests import command_line
 from tests.viewer import rrd
-from viewer import colors
-from viewer.air import air_cells, air_pixels
-from viewer.city_mesh import SHADES_PERCENT, build_mesh
-from viewer.plots import COUNTS, REWARDS, SCORES
 
 GOLDEN = Path(__file__).parents[2] / "recordings" / "golden"
 

@@ -9,14 +9,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fireworld_viewer import colors
+from fireworld_viewer.pictures import film
+from fireworld_viewer.pictures.figure_files import plain_style
+from fireworld_viewer.pictures.moments import moments_between
 from PIL import Image
 
 from tests import command_line
 from tests.viewer.conftest import make_recording
 from tests.viewer.recorded import write_log
-from viewer import colors, film
-from viewer.moments import moments_between
-from viewer.output import plain_style
 
 
 @pytest.fixture(scope="module")

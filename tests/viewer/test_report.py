@@ -12,16 +12,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from fireworld_recorder.reader import open_log
+from fireworld_viewer.pictures.curves import draw_curves
+from fireworld_viewer.pictures.decision_timeline import draw_timeline
+from fireworld_viewer.story.counts import OwnTarget, count_choices
 
 from fireworld.cli import root
 from fireworld.records import ACTION_NAMES, MemoryRecording
-from recorder.reader import open_log
 from tests import command_line
 from tests.viewer.conftest import make_recording
 from tests.viewer.recorded import write_log
-from viewer.counts import OwnTarget, count_choices
-from viewer.curves import draw_curves
-from viewer.timeline import draw_timeline
 
 
 @pytest.fixture

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fireworld_viewer.story.choices import choices_of
+from fireworld_viewer.story.narration import decision_lines
 
 from fireworld.records import ACTION_NAMES, MemoryRecording
 from tests.viewer.conftest import make_recording
-from viewer.choices import choices_of
-from viewer.telling import decision_lines
 
 
 def recording_of(**decisions: Any) -> MemoryRecording:

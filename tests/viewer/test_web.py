@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fireworld_viewer import colors
+from fireworld_viewer.rerun_view.app import free_port
 
 from tests import command_line
 from tests.viewer.browser import Browser, browser, executable
 from tests.viewer.headless import CALL
 from tests.viewer.pixels import n_near, part
-from viewer import colors
-from viewer.app import free_port
 
 PATIENCE_SECONDS = 120.0
 """Drawing by software takes long where others compute too."""

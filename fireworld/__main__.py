@@ -1,0 +1,5 @@
+"""`python -m fireworld`: the command line."""
+
+from fireworld.cli import main
+
+main()

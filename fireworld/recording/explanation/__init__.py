@@ -1,0 +1,1 @@
+"""Which decisions make the difference between the scores of two recorded runs."""

@@ -1,0 +1,1 @@
+"""Golden recordings: kept, run again, compared."""

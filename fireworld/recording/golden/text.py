@@ -1,0 +1,118 @@
+"""A golden recording as text: what happened in it, to be read in a review, line by line."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from typing import TYPE_CHECKING, Final
+
+from fireworld.records import EVENT_KINDS, Array
+
+if TYPE_CHECKING:
+    from fireworld_recorder.reader import Log
+
+    from fireworld.recording.golden.order import Order
+
+LETTERS: Final = {"E": "easiest", "V": "nearest-to-civilian", "C": "nearest-to-center", "M": "nearest-to-me"}
+"""Of the actions, in their order."""
+OWN: Final = "T"
+"""An action beyond these: a target of the brigade's own."""
+NONE: Final = "."
+LEGEND: Final = ", ".join(
+    f"{letter} {action}" for letter, action in {**LETTERS, OWN: "own target", NONE: "none"}.items()
+)
+STEPS_IN_A_LINE: Final = 100
+
+
+def golden_text(log: Log) -> str:
+    """Tell a recording: what was run, how it ended, every event, who decided what, and the final hash."""
+    from fireworld.recording.golden.order import order_of
+
+    blocks = (_facts(log, order_of(log.header)), _events(log), _decisions(log), [_hash(log)])
+    return "\n\n".join("\n".join(block) for block in blocks) + "\n"
+
+
+def tells_of(text: str, log: Log) -> bool:
+    """Whether a text tells of this recording; how it is worded is another matter."""
+    return _hash(log) in text.splitlines()
+
+
+def _hash(log: Log) -> str:
+    return f"hash {log.digest}"
+
+
+def _facts(log: Log, order: Order) -> list[str]:
+    """Say what was run and what came of it."""
+    from fireworld_recorder.totals import totals_of
+
+    from fireworld.recording.golden.order import kind_of, recorded_scenario
+
+    totals, city = totals_of(log), log.city
+    ended = "still burning" if totals.time_to_complete is None else "the fire is out"
+    settings = "".join(f", {key}={text}" for key, text in order.settings.items())
+    exceptions = [f"{field} to {tolerance:g}" for field, tolerance in order.tolerances.items()]
+    exceptions += [f"not {name}" for name in order.ignore]
+    facts = {
+        "scenario": f"{log.header.scenario}{settings}",
+        "kind": kind_of(recorded_scenario(log.header)),
+        "policy": log.header.policy,
+        "seed": str(log.header.seed),
+        "steps": f"{totals.last_step} of at most {log.header.n_steps_max}, {ended}",
+        "score": f"{totals.score:.6g} of {totals.score_max:g}",
+        "burnt out": f"{totals.n_burnt_out} of {len(city.building_id)} buildings",
+        "alive": f"{totals.n_civilians_alive} of {len(city.civilian_hp)} civilians",
+        "return": f"{totals.sum_of_rewards:.6g}",
+        "water": f"{totals.water_used_litres:g} litres",
+        "compared": "exactly" + "".join(f", {exception}" for exception in exceptions),
+    }
+    return [f"{label:<10} {text}" for label, text in facts.items()]
+
+
+def _events(log: Log) -> list[str]:
+    """List the events of every step that has any."""
+    lines = ["events by step, with the numbers of the buildings; tank-empty and refilled: of the brigades"]
+    kinds, entities = log.ragged("events", "kind"), log.ragged("events", "entity")
+    for step, kind, entity in zip(log.steps, kinds, entities, strict=True):
+        if len(kind):
+            lines.append(f"{step:>5}  {_step_events(kind, entity)}")
+    return lines
+
+
+def _step_events(kinds: Array, entities: Array) -> str:
+    events = zip(kinds.tolist(), entities.tolist(), strict=True)
+    parts = []
+    for kind, group in groupby(events, key=lambda event: event[0]):
+        name = EVENT_KINDS[kind] if kind < len(EVENT_KINDS) else f"kind {kind}"
+        parts.append(f"{name} {', '.join(str(entity) for _, entity in group)}")
+    return "; ".join(parts)
+
+
+def _decisions(log: Log) -> list[str]:
+    """Draw a strip of letters for each brigade, one for each step, and list where its targets change."""
+    lines = [f"decisions, a letter for each step: {LEGEND}"]
+    steps = log.steps.tolist()
+    actions, targets = log.ragged("decisions", "action"), log.ragged("decisions", "target")
+    for brigade in range(len(log.city.brigade_tank_litres)):
+        chosen = [(step, _entry(row, brigade)) for step, row in zip(steps, actions, strict=True) if step]
+        letters = "".join(_letter(action) for _, action in chosen)
+        counts = (f"{letters.count(letter)} {letter}" for letter in (*LETTERS, OWN, NONE) if letter in letters)
+        lines.append(f"brigade {brigade}: {', '.join(counts)}")
+        starts = range(0, len(letters), STEPS_IN_A_LINE)
+        lines += [f"{chosen[start][0]:>5}  {letters[start : start + STEPS_IN_A_LINE]}" for start in starts]
+        lines += _changes_of([(step, _entry(row, brigade)) for step, row in zip(steps, targets, strict=True) if step])
+    return lines
+
+
+def _changes_of(targets: list[tuple[int, int]]) -> list[str]:
+    """Say from which step on a brigade had which building as its target."""
+    changes = [next(group) for _, group in groupby(targets, key=lambda entry: entry[1])]
+    words = [f"{step} {'none' if target < 0 else target}" for step, target in changes]
+    return [f"       targets from step: {', '.join(words)}"] if words else []
+
+
+def _letter(action: int) -> str:
+    return NONE if action < 0 else (*LETTERS, OWN)[min(action, len(LETTERS))]
+
+
+def _entry(row: Array, brigade: int) -> int:
+    """Return what a brigade's entry is, -1 where there is none."""
+    return int(row[brigade]) if brigade < len(row) else -1

@@ -1,0 +1,167 @@
+"""`--scene foxglove`: steps as Foxglove, Lichtblick and Rerun draw them: the viewer's looks in the recorder's bytes."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from typing import Any, Final
+
+import numpy as np
+from fireworld_recorder import foxglove
+from fireworld_recorder.chain import SCENE_PREFIX
+from fireworld_recorder.writer import Channel
+from fireworld_viewer import colors
+from fireworld_viewer.city_mesh import STOREY_M, build_mesh, triangulate
+from fireworld_viewer.story import narration as telling
+from numpy.typing import NDArray
+
+from fireworld.records import ACTIVITIES, CityRecord, MemoryRecording, RunHeader, StepRecord
+
+CITY: Final = f"{SCENE_PREFIX}city"
+FIRE: Final = f"{SCENE_PREFIX}fire"
+POINTS: Final = f"{SCENE_PREFIX}points"
+TEAM: Final = f"{SCENE_PREFIX}team"
+LOG: Final = f"{SCENE_PREFIX}log"
+
+_LEVELS: Final = {"INFO": "INFO", "WARN": "WARNING", "ERROR": "ERROR", "CRITICAL": "FATAL"}
+_ABOVE_ROOF_M: Final = 0.3
+_POINT: Final = np.dtype(
+    [(axis, "<f4") for axis in "xyz"]
+    + [(channel, "u1") for channel in ("red", "green", "blue", "alpha")]
+    + [("temperature", "<f4"), ("fuel_share", "<f4"), ("water_litres", "<i4"), ("fieryness", "u1")]
+)
+_BURNING_OR_DONE: Final = range(1, len(colors.FIERYNESS_RGB))
+
+
+class FoxgloveScene:
+    """Draws a run, step by step, as a `fireworld_recorder.writer.Scene`.
+
+    Every message shows all that its topic has to show at its step: a tool that jumps to a step sees the last message of
+    each topic, and nothing older.
+    """
+
+    def __init__(self, header: RunHeader, city: CityRecord) -> None:
+        self._header = header
+        self._city = city
+        self._mesh = build_mesh(city)
+        self._roofs = _Roofs(city)
+        self._refuges = np.asarray(city.refuge_building, dtype=np.intp)
+        self._shown: NDArray[np.uint8] | None = None
+
+    @property
+    def channels(self) -> list[Channel]:
+        """The topics, in fixed order."""
+        update = "SceneUpdate"
+        roots = ((CITY, update), (POINTS, "PointCloud"), (FIRE, update), (TEAM, update), (LOG, "Log"))
+        return [foxglove.channel(topic, root) for topic, root in roots]
+
+    def messages(self, record: StepRecord) -> list[tuple[str, bytes]]:
+        """Encode what is to be drawn of a step."""
+        found: list[tuple[str, bytes]] = []
+        if self._shown is None:
+            found.append((CITY, foxglove.scene(list(self._static(record.step)))))
+        found.append((POINTS, foxglove.point_cloud(record.step, self._points(record))))
+        codes = np.asarray(record.buildings.fieryness, dtype=np.uint8).copy()
+        codes[self._refuges] = 0
+        if self._shown is None or not np.array_equal(codes, self._shown):
+            found.append((FIRE, foxglove.scene([foxglove.entity(record.step, "fire", *self._fire(codes))])))
+            self._shown = codes
+        found.append((TEAM, foxglove.scene([foxglove.entity(record.step, "team", *self._team(record))])))
+        found += [(LOG, line) for line in self._log_lines(record)]
+        return found
+
+    def _static(self, step: int) -> Iterator[bytes]:
+        """The city as it stands, untouched."""
+        city, mesh = self._city, self._mesh
+        grey, green = colors.FIERYNESS_RGB[0], colors.REFUGE_RGB
+        of_refuge = np.isin(mesh.vertex_building[mesh.triangle[:, 0]], self._refuges)
+        houses = _triangles(mesh.vertex_xyz_m, mesh.triangle[~of_refuge], grey)
+        refuges = _triangles(mesh.vertex_xyz_m, mesh.triangle[of_refuge], green)
+        names = [
+            foxglove.label(
+                mesh.roof_xyz_m[index] + (0, 0, 8), f"refuge {city.building_id[index]}", height_m=8, rgb=green
+            )
+            for index in self._refuges
+        ]
+        yield foxglove.entity(step, "buildings", houses, refuges, *names)
+        node = np.column_stack([city.node_x_m, city.node_y_m, np.zeros(len(city.node_x_m))])
+        streets = np.stack([node[np.asarray(city.street_from)], node[np.asarray(city.street_to)]], axis=1)
+        yield foxglove.entity(step, "streets", foxglove.lines(streets, colors.STREET_RGB, thickness_m=1.6))
+        hydrant = np.column_stack([city.hydrant_x_m, city.hydrant_y_m, np.ones(len(city.hydrant_x_m))])
+        rgb = np.tile(colors.HYDRANT_RGB, (len(hydrant), 1))
+        yield foxglove.entity(step, "hydrants", foxglove.spheres(hydrant, rgb, diameter_m=2.4))
+
+    def _points(self, record: StepRecord) -> NDArray[Any]:
+        """A point on each roof, with its color and numbers."""
+        buildings = record.buildings
+        code = np.asarray(buildings.fieryness)
+        rgb = np.array(colors.FIERYNESS_RGB, dtype=np.uint8)[code]
+        rgb[self._refuges] = colors.REFUGE_RGB
+        points = np.zeros(len(code), dtype=_POINT)
+        for place, axis in enumerate("xyz"):
+            points[axis] = self._mesh.roof_xyz_m[:, place]
+        for place, channel in enumerate(("red", "green", "blue")):
+            points[channel] = rgb[:, place]
+        points["z"] += 2 * _ABOVE_ROOF_M
+        points["alpha"] = 255
+        for name in ("temperature", "fuel_share", "water_litres"):
+            points[name] = getattr(buildings, name)
+        points["fieryness"] = code
+        return points
+
+    def _fire(self, codes: NDArray[np.uint8]) -> Iterator[bytes]:
+        """The roofs of all buildings that are not untouched any more, in the colors of their codes."""
+        for code in _BURNING_OR_DONE:
+            corners, indices = self._roofs.of(codes == code)
+            yield foxglove.triangles(corners, indices, colors.FIERYNESS_RGB[code])
+
+    def _team(self, record: StepRecord) -> Iterator[bytes]:
+        """Brigades with their tanks, water on its way, civilians."""
+        crew, city = record.brigades, self._city
+        place = np.column_stack([crew.x_m, crew.y_m, np.full(len(crew.x_m), 6.0)])
+        look = np.array(colors.ACTIVITY_RGB)[np.asarray(crew.activity)].reshape(-1, 3)
+        yield foxglove.spheres(place, look, diameter_m=8.0)
+        for brigade, litres in enumerate(np.asarray(crew.tank_litres).tolist()):
+            text = f"{brigade} · {litres} l · {ACTIVITIES[int(crew.activity[brigade])]}"
+            yield foxglove.label(place[brigade] + (0, 0, 10), text, height_m=6, rgb=colors.LABEL_RGB)
+        target = np.asarray(record.decisions.target, dtype=np.intp)
+        if len(target):
+            sprays = np.flatnonzero((target >= 0) & (np.asarray(crew.sprayed_litres) > 0))
+            jets = np.stack([place[sprays], self._mesh.roof_xyz_m[target[sprays]]], axis=1)
+            yield foxglove.lines(jets, colors.WATER_RGB, thickness_m=1.2)
+        inside = np.asarray(city.civilian_building, dtype=np.intp)
+        height = np.where(inside >= 0, self._mesh.roof_xyz_m[inside, 2] + 3.0, 2.0)
+        health = colors.health_rgb(np.asarray(record.civilians.hp), np.asarray(city.civilian_hp))
+        where = np.column_stack([city.civilian_x_m, city.civilian_y_m, height])
+        yield foxglove.spheres(where, health.reshape(-1, 3), diameter_m=5.2)
+
+    def _log_lines(self, record: StepRecord) -> Iterator[bytes]:
+        """A line for each event."""
+        for step, level, text, _ in telling.event_lines(MemoryRecording(self._header, self._city, [record])):
+            yield foxglove.log_line(step, level=_LEVELS[level], text=text, name="fireworld")
+
+
+class _Roofs:
+    """The roofs of a city, cut into triangles once; a step takes those it needs."""
+
+    def __init__(self, city: CityRecord) -> None:
+        ptr = np.asarray(city.outline_ptr, dtype=np.int64)
+        x, y = np.asarray(city.outline_x_m), np.asarray(city.outline_y_m)
+        self._n_corners = np.diff(ptr)
+        height = np.repeat(np.asarray(city.floors) * STOREY_M + _ABOVE_ROOF_M, self._n_corners)
+        self._corners = np.column_stack([x, y, height])
+        parts = [triangulate(x[a:b], y[a:b]) + a for a, b in itertools.pairwise(ptr.tolist())]
+        self._triangles = np.concatenate(parts) if parts else np.zeros((0, 3), dtype=np.int64)
+        self._building = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+
+    def of(self, chosen: NDArray[np.bool_]) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Corners (v, 3) and triangles (t, 3) of some buildings. (n,) whether it is chosen."""
+        kept = np.repeat(chosen, self._n_corners)
+        number = np.cumsum(kept) - 1
+        return self._corners[kept], number[self._triangles[chosen[self._building]]]
+
+
+def _triangles(xyz_m: NDArray[Any], triangle: NDArray[Any], rgb: colors.Rgb) -> bytes:
+    """Triangles with the corners that they use only."""
+    used, indices = np.unique(triangle, return_inverse=True)
+    return foxglove.triangles(xyz_m[used], indices.reshape(-1, 3), rgb)

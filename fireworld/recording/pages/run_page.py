@@ -1,0 +1,228 @@
+"""One recording, or two of one city, as an HTML page: outcome, maps, curves, choices, events, how to repeat it."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from html import escape
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from fireworld_recorder.totals import totals_of
+from fireworld_viewer.story.counts import Counts, count_choices
+from fireworld_viewer.story.narration import event_lines
+
+from fireworld.errors import one_line
+from fireworld.html_page import html_figure, html_page, html_table, text_cell
+from fireworld.records import ACTION_NAMES, EVENT_KINDS
+
+if TYPE_CHECKING:
+    from fireworld_recorder.reader import Log
+
+_STYLE: Final = """
+pre { background: #f0ede6; padding: .7rem 1rem; overflow-x: auto; font-size: 13px; }
+td.text { overflow-wrap: anywhere; } summary { cursor: pointer; }
+"""
+SCENARIO: Final = "scenario.yaml"
+"""Every recording has its scenario in a file of that name."""
+_ALWAYS_OF_NOTE: Final = frozenset({"civilian-hurt", "civilian-died", "brigade-hurt", "brigade-died", "site-out"})
+_FIRST_OF_NOTE: Final = frozenset({"ignited", "burnt-out", "extinguished", "tank-empty"})
+_EVENTS_SHOWN: Final = 40
+_TARGETS_SHOWN: Final = 12
+
+
+def run_page(logs: Sequence[Log], images: Mapping[str, bytes]) -> str:
+    """Write the page; it needs no other file.
+
+    Args:
+        logs: one recording, or two of the same city; with steps.
+        images: PNG files: "maps", "curves", "timeline".
+    """
+    names = _names(logs)
+    headers = [log.header for log in logs]
+    title = " against ".join(f"{one_line(one.scenario)}, {one_line(one.policy)}, seed {one.seed}" for one in headers)
+    body = [
+        f"<h1>{escape(title)}</h1>",
+        *(f'<p class="caveat">{escape(f"{log.path.name}: {log.damage}; only what is good is told of")}</p>'
+          for log in logs if log.damage is not None),
+        "<h2>Outcome</h2>",
+        _outcome(logs, names),
+        "<h2>Maps</h2>",
+        html_figure(images["maps"], "The city at the start, at the end and evenly between." + _rows_note(logs)),
+        "<h2>Curves</h2>",
+        html_figure(images["curves"], "Steps are simulated minutes. Rewards are never above zero: less is worse."),
+        "<h2>Decisions</h2>",
+        html_figure(images["timeline"], "White where a brigade made no choice: it refilled, or nothing burned."),
+        *(part for log, name in zip(logs, names, strict=True) for part in _decisions(log, name)),
+        "<h2>Events</h2>",
+        _event_counts(logs, names),
+        *(part for log, name in zip(logs, names, strict=True) for part in _events_of_note(log, name)),
+        "<h2>How to get the same again</h2>",
+        *(part for log, name in zip(logs, names, strict=True) for part in _repetition(log, name)),
+        *_scenarios(logs, names),
+    ]  # fmt: skip
+    return html_page(f"fireworld: {title}", body, style=_STYLE)
+
+
+def _names(logs: Sequence[Log]) -> list[str]:
+    """Call a recording by its file's name, A and B if there are two."""
+    if len(logs) == 1:
+        return [one_line(logs[0].path.name)]
+    return [f"{letter}: {one_line(log.path.name)}" for letter, log in zip("AB", logs, strict=True)]
+
+
+def _rows_note(logs: Sequence[Log]) -> str:
+    return " Above A, below B; a run that ended before the other keeps its last state." if len(logs) > 1 else ""
+
+
+def _outcome(logs: Sequence[Log], names: Sequence[str]) -> str:
+    columns = [_outcome_of(log) for log in logs]
+    rows = []
+    for label in columns[0]:
+        values = [escape(column[label]) for column in columns]
+        rows.append([text_cell(label), *(f"<b>{value}</b>" if len(set(values)) > 1 else value for value in values)])
+    note = "<p>Bold: where they differ.</p>" if len(logs) > 1 else ""
+    return html_table(["", *map(escape, names)], rows) + note
+
+
+def _outcome_of(log: Log) -> dict[str, str]:
+    totals, last = totals_of(log), log.step(int(log.steps[-1]))
+    n_buildings, n_civilians = len(log.city.building_id), len(log.city.civilian_hp)
+    complete = totals.time_to_complete
+    ended = (
+        "nothing burned any more" if last.terminated else "the scenario's last step" if last.truncated else "stopped"
+    )
+    return {
+        "scenario": one_line(log.header.scenario),
+        "policy": one_line(log.header.policy),
+        "seed": str(log.header.seed),
+        "score": f"{last.score.score:.4f} of {last.score.score_max:.0f}",
+        "score by today's rule": f"{last.score.score_now:.4f}",
+        "last step": f"{last.step}: {ended}",
+        "time to complete": f"{complete} steps" if complete is not None else "-",
+        "burnt out": f"{last.score.n_burnt_out} of {n_buildings} buildings",
+        "still burning": f"{last.score.n_burning}",
+        "water-damaged": f"{last.score.n_water_damaged}",
+        "civilians alive": f"{last.score.n_civilians_alive} of {n_civilians}",
+        "return": f"{last.rewards.sum_so_far:,.0f}",
+        "water used": f"{last.score.water_used_litres:,.0f} litres",
+        "digest": log.digest[:12],
+    }
+
+
+def _decisions(log: Log, name: str) -> Iterator[str]:
+    """Say how often each brigade chose which action, and which targets it named itself."""
+    found = count_choices(log)
+    used = [k for k in range(len(ACTION_NAMES)) if any(one.n_by_action[k] for one in found)]
+    explored = any(one.n_explored for one in found)
+    heads = ["brigade", *(ACTION_NAMES[k] for k in used), "no choice", "other than before",
+             *(["explored"] if explored else []), "sprayed, litres", "driven, m", "refills"]  # fmt: skip
+    rows = [
+        [text_cell(str(one.brigade)), *(_share(one, one.n_by_action[k]) for k in used), _share(one, one.n_without),
+         str(one.n_changes), *([str(one.n_explored)] if explored else []),
+         f"{one.sprayed_litres:,}", f"{one.driven_m:,.0f}", str(one.n_refills)]
+        for one in found
+    ]  # fmt: skip
+    yield f"<h3>{escape(name)}</h3>"
+    yield html_table(heads, rows)
+    yield "<p>Steps in which a brigade chose an action, and how often a choice was another than the one before.</p>"
+    own = [(one.brigade, target) for one in found for target in one.own_targets[:_TARGETS_SHOWN]]
+    if own:
+        ids = log.city.building_id
+        targets = [[text_cell(str(brigade)), str(int(ids[target.building])), str(target.n_steps),
+                    str(target.first_step), str(target.last_step)] for brigade, target in own]  # fmt: skip
+        yield html_table(["brigade", "own target, building", "steps", "first", "last"], targets)
+        more = sum(max(0, len(one.own_targets) - _TARGETS_SHOWN) for one in found)
+        if more:
+            yield f"<p>The {_TARGETS_SHOWN} targets that each brigade pursued longest; {more} more are left out.</p>"
+
+
+def _share(one: Counts, n: int) -> str:
+    total = sum(one.n_by_action) + one.n_without
+    return f'{n} <span class="interval">{100 * n / max(1, total):.0f}&nbsp;%</span>' if n else "0"
+
+
+def _event_counts(logs: Sequence[Log], names: Sequence[str]) -> str:
+    """Say how often each kind of event happened, and when first and last."""
+    found = [_steps_by_kind(log) for log in logs]
+    kinds = [kind for kind in EVENT_KINDS if any(len(steps[kind]) for steps in found)]
+    rows = [
+        [text_cell(kind.replace("-", " ")), *(cell for steps in found for cell in _count_cells(steps[kind]))]
+        for kind in kinds
+    ]
+    heads = [f"{escape(name)}: {what}" if len(logs) > 1 else what for name in names for what in ("how often", "steps")]
+    return html_table(["event", *heads], rows) if rows else "<p>Nothing happened.</p>"
+
+
+def _count_cells(steps: Sequence[int]) -> tuple[str, str]:
+    if not steps:
+        return "0", "-"
+    return str(len(steps)), str(steps[0]) if steps[0] == steps[-1] else f"{steps[0]} to {steps[-1]}"
+
+
+def _steps_by_kind(log: Log) -> dict[str, list[int]]:
+    steps: dict[str, list[int]] = {kind: [] for kind in EVENT_KINDS}
+    for step, kinds in zip(log.steps.tolist(), log.ragged("/events", "kind"), strict=True):
+        for kind in np.asarray(kinds).tolist():
+            steps[EVENT_KINDS[kind]].append(step)
+    return steps
+
+
+def _events_of_note(log: Log, name: str) -> Iterator[str]:
+    """Tell of people, of fires that are out, and of the first of what happens often."""
+    kinds = [EVENT_KINDS[kind] for row in log.ragged("/events", "kind") for kind in np.asarray(row).tolist()]
+    met: set[str] = set()
+    told: list[tuple[int, str]] = []
+    for kind, (step, _, text, _) in zip(kinds, event_lines(log), strict=True):
+        first = kind not in met
+        if kind in _ALWAYS_OF_NOTE or (kind in _FIRST_OF_NOTE and first):
+            told.append((step, f"{text}, the first" if kind in _FIRST_OF_NOTE else text))
+        met.add(kind)
+    if told:
+        yield f"<h3>{escape(name)}</h3>"
+        rows = [[str(step), text_cell(escape(text))] for step, text in told[:_EVENTS_SHOWN]]
+        yield html_table(["step", "of note"], rows, n_text=0)
+    if len(told) > _EVENTS_SHOWN:
+        yield f"<p>{len(told) - _EVENTS_SHOWN} more are left out; the recording has them.</p>"
+
+
+def _repetition(log: Log, name: str) -> Iterator[str]:
+    """Say what identifies a run, and which commands repeat it."""
+    header = log.header
+    rows = {
+        "recording": log.path.name,
+        "scenario": f"{header.scenario}, {header.scenario_digest}",
+        "policy": f"{header.policy}, {header.policy_digest}",
+        "seed": str(header.seed),
+        "forked from": header.forked_from,
+        "digest of the run": log.digest,
+        "recorded by": f"fireworld {header.fireworld_version}",
+        "files in the recording": ", ".join(f"{file} ({len(data)} bytes)" for file, data in header.attachments.items()),
+    }
+    yield f"<h3>{escape(name)}</h3>"
+    shown = ((label, one_line(value)) for label, value in rows.items() if value)
+    yield html_table(["", ""], [[text_cell(label), text_cell(escape(value))] for label, value in shown], n_text=2)
+    yield f"<pre>{escape(_commands(log))}</pre>"
+
+
+def _scenarios(logs: Sequence[Log], names: Sequence[str]) -> Iterator[str]:
+    """Show the text of each scenario, once."""
+    texts: dict[bytes, list[str]] = {}
+    for log, name in zip(logs, names, strict=True):
+        if SCENARIO in log.header.attachments:
+            texts.setdefault(log.header.attachments[SCENARIO], []).append(name)
+    for text, whose in texts.items():
+        title = SCENARIO if len(whose) == len(logs) else f"{SCENARIO} of {', '.join(whose)}"
+        shown = escape(text.decode("utf-8", errors="replace"))
+        yield f"<details><summary>{escape(title)}</summary><pre>{shown}</pre></details>"
+
+
+def _commands(log: Log) -> str:
+    """Return the commands that replay a run, and run it anew; a run that branched off has no beginning of its own."""
+    header, recording = log.header, shlex.quote(one_line(log.path.name))
+    lines = [f"fireworld verify {recording}   # from the recording alone: every step is computed again and compared"]
+    if not header.forked_from:
+        words = ["fireworld", "run", SCENARIO, "--policy", one_line(header.policy)]
+        words += ["--seed", str(header.seed), "--steps", str(header.n_steps_max), "--record", "again.mcap"]
+        lines.append(f"{shlex.join(words)}   # {SCENARIO}: the text below")
+    return "\n".join(lines)

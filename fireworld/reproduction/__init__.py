@@ -1,0 +1,1 @@
+"""The paper: its tables, its readings, its report."""

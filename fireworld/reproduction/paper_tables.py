@@ -1,0 +1,195 @@
+"""Tables of a reproduction: the paper's figures beside ours, with a plain verdict for every cell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from fireworld.evaluation.statistics import Estimate, estimate, paired_difference, probability_of_improvement
+from fireworld.kernels.arrays import Array
+from fireworld.reproduction import paper
+from fireworld.reproduction.study import ALONE, FIXED, RANDOM_TABLES, TEAMS, TOGETHER, TOGETHER_WITHOUT_FLAGS, Study
+
+WITHIN: Final = "within the interval"
+NEAR: Final = "within 25 %"
+APART: Final = "not"
+_NEAR_SHARE: Final = 0.25
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One figure of the paper, and what we measured."""
+
+    table: int
+    scenario: str
+    quantity: str
+    team: str
+    paper: float
+    ours: Estimate
+    ours_max: float | None = None
+    """Greatest possible value, of a score."""
+
+    @property
+    def verdict(self) -> str:
+        """Whether the paper's figure lies within our interval, our mean within 25 % of it, or neither."""
+        if self.ours.low <= self.paper <= self.ours.high:
+            return WITHIN
+        return NEAR if self.is_near else APART
+
+    @property
+    def is_near(self) -> bool:
+        """Whether our mean lies within 25 % of the paper's figure: says more than an interval that is wide."""
+        return abs(self.ours.mean - self.paper) <= _NEAR_SHARE * self.paper
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A figure of Table 2 or 3 without and with cooperation, and what cooperation changes."""
+
+    without: Cell
+    together: Cell
+    difference: Estimate
+    """With less without, run by run."""
+
+    @property
+    def claim_holds(self) -> bool | None:
+        """Whether cooperation changes the figure the way the paper says; None: the interval spans zero."""
+        change = self.difference
+        if not (change.above_zero or change.below_zero):
+            return None
+        return change.above_zero == (self.together.paper > self.without.paper)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How a team does, as a share of the greatest score."""
+
+    team: str
+    by_scenario: Sequence[Estimate]
+    mean: Estimate
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two teams on the same repetitions and seeds; share of the greatest score, mean over tests."""
+
+    team: str
+    other: str
+    question: str
+    difference: Estimate
+    improvement: Estimate
+    """Probability that a run of the first is the better one."""
+
+
+@dataclass(frozen=True)
+class Tables:
+    """All tables of a reproduction."""
+
+    lessons: Sequence[Cell]
+    converged: Sequence[Estimate]
+    """Share of the repetitions in which the policy settled, by rows of Table 1."""
+    tests: Sequence[Pair]
+    more_brigades: Sequence[Pair]
+    standings: Sequence[Standing]
+    """Over the tests of Table 2."""
+    standings_more_brigades: Sequence[Standing]
+    """Over the tests of Table 3."""
+    comparisons: Sequence[Comparison]
+    """Over the tests of Table 2."""
+    agreement: Estimate
+    """Share of the states met in which all brigades of the cooperative team prefer the same action."""
+
+    @property
+    def cells(self) -> list[Cell]:
+        """Every figure of the paper."""
+        pairs = [*self.tests, *self.more_brigades]
+        return [*self.lessons, *(cell for pair in pairs for cell in (pair.without, pair.together))]
+
+
+def make_tables(study: Study) -> Tables:
+    """Judge a study."""
+    names_2, names_3 = [row.scenario for row in paper.TABLE_2], [row.scenario for row in paper.TABLE_3]
+    standings = _standings(study, names_2)
+    return Tables(
+        lessons=[cell for row in paper.TABLE_1 for cell in _lesson_cells(study, row)],
+        converged=[
+            estimate(_column(lesson.converged for lesson in study.lessons_of(TOGETHER, row.scenario)))
+            for row in paper.TABLE_1
+        ],
+        tests=[pair for row in paper.TABLE_2 for pair in _pairs(study, row, table=2)],
+        more_brigades=[pair for row in paper.TABLE_3 for pair in _pairs(study, row, table=3)],
+        standings=standings,
+        standings_more_brigades=_standings(study, names_3),
+        comparisons=_comparisons(study, names_2, standings),
+        agreement=estimate(_column(study.agreement)),
+    )
+
+
+def _column(values: Iterable[float]) -> Array:
+    """Return one value a repetition as (repetitions, 1)."""
+    return np.array([[value] for value in values], dtype=np.float64)
+
+
+def _lesson_cells(study: Study, row: paper.Lesson) -> list[Cell]:
+    lessons = study.lessons_of(TOGETHER, row.scenario)
+    episodes = estimate(_column(lesson.n_episodes for lesson in lessons))
+    score = estimate(_column(lesson.score for lesson in lessons))
+    return [
+        Cell(1, row.scenario, "convergence episode", TOGETHER, row.convergence_episode, episodes),
+        Cell(1, row.scenario, "score", TOGETHER, row.score, score, lessons[0].score_max),
+    ]
+
+
+def _pairs(study: Study, row: paper.Test, *, table: int) -> list[Pair]:
+    made = []
+    for quantity, key, figures in (
+        ("time to complete", "steps", row.steps),
+        ("burnt out", "burnt_out", row.burnt_out),
+        ("score", "score", row.score),
+    ):
+        without, together = study.values(row.scenario, ALONE, key), study.values(row.scenario, TOGETHER, key)
+        best = float(study.values(row.scenario, ALONE, "score_max")[0, 0]) if key == "score" else None
+        made.append(
+            Pair(
+                Cell(table, row.scenario, quantity, ALONE, figures[0], estimate(without), best),
+                Cell(table, row.scenario, quantity, TOGETHER, figures[1], estimate(together), best),
+                paired_difference(together, without),
+            )
+        )
+    return made
+
+
+def _standings(study: Study, scenarios: Sequence[str]) -> list[Standing]:
+    return [
+        Standing(
+            team=team,
+            by_scenario=[estimate(study.values(scenario, team, "score_share")) for scenario in scenarios],
+            mean=estimate(study.mean_share(scenarios, team)),
+        )
+        for team in TEAMS
+    ]
+
+
+def _comparisons(study: Study, scenarios: Sequence[str], standings: Sequence[Standing]) -> list[Comparison]:
+    best_rule = max((row for row in standings if row.team in FIXED), key=lambda row: row.mean.mean).team
+    asked = [
+        (TOGETHER, ALONE, "is the paper's cooperative team better than its non-cooperative one?"),
+        (TOGETHER, TOGETHER_WITHOUT_FLAGS, "do the flags that tell what the others do help?"),
+        (TOGETHER_WITHOUT_FLAGS, ALONE, "does training in the team help, without the flags?"),
+        (TOGETHER, RANDOM_TABLES, "is what the team learned better than tables drawn at random?"),
+        (TOGETHER, "random", "is it better than random actions?"),
+        (TOGETHER, best_rule, "is it better than the best of the rules that learn nothing (chosen on these tests)?"),
+    ]
+    return [
+        Comparison(
+            team,
+            other,
+            question,
+            paired_difference(study.mean_share(scenarios, team), study.mean_share(scenarios, other)),
+            probability_of_improvement(study.mean_share(scenarios, team), study.mean_share(scenarios, other)),
+        )
+        for team, other, question in asked
+    ]

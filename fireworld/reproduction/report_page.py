@@ -1,0 +1,160 @@
+"""The report of a reproduction as one HTML page: findings, tables, graphs and maps, with every image in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Final
+
+from fireworld.evaluation.statistics import Estimate
+from fireworld.html_page import html_figure, html_mark, html_page, html_table, text_cell
+from fireworld.reproduction import paper
+from fireworld.reproduction.findings import caveat, findings, spread, tally
+from fireworld.reproduction.paper_tables import APART, NEAR, WITHIN, Cell, Pair, Standing, Tables
+from fireworld.reproduction.study import ALONE, TEAMS, TOGETHER, Study
+
+_MARKS: Final = {
+    WITHIN: "good", NEAR: "fair", APART: "bad",
+    "reproduced": "good", "partly": "fair", "not reproduced": "bad", "open": "open", "yes": "good", "no": "bad",
+}  # fmt: skip
+_CLAIMS: Final = {True: ("as the paper says", "good"), False: ("the other way", "bad"), None: ("open", "open")}
+
+
+def report_page(study: Study, tables: Tables, images: Mapping[str, bytes]) -> str:
+    """Write the page.
+
+    Args:
+        study: what was measured.
+        tables: what it comes to.
+        images: PNG files by name: "returns", "policy-changes", and for each test "SCENARIO-before",
+            "SCENARIO-non-cooperative", "SCENARIO-cooperative". What is missing is left out.
+    """
+    body = [
+        "<h1>Does the paper reproduce?</h1>",
+        f"<p>{_introduction(study)}</p>",
+        *([f'<p class="caveat">{escape(warning)}</p>'] if (warning := caveat(study)) else []),
+        "<h2>Findings</h2>",
+        _findings(study, tables),
+        "<h2>Table 1: training scenarios with four brigades</h2>",
+        _lessons(tables),
+        "<h2>Table 2: three tests, four brigades</h2>",
+        _pairs(tables.tests),
+        "<h2>Table 3: the tests with other numbers of brigades</h2>",
+        _pairs(tables.more_brigades),
+        "<h2>Controls</h2>",
+        _controls(tables),
+        "<h2>Convergence</h2>",
+        _image(images, "returns", "Return of each episode. Thick: mean over repetitions; thin: each of them."),
+        _image(images, "policy-changes", "States in which the best action of a brigade changed."),
+        "<h2>The city before and after</h2>",
+        *(_maps(images, row.scenario) for row in (*paper.TABLE_2, *paper.TABLE_3)),
+        "<h2>How it was measured</h2>",
+        _method(),
+    ]
+    return html_page("fireworld: reproduction", body)
+
+
+def _introduction(study: Study) -> str:
+    n_runs = sum(len(row.seed) for teams in study.outcomes.values() for rows in teams.values() for row in rows)
+    return (
+        "A. Abdolmaleki, M. Movahedi, N. Lau, L. P. Reis: <i>A Distributed Cooperative Reinforcement Learning Method "
+        "for Decision Making in Fire Brigade Teams</i> (RoboCup 2012), repeated: "
+        f"<b>{study.n_repetitions}</b> trainings, each tested on <b>{len(study.seeds)}</b> seeds, {n_runs} test runs "
+        "in all. Means are followed by their 95&nbsp;% interval over repetitions and seeds."
+    )
+
+
+def _findings(study: Study, tables: Tables) -> str:
+    rows = [
+        [
+            text_cell(finding.question),
+            text_cell(html_mark(finding.verdict, _MARKS[finding.verdict])),
+            text_cell(escape(finding.text)),
+        ]
+        for finding in findings(study, tables)
+    ]
+    return html_table(["question", "answer", "numbers"], rows, n_text=3)
+
+
+def _lessons(tables: Tables) -> str:
+    rows = []
+    for place, converged in enumerate(tables.converged):
+        episode, score = tables.lessons[2 * place : 2 * place + 2]
+        rows.append([
+            text_cell(episode.scenario), *_compared(episode, digits=0), f"{100 * converged.mean:.0f} %",
+            *_compared(score, digits=2), _maximum(score),
+        ])  # fmt: skip
+    heads = ["scenario", "convergence episode: paper", "ours", "", "settled", "score: paper", "ours", "", "of"]
+    note = f"{tally(tables.lessons)}. The score is that of the last episode; the episode is 130 where nothing settled."
+    return html_table(heads, rows) + f"<p>{escape(note[0].upper() + note[1:])}</p>"
+
+
+def _pairs(pairs: Sequence[Pair]) -> str:
+    rows = []
+    for pair in pairs:
+        digits = 2 if pair.without.quantity == "score" else 0
+        claim, mark = _CLAIMS[pair.claim_holds]
+        rows.append([
+            text_cell(pair.without.scenario), text_cell(pair.without.quantity), *_compared(pair.without, digits=digits),
+            *_compared(pair.together, digits=digits), _spread(pair.difference, digits=digits, sign=True),
+            html_mark(claim, mark), _maximum(pair.without),
+        ])  # fmt: skip
+    heads = [
+        "scenario", "", "without: paper", "ours", "", "with: paper", "ours", "", "with less without", "", "of",
+    ]  # fmt: skip
+    cells = [cell for pair in pairs for cell in (pair.without, pair.together)]
+    counted = tally(cells)
+    return html_table(heads, rows, n_text=2) + f"<p>{escape(counted[0].upper() + counted[1:])}.</p>"
+
+
+def _controls(tables: Tables) -> str:
+    parts = ["<p>Share of the greatest score.</p>"]
+    for table, standings in ((paper.TABLE_2, tables.standings), (paper.TABLE_3, tables.standings_more_brigades)):
+        heads = ["team", "", *(row.scenario for row in table), "mean", "typical run"]
+        parts.append(html_table(heads, [_standing(row) for row in standings], n_text=2))
+    return "\n".join([*parts, "<p>A typical run is the mean of the middle half of all runs.</p>"])
+
+
+def _standing(row: Standing) -> list[str]:
+    name = f"<b>{row.team}</b>" if row.team in {ALONE, TOGETHER} else row.team
+    shares = [_spread(found, digits=2) for found in (*row.by_scenario, row.mean)]
+    return [text_cell(name), text_cell(escape(TEAMS[row.team])), *shares, f"{row.mean.interquartile_mean:.2f}"]
+
+
+def _maps(images: Mapping[str, bytes], scenario: str) -> str:
+    shown = [
+        _image(images, f"{scenario}-before", "before"),
+        _image(images, f"{scenario}-{ALONE}", "after: without cooperation"),
+        _image(images, f"{scenario}-{TOGETHER}", "after: with cooperation"),
+    ]
+    return f'<h3>{scenario}</h3><div class="maps">{"".join(shown)}</div>' if any(shown) else ""
+
+
+def _method() -> str:
+    return (
+        "<p>Tabular SARSA with the paper's figures (learning rate 0.7, discount 0.5, exploration 0.9 to the power of "
+        "the episode), 24 scenarios alone and eight together, at most 130 episodes each. The paper's figures count as "
+        "met where they lie within our interval, however wide that is. Intervals come from a bootstrap "
+        "that draws repetitions and seeds anew, "
+        "apart from each other; differences are taken run by run on the same repetition and seed. The size of the "
+        "fires at the start is not in the paper: it was set once with rules that learn nothing, so scores are not to "
+        "be compared with the paper's to the decimal. The maps and recordings show repetition 1 on the first seed.</p>"
+    )
+
+
+def _compared(cell: Cell, *, digits: int) -> list[str]:
+    """Three cells: the paper's figure, ours, the verdict."""
+    return [f"{cell.paper:g}", _spread(cell.ours, digits=digits), html_mark(cell.verdict, _MARKS[cell.verdict])]
+
+
+def _spread(found: Estimate, *, digits: int, sign: bool = False) -> str:
+    value, _, interval = spread(found, digits=digits, sign=sign).partition(" ")
+    return f'{value} <span class="interval">{interval}</span>'
+
+
+def _maximum(cell: Cell) -> str:
+    return "" if cell.ours_max is None else f"{cell.ours_max:.0f}"
+
+
+def _image(images: Mapping[str, bytes], name: str, caption: str) -> str:
+    return html_figure(images[name], caption) if name in images else ""

@@ -1,0 +1,131 @@
+"""A scenario with its city built, ready to start any number of worlds; and the cache of the cities built so far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fireworld import __version__
+from fireworld.city.build import build_city
+from fireworld.city.city import City, Plan
+from fireworld.city.record import city_record
+from fireworld.kernels.arrays import CityArrays
+from fireworld.records import CityRecord, RunHeader
+from fireworld.scenario import Scenario
+from fireworld.simulation.city_arrays import city_arrays
+from fireworld.simulation.placement import Placement, attachments, place, scenario_plan
+from fireworld.simulation.world import World
+
+
+@dataclass(frozen=True)
+class BuiltScenario:
+    """What all runs of a scenario share: built once."""
+
+    scenario: Scenario
+    city: City
+    city_arrays: CityArrays
+    placement: Placement
+
+    @property
+    def n_brigades(self) -> int:
+        """Number of brigades."""
+        return len(self.placement.brigade_refuge)
+
+    def world(self, *, seed: int, n_steps_max: int | None = None) -> World:
+        """Start a world.
+
+        Args:
+            seed: of the run's random draws.
+            n_steps_max: last step; None: the scenario's.
+        """
+        return World(
+            self.city,
+            self.scenario.parameters,
+            ignited=self.placement.ignited,
+            civilian_building=self.placement.civilian_building,
+            civilian_mm=self.placement.civilian_mm,
+            brigade_refuge=self.placement.brigade_refuge,
+            seed=seed,
+            n_steps_max=self.scenario.steps if n_steps_max is None else n_steps_max,
+            reward_change=self.scenario.reward == "change",
+            unit_volume_m3=self.scenario.unit_volume_m3,
+            in_turn=self.scenario.choices == "in-turn",
+            arrays=self.city_arrays,
+        )
+
+    def city_record(self) -> CityRecord:
+        """Return the city as it is recorded."""
+        parameters = self.scenario.parameters
+        n_civilians = len(self.placement.civilian_building)
+        return city_record(
+            self.city,
+            civilian_mm=self.placement.civilian_mm,
+            civilian_building=self.placement.civilian_building,
+            civilian_hp=np.full(n_civilians, parameters.health.initial_hp, dtype=np.int32),
+            n_brigades=self.n_brigades,
+            brigades=parameters.brigades,
+        )
+
+    def header(
+        self, *, seed: int, policy: str, policy_digest: str, n_steps_max: int, forked_from: str = ""
+    ) -> RunHeader:
+        """Return what identifies a run of this scenario."""
+        return RunHeader(
+            scenario=self.scenario.name,
+            scenario_digest=self.scenario.digest,
+            seed=seed,
+            policy=policy,
+            policy_digest=policy_digest,
+            fireworld_version=__version__,
+            n_steps_max=n_steps_max,
+            forked_from=forked_from,
+            attachments=attachments(self.scenario),
+        )
+
+
+@dataclass(frozen=True)
+class BareCity:
+    """A city built, without anybody in it."""
+
+    plan: Plan
+    city: City
+    arrays: CityArrays
+
+
+class CityCache:
+    """The cities built so far, by what makes them: scenarios in one city build it once."""
+
+    def __init__(self) -> None:
+        self._built: dict[str, BareCity] = {}
+
+    def build(self, scenario: Scenario, *, city_json: bytes | None = None) -> BuiltScenario:
+        """Build a scenario's city, or take it from the cache, and place everybody in it.
+
+        Args:
+            scenario: the scenario.
+            city_json: content of its city file, where it comes from a recording; None reads the file.
+
+        Raises:
+            ScenarioError: the city has not what the scenario asks for.
+            CityError: the city cannot be built.
+        """
+        key = repr((scenario.city, scenario.city_sha256, scenario.parameters.fire))
+        bare = self._built.get(key)
+        if bare is None:
+            bare = self._built[key] = _build_bare_city(scenario, city_json=city_json)
+        return BuiltScenario(
+            scenario=scenario, city=bare.city, city_arrays=bare.arrays, placement=place(scenario, bare.plan)
+        )
+
+
+def build_scenario(scenario: Scenario, *, city_json: bytes | None = None) -> BuiltScenario:
+    """Build one scenario; arguments and errors as for `CityCache.build`."""
+    return CityCache().build(scenario, city_json=city_json)
+
+
+def _build_bare_city(scenario: Scenario, *, city_json: bytes | None) -> BareCity:
+    plan = scenario_plan(scenario, city_json=city_json)
+    fire = scenario.parameters.fire
+    city = build_city(plan, fire, seed=scenario.city.ray_seed)
+    return BareCity(plan=plan, city=city, arrays=city_arrays(city, fire))

@@ -1,0 +1,234 @@
+"""Turn a City and its parameters into the tables and constants that kernels work on."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fireworld.city.city import City
+from fireworld.kernels.arrays import (
+    Array,
+    BrigadeConstants,
+    BuildingArrays,
+    CityArrays,
+    Constants,
+    CoverArrays,
+    FireConstants,
+    GeometryArrays,
+    HealthConstants,
+    LinkArrays,
+    NearArrays,
+    ObservationConstants,
+    StreetArrays,
+)
+from fireworld.kernels.fire import STEFAN_BOLTZMANN
+from fireworld.parameters import BrigadeParameters, FireParameters, HealthParameters, Parameters
+
+CIVILIAN_LOW_M = 30.0
+CIVILIAN_MEDIUM_M = 80.0
+LANES = 4
+"""Air cells that the exchange handles at once; rows of cells are padded to a multiple of it."""
+BORDER = 1
+"""Empty rows and cells around the air grid."""
+
+
+def single(value: float) -> float:
+    """Round to single precision, as the official program keeps most of its parameters."""
+    return float(np.float32(value))
+
+
+def building_arrays(city: City, fire: FireParameters) -> BuildingArrays:
+    """Collect what the fire model needs of every building."""
+    return BuildingArrays(
+        building_id=city.footprints.building_id.astype(np.int64),
+        order=city.order.astype(np.uint32),
+        capacity=city.heat_capacity.astype(np.float64),
+        initial_fuel=city.initial_fuel.astype(np.float32),
+        ignition_point=city.ignition_point.astype(np.float64),
+        emission=city.wall_area_m2 * single(fire.radiation_coefficient) * STEFAN_BOLTZMANN,
+        inflammable=city.footprints.inflammable.astype(np.uint8),
+    )
+
+
+def cover_arrays(city: City, fire: FireParameters) -> CoverArrays:
+    """Lay each building's air cells out as a dense block, so that the exchange reads rows of cells in one go."""
+    air = city.air
+    starts, ends = air.ptr[:-1], air.ptr[1:]
+    west, south = np.minimum.reduceat(air.x, starts), np.minimum.reduceat(air.y, starts)
+    rows = np.maximum.reduceat(air.x, starts) - west + 1
+    width = (np.maximum.reduceat(air.y, starts) - south) // LANES * LANES + LANES
+    ptr = np.concatenate([[0], np.cumsum(rows * width)])
+    owner = np.repeat(np.arange(city.n_buildings), ends - starts)
+    weight = np.zeros(int(ptr[-1]))
+    place = ptr[owner] + (air.x - west[owner]) * width[owner] + (air.y - south[owner])
+    weight[place] = single(fire.air_to_building_flow) * (air.percent / 100.0) * air.cell_mm
+    return CoverArrays(
+        x0=(west + BORDER).astype(np.uint32),
+        y0=(south + BORDER).astype(np.uint32),
+        rows=rows.astype(np.uint32),
+        width=width.astype(np.uint32),
+        ptr=ptr[:-1].astype(np.uint32),
+        weight=weight,
+    )
+
+
+def geometry_arrays(city: City) -> GeometryArrays:
+    """Collect where the buildings are and how big they are."""
+    outline, starts = city.footprints.outline_mm.astype(np.float64), city.footprints.outline_ptr[:-1]
+    low, high = np.minimum.reduceat(outline, starts), np.maximum.reduceat(outline, starts)
+    x, y = city.footprints.centroid_mm.astype(np.float64).T.copy()
+    middle_x, middle_y = city.middle_mm
+    floor_area = city.footprints.ground_area_m2.astype(np.float64) * city.footprints.floors
+    return GeometryArrays(
+        x=x,
+        y=y,
+        west=low[:, 0].copy(),
+        south=low[:, 1].copy(),
+        east=high[:, 0].copy(),
+        north=high[:, 1].copy(),
+        center_square=(x - middle_x) ** 2 + (y - middle_y) ** 2,
+        volume=city.volume_m3.astype(np.float64),
+        floor_area=floor_area,
+    )
+
+
+def street_arrays(city: City) -> StreetArrays:
+    """Collect the street graph, with the streets at each node as CSR."""
+    streets = city.streets
+    first, second = streets.street[:, 0], streets.street[:, 1]
+    node = np.concatenate([first, second])
+    other = np.concatenate([second, first])
+    street = np.tile(np.arange(len(first)), 2)
+    arcs = np.lexsort((street, node))
+    n_nodes = len(streets.node_mm)
+    return StreetArrays(
+        node_x=streets.node_mm[:, 0].astype(np.float64),
+        node_y=streets.node_mm[:, 1].astype(np.float64),
+        first=first.astype(np.int32),
+        second=second.astype(np.int32),
+        length=streets.street_length_mm.astype(np.int64),
+        distance=streets.distance_mm.astype(np.int64),
+        next_node=streets.next_node.astype(np.int32),
+        arc_ptr=np.concatenate([[0], np.cumsum(np.bincount(node, minlength=n_nodes))]).astype(np.int32),
+        arc_node=other[arcs].astype(np.int32),
+        arc_street=street[arcs].astype(np.int32),
+        access_street=streets.access_street.astype(np.int32),
+        access_offset=streets.access_offset_mm.astype(np.int64),
+        refuge=np.flatnonzero(city.footprints.refuge).astype(np.int32),
+        hydrant_node=streets.hydrant_node.astype(np.int32),
+    )
+
+
+def city_arrays(city: City, fire: FireParameters) -> CityArrays:
+    """Build all tables of a city."""
+    return CityArrays(
+        buildings=building_arrays(city, fire),
+        cover=cover_arrays(city, fire),
+        links=link_arrays(city),
+        geometry=geometry_arrays(city),
+        near=NearArrays(ptr=city.near.ptr.astype(np.uint32), building=city.near.building.astype(np.uint32)),
+        streets=street_arrays(city),
+    )
+
+
+def link_arrays(city: City) -> LinkArrays:
+    """Collect the radiation links."""
+    return LinkArrays(
+        ptr=city.links.ptr.astype(np.uint32),
+        building=city.links.building.astype(np.uint32),
+        share=city.links.share.astype(np.float64),
+    )
+
+
+def fire_constants(fire: FireParameters) -> FireConstants:
+    """Round the fire model's scalars as the official program does (single precision, and products of such)."""
+    cell = np.float32(fire.air_heat_capacity) * np.float32(fire.air_cell_mm)
+    return FireConstants(
+        burn_rate_mean=float(fire.burn_rate_mean),
+        burn_rate_sd=float(fire.burn_rate_sd),
+        air_to_air_flow=single(fire.air_to_air_flow),
+        air_heat_kept=single(fire.air_heat_kept),
+        cell_share=1.0 / float(cell),
+        water_heat_burning=single(fire.water_heat_per_litre),
+        water_heat_unburnt=float(np.float32(fire.water_heat_per_litre) * np.float32(fire.water_unburnt_share)),
+        flush_temperature=float(fire.flush_temperature),
+    )
+
+
+def health_constants(health: HealthParameters) -> HealthConstants:
+    """Turn the three probabilities into the bounds of one uniform draw."""
+    slight = health.slight_probability
+    serious = slight + health.serious_probability
+    return HealthConstants(
+        slight_damage=float(health.slight_damage),
+        slight_below=slight,
+        serious_damage=float(health.serious_damage),
+        serious_below=serious,
+        critical_damage=float(health.critical_damage),
+        critical_below=serious + health.critical_probability,
+        growth=float(health.growth),
+        constant=float(health.constant),
+        noise_mean=float(health.noise_mean),
+        noise_sd=float(health.noise_sd),
+        brigade_share=float(health.brigade_share),
+    )
+
+
+def brigade_constants(brigades: BrigadeParameters) -> BrigadeConstants:
+    """Turn metres into millimetres."""
+    range_mm = round(brigades.range_m * 1000.0)  # whole, so that a brigade exactly at its range may spray
+    return BrigadeConstants(
+        tank=brigades.tank_litres,
+        power=brigades.power_litres,
+        refuge_refill=brigades.refuge_refill_litres,
+        hydrant_refill=brigades.hydrant_refill_litres,
+        range_square=float(range_mm * range_mm),
+        speed=round(brigades.speed_m * 1000.0),
+    )
+
+
+def observation_constants(city: City, unit_volume_m3: float | None, *, in_turn: bool) -> ObservationConstants:
+    """Derive the thresholds of the features: thirds of the half diagonal, 30 and 80 m, the unit volume."""
+    third = city.half_diagonal_mm / 3.0
+    mean_volume = math.fsum(city.volume_m3.tolist()) / city.n_buildings
+    low, medium = CIVILIAN_LOW_M * 1000.0, CIVILIAN_MEDIUM_M * 1000.0
+    return ObservationConstants(
+        center_low_square=third * third,
+        center_medium_square=4.0 * third * third,
+        civilian_low_square=low * low,
+        civilian_medium_square=medium * medium,
+        unit_volume=float(unit_volume_m3) if unit_volume_m3 is not None else 2.0 * mean_volume,
+        in_turn=in_turn,
+    )
+
+
+def world_constants(
+    city: City,
+    parameters: Parameters,
+    *,
+    reward_change: bool = False,
+    unit_volume_m3: float | None = None,
+    in_turn: bool = True,
+) -> Constants:
+    """Collect all scalars of a world."""
+    return Constants(
+        fire=fire_constants(parameters.fire),
+        health=health_constants(parameters.health),
+        brigades=brigade_constants(parameters.brigades),
+        observation=observation_constants(city, unit_volume_m3, in_turn=in_turn),
+        reward_change=reward_change,
+    )
+
+
+def air_shape(city: City) -> tuple[int, int]:
+    """Return rows and pitch of the padded air array."""
+    nx, ny = city.air.shape
+    return nx + 2 * BORDER, ny + 2 * BORDER + LANES - 1
+
+
+def air_inside(city: City, air: Array) -> Array:
+    """Return the (nx, ny) air cells without border and padding."""
+    nx, ny = city.air.shape
+    inside: Array = air[BORDER : BORDER + nx, BORDER : BORDER + ny]
+    return inside

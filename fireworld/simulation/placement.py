@@ -1,0 +1,234 @@
+"""From a scenario to its city plan, and who and what is where in it at the start.
+
+The data flows one way: a scenario is read (fireworld.scenario), its plan made or loaded here, fires, people and
+brigades placed in the plan here, and the plan built into a City (fireworld.city.build).
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, NoReturn
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from fireworld import draws
+from fireworld.city.city import Int32Array, Int64Array, Plan
+from fireworld.city.generator import generate_plan
+from fireworld.city.plan_file import parse_plan
+from fireworld.errors import CityError, ScenarioError, expected
+from fireworld.scenario.document import Civilians, Direction, Fire, Point
+from fireworld.scenario.scenario import Scenario, read_city_file
+
+SCENARIO_ATTACHMENT: Final = "scenario.yaml"
+CITY_ATTACHMENT: Final = "city.json"
+BoolArray = NDArray[np.bool_]
+UNKNOWN_SHOWN_MAX: Final = 5
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Who and what is where at the start; buildings by index, read-only."""
+
+    ignited: Int32Array  # (k,) buildings that burn, rising
+    civilian_building: Int32Array  # (c,) building each civilian is in
+    civilian_mm: Int32Array  # (c, 2) where in it: its centroid
+    brigade_refuge: Int32Array  # (b,) refuge building where each brigade starts
+
+
+def scenario_plan(scenario: Scenario, *, city_json: bytes | None = None) -> Plan:
+    """Make or load the plan of a scenario's city.
+
+    Args:
+        scenario: the scenario.
+        city_json: content of the city file, where it comes from a recording; None reads the file.
+
+    Raises:
+        ScenarioError: figures that make no city, or another city file than the scenario names.
+        CityError: a city file that makes no city.
+    """
+    generated = scenario.city.generated
+    if generated is None:
+        file = Path(scenario.city.file or "")
+        text = _check_city_file(scenario, city_json if city_json is not None else read_city_file(scenario))
+        return parse_plan(text, where=file.name if city_json is not None else str(file), name=file.stem)
+    name = f"generated-{generated.columns}x{generated.rows}-{generated.seed}"
+    try:
+        return generate_plan(name=name, **msgspec.structs.asdict(generated))
+    except CityError as error:
+        raise ScenarioError(f"{scenario.source}: city.generated: {error}") from None
+
+
+def attachments(scenario: Scenario) -> dict[str, bytes]:
+    """Return the files that a recording of the scenario carries, by name: all that a replay needs of it.
+
+    `parse_scenario` reads "scenario.yaml" back, and `scenario_plan` takes "city.json", there if the city is a file's.
+    """
+    files = {SCENARIO_ATTACHMENT: scenario.to_yaml().encode()}
+    if scenario.city.file is not None:
+        files[CITY_ATTACHMENT] = _check_city_file(scenario, read_city_file(scenario))
+    return files
+
+
+def place(scenario: Scenario, plan: Plan) -> Placement:
+    """Place a scenario's fires, civilians and brigades in its city.
+
+    Raises:
+        ScenarioError: the city has not the buildings, places or refuges that the scenario asks for.
+    """
+    ignited: list[int] = []
+    for index, fire in enumerate(scenario.fires):
+        ignited += _ignite(scenario, plan, fire, key=f"fires.{index}", taken=ignited)
+    ignited.sort()
+    civilian_building = _place_civilians(scenario, plan, ignited=ignited)
+    refuges = [int(building) for building in np.flatnonzero(plan.footprints.refuge)]
+    if not refuges:
+        _refuse(scenario, "city", "a city with a refuge, where brigades start and fill their tanks", "none of them")
+    return Placement(
+        ignited=_read_only(ignited),
+        civilian_building=_read_only(civilian_building),
+        civilian_mm=_frozen(plan.footprints.centroid_mm[civilian_building]),
+        brigade_refuge=_read_only([refuges[brigade % len(refuges)] for brigade in range(scenario.brigades.n)]),
+    )
+
+
+def _check_city_file(scenario: Scenario, text: bytes) -> bytes:
+    """Return the content of a city file if it is the one that the scenario was loaded with."""
+    digest = hashlib.sha256(text).hexdigest()
+    if digest != scenario.city_sha256:
+        _refuse(scenario, "city.file", f"a city file of SHA-256 {scenario.city_sha256}", f"one of {digest}")
+    return text
+
+
+def _ignite(scenario: Scenario, plan: Plan, fire: Fire, *, key: str, taken: list[int]) -> list[int]:
+    """Return the buildings that one fire sets alight, besides those that another fire has taken."""
+    if fire.at is None:
+        return _ignite_named(scenario, plan, fire, key=f"{key}.buildings", taken=taken)
+    inflammable = plan.footprints.inflammable != 0
+    inflammable[taken] = False
+    free = np.flatnonzero(inflammable)
+    n_buildings = fire.n_buildings or 1
+    if n_buildings > len(free):
+        _refuse(scenario, f"{key}.n_buildings", f"at most {len(free)}, the city's inflammable buildings", n_buildings)
+    x_mm, y_mm = _locate(plan, fire.at)
+    offset = plan.footprints.centroid_mm[free].astype(np.int64) - (x_mm, y_mm)
+    nearest = np.argsort((offset * offset).sum(axis=1), kind="stable")[:n_buildings]
+    return [int(building) for building in free[nearest]]
+
+
+def _ignite_named(scenario: Scenario, plan: Plan, fire: Fire, *, key: str, taken: list[int]) -> list[int]:
+    """Return the buildings that a fire names, if they can burn and no other fire has taken them."""
+    buildings = _find_buildings(scenario, plan, fire.buildings or (), key=key)
+    for building in buildings:
+        building_id = plan.footprints.building_id[building]
+        if not plan.footprints.inflammable[building]:
+            _refuse(scenario, key, "inflammable buildings", f"building {building_id}, which cannot burn")
+        if building in taken:
+            _refuse(scenario, key, "buildings that no other fire takes", f"building {building_id}")
+    return buildings
+
+
+def _place_civilians(scenario: Scenario, plan: Plan, *, ignited: list[int]) -> list[int]:
+    """Return the building of each civilian."""
+    civilians = scenario.civilians
+    if civilians.buildings is not None:
+        return _find_buildings(scenario, plan, civilians.buildings, key="civilians.buildings")
+    n_civilians = civilians.n or 0
+    if n_civilians == 0:
+        return []
+    places = _civilian_places(civilians, plan, ignited=ignited, center_mm=_center_of_people(scenario, plan))
+    chosen: list[int] = []
+    turn = 0
+    while len(chosen) < n_civilians and any(places):
+        queue = places[turn % len(places)]
+        turn += 1
+        while queue and queue[0] in chosen:
+            del queue[0]
+        chosen += queue[:1]
+    if len(chosen) < n_civilians:
+        wanted = f"at most {len(chosen)}, the unburnt inflammable buildings of that distance and direction"
+        _refuse(scenario, "civilians.n", wanted, n_civilians, hint="try a greater to_m")
+    return chosen
+
+
+def _civilian_places(
+    civilians: Civilians, plan: Plan, *, ignited: list[int], center_mm: tuple[int, int]
+) -> list[list[int]]:
+    """Return, for each direction, the buildings where a civilian may be, in the order of their draws."""
+    eligible = plan.footprints.inflammable != 0
+    eligible[ignited] = False
+    offset = plan.footprints.centroid_mm.astype(np.int64) - center_mm
+    square = (offset * offset).sum(axis=1)
+    eligible &= square >= _to_mm(civilians.from_m) ** 2
+    if civilians.to_m is not None:
+        eligible &= square <= _to_mm(civilians.to_m) ** 2
+
+    def draw(building: int) -> int:
+        return draws.hash_key(civilians.seed, draws.PLACEMENT, int(plan.footprints.building_id[building]), 0)
+
+    return [
+        sorted((int(building) for building in np.flatnonzero(eligible & _lies(offset, direction))), key=draw)
+        for direction in civilians.directions
+    ]
+
+
+def _lies(offset: Int64Array, direction: Direction) -> BoolArray:
+    """Tell which offsets, (n, 2), point into the quarter around a direction; diagonals belong to both."""
+    east, north = offset[:, 0], offset[:, 1]
+    ahead, aside = {"N": (north, east), "E": (east, north), "S": (-north, east), "W": (-east, north)}[direction]
+    quarter: BoolArray = ahead >= np.abs(aside)
+    return quarter
+
+
+def _center_of_people(scenario: Scenario, plan: Plan) -> tuple[int, int]:
+    """Return the point around which civilians are placed: as said, or the centre of the first fire."""
+    fire, around = scenario.fires[0], scenario.civilians.around
+    if around is not None:
+        return _locate(plan, around)
+    if fire.at is not None:
+        return _locate(plan, fire.at)
+    buildings = _find_buildings(scenario, plan, fire.buildings or (), key="fires.0.buildings")
+    x_mm, y_mm = plan.footprints.centroid_mm[buildings].astype(np.int64).sum(axis=0)
+    return int(x_mm) // len(buildings), int(y_mm) // len(buildings)
+
+
+def _find_buildings(scenario: Scenario, plan: Plan, building_ids: Sequence[int], *, key: str) -> list[int]:
+    """Return the indices of buildings by their ids."""
+    index = {int(building_id): position for position, building_id in enumerate(plan.footprints.building_id)}
+    unknown = [building_id for building_id in building_ids if building_id not in index]
+    if unknown:
+        shown = ", ".join(str(building_id) for building_id in unknown[:UNKNOWN_SHOWN_MAX])
+        _refuse(scenario, key, f"ids of buildings of {plan.name}", f"unknown ids: {shown}")
+    return [index[building_id] for building_id in building_ids]
+
+
+def _locate(plan: Plan, point: Point) -> tuple[int, int]:
+    """Turn fractions of the city's bounding box into a place in whole millimetres."""
+    low, high = plan.footprints.outline_mm.min(axis=0), plan.footprints.outline_mm.max(axis=0)
+    x_mm, y_mm = (int(low[axis]) + int(point[axis] * (int(high[axis]) - int(low[axis]))) for axis in (0, 1))
+    return x_mm, y_mm
+
+
+def _to_mm(length_m: float) -> int:
+    """Turn metres into whole millimetres."""
+    return round(length_m * 1000)
+
+
+def _read_only(buildings: list[int]) -> Int32Array:
+    """Turn indices into an array that no one changes."""
+    return _frozen(np.array(buildings, dtype=np.int32))
+
+
+def _frozen(array: Int32Array) -> Int32Array:
+    """Make an array read-only."""
+    array.setflags(write=False)
+    return array
+
+
+def _refuse(scenario: Scenario, key: str, wanted: str, got: object, hint: str = "") -> NoReturn:
+    """Raise the error for a scenario that does not fit its city."""
+    raise ScenarioError(expected(scenario.source, key, wanted, got, hint))

@@ -1,0 +1,210 @@
+"""WorldState: made fresh, copied, taken as a snapshot and put back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from fireworld.city.city import City
+from fireworld.errors import LogError
+from fireworld.kernels.arrays import (
+    Array,
+    BrigadeState,
+    CivilianState,
+    FireState,
+    Learner,
+    Outcome,
+    SiteState,
+    WorldState,
+)
+from fireworld.parameters import Parameters
+from fireworld.simulation.city_arrays import air_shape
+
+SCRATCH = {"fire.span", "fire.rate", "fire.emitted", "fire.scratch"} | {
+    f"sites.{name}" for name in SiteState._fields if name not in {"counts", "label"}
+}
+"""Arrays that no snapshot holds: what a step needs of them, it computes, or `restore_snapshot` makes it anew."""
+
+
+def warm_spans(warm: Array, shape: tuple[int, ...]) -> Array:
+    """Return the spans of the rows of an air array of which only a box may differ from zero; see `FireState`."""
+    rows, pitch = shape
+    span = np.zeros((2, rows), dtype=np.uint64)
+    span[0] = pitch  # a row that is cold: its span starts behind its end
+    span[:, warm[0] : warm[1]] = warm[2:, None]
+    return span
+
+
+def fresh_fire(city: City) -> FireState:
+    """Return the fire state of a cold, untouched city."""
+    n = city.n_buildings
+    rows, pitch = air_shape(city)
+    warm = np.zeros(4, dtype=np.int64)
+    return FireState(
+        energy=np.zeros(n),
+        fuel=city.initial_fuel.astype(np.float32),
+        water=np.zeros(n, dtype=np.int32),
+        watered=np.zeros(n, dtype=np.uint8),
+        fieryness=np.zeros(n, dtype=np.uint8),
+        air=np.zeros((rows, pitch)),
+        warm=warm,
+        span=warm_spans(warm, (rows, pitch)),
+        rate=np.zeros(n),
+        emitted=np.zeros(n),
+        scratch=np.zeros((2, pitch)),
+    )
+
+
+def fresh_civilians(buildings: Array, positions_mm: Array, hp: int) -> CivilianState:
+    """Return healthy civilians. buildings: (c,) index or -1; positions_mm: (c, 2)."""
+    c = len(buildings)
+    positions = np.asarray(positions_mm, dtype=np.float64).reshape(c, 2)
+    return CivilianState(
+        building=np.array(buildings, dtype=np.int32),
+        x=positions[:, 0].copy(),
+        y=positions[:, 1].copy(),
+        full_hp=np.full(c, hp, dtype=np.int32),
+        hp=np.full(c, hp, dtype=np.int32),
+        damage=np.zeros(c),
+    )
+
+
+def fresh_brigades(city: City, refuges: Array, tank_litres: int, hp: int) -> BrigadeState:
+    """Return healthy brigades with full tanks, each at the entrance of its refuge. refuges: (b,) building index."""
+    refuges = np.asarray(refuges, dtype=np.int64)
+    b = len(refuges)
+    access = city.streets.access_mm[refuges].astype(np.float64)
+    return BrigadeState(
+        street=city.streets.access_street[refuges].astype(np.int32),
+        offset=city.streets.access_offset_mm[refuges].astype(np.int64),
+        x=access[:, 0].copy(),
+        y=access[:, 1].copy(),
+        tank=np.full(b, tank_litres, dtype=np.int32),
+        refilling=np.zeros(b, dtype=np.uint8),
+        action=np.full(b, -1, dtype=np.int32),
+        target=np.full(b, -1, dtype=np.int32),
+        site=np.zeros(b, dtype=np.int32),
+        activity=np.zeros(b, dtype=np.uint8),
+        refuge=np.full(b, -1, dtype=np.int32),
+        hydrant=np.full(b, -1, dtype=np.int32),
+        inside=np.full(b, -1, dtype=np.int32),
+        sprayed=np.zeros(b, dtype=np.int32),
+        driven=np.zeros(b, dtype=np.int64),
+        hp=np.full(b, hp, dtype=np.int32),
+        damage=np.zeros(b),
+    )
+
+
+def fresh_sites(n: int) -> SiteState:
+    """Return the site state of a city of n buildings in which nothing burns."""
+    return SiteState(
+        counts=np.zeros(3, dtype=np.int32),
+        label=np.zeros(n, dtype=np.int32),
+        place=np.full(n, -1, dtype=np.int32),
+        member=np.zeros(n, dtype=np.uint32),
+        start=np.zeros(n + 1, dtype=np.int32),
+        number=np.zeros(n, dtype=np.int32),
+        volume=np.zeros(n),
+        west=np.zeros(n),
+        south=np.zeros(n),
+        east=np.zeros(n),
+        north=np.zeros(n),
+        center_square=np.zeros(n),
+        civilian_square=np.zeros(n),
+        free_sides=np.zeros(n, dtype=np.uint8),
+        building_civilian_square=np.zeros(n),
+    )
+
+
+def fresh_outcome() -> Outcome:
+    """Return an outcome of which nothing is known yet."""
+    return Outcome(
+        reward=np.zeros(6),
+        stock=np.zeros(4),
+        score=np.zeros(3),
+        counts=np.zeros(4, dtype=np.int32),
+        water=np.zeros(1),
+        draws=np.zeros(2),
+    )
+
+
+def fresh_learner(
+    tables: Array, n_brigades: int, *, rule: int = 0, alpha: float = 0.7, alpha_decay: float = 0.0, gamma: float = 0.5
+) -> Learner:
+    """Return the memory of a team that learns into `tables`, (tables, states, 4); the rates are the paper's."""
+    return Learner(
+        learning=np.ones(1, dtype=np.uint8),
+        rule=np.array([rule], dtype=np.int64),
+        alpha=np.array([alpha]),
+        alpha_decay=np.array([alpha_decay]),
+        gamma=np.array([gamma]),
+        tables=tables,
+        visits=np.zeros(tables.shape, dtype=np.int64),
+        state=np.full(n_brigades, -1, dtype=np.int64),
+        action=np.zeros(n_brigades, dtype=np.int64),
+        reward=np.zeros(n_brigades),
+        discount=np.ones(n_brigades),
+        td_error=np.zeros(n_brigades),
+    )
+
+
+NO_LEARNER: Final = fresh_learner(np.zeros((1, 1, 4)), 0)._replace(learning=np.zeros(1, dtype=np.uint8))
+"""Of a team that learns nothing."""
+
+
+def fresh_world(
+    city: City, parameters: Parameters, *, civilian_building: Array, civilian_mm: Array, brigade_refuge: Array
+) -> WorldState:
+    """Return the state before anything burns."""
+    hp = parameters.health.initial_hp
+    return WorldState(
+        fire=fresh_fire(city),
+        civilians=fresh_civilians(civilian_building, civilian_mm, hp),
+        brigades=fresh_brigades(city, brigade_refuge, parameters.brigades.tank_litres, hp),
+        sites=fresh_sites(city.n_buildings),
+        outcome=fresh_outcome(),
+    )
+
+
+def named_arrays(world: WorldState) -> Iterator[tuple[str, Array]]:
+    """Yield every array with its name, `group.field`."""
+    groups: tuple[Any, ...] = world
+    for group_name, group in zip(world._fields, groups, strict=True):
+        for name, array in zip(group._fields, group, strict=True):
+            yield f"{group_name}.{name}", array
+
+
+def copy_world(world: WorldState) -> WorldState:
+    """Copy all arrays."""
+    groups: list[Any] = [type(group)(*(array.copy() for array in group)) for group in world]
+    return WorldState(*groups)
+
+
+def copy_into(world: WorldState, source: WorldState) -> None:
+    """Overwrite one world's arrays with another's of the same shapes."""
+    for (_, array), (_, other) in zip(named_arrays(world), named_arrays(source), strict=True):
+        array[...] = other
+
+
+def take_snapshot(world: WorldState) -> dict[str, Array]:
+    """Copy everything that replay needs to go on from here."""
+    return {name: array.copy() for name, array in named_arrays(world) if name not in SCRATCH}
+
+
+def restore_snapshot(world: WorldState, snapshot: Mapping[str, Array]) -> None:
+    """Put a snapshot back into a world of the same city and team.
+
+    Raises:
+        LogError: an array is missing or of another shape or type.
+    """
+    for name, array in named_arrays(world):
+        if name in SCRATCH:
+            continue
+        held = snapshot.get(name)
+        if held is None or held.shape != array.shape or held.dtype != array.dtype:
+            found = "nothing" if held is None else f"{held.dtype} {held.shape}"
+            raise LogError(f"snapshot: {name}: expected {array.dtype} {array.shape}, got {found}")
+        array[...] = held
+    world.fire.span[...] = warm_spans(world.fire.warm, world.fire.air.shape)

@@ -1,0 +1,69 @@
+"""The chained hash of a run: every commit seals the steps before it, and the last hash is the run's identity."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Final
+
+from fireworld.records import FORMAT, STEP_TOPICS, CityRecord, Snapshot, StepRecord
+from fireworld_recorder.codec import Buffer, encode
+from fireworld_recorder.schema import Commit
+
+UNCHAINED: Final = frozenset({Snapshot.topic, Commit.topic})
+"""Topics whose messages `Chain.add` does not take: derived state, and the commit itself."""
+SCENE_PREFIX: Final = "/scene/"
+"""What the topics begin with that show a step to other tools: derived from it, not chained, any number in a step."""
+
+_PARTS: Final = [(topic.topic, topic.topic[1:]) for topic in STEP_TOPICS]
+
+
+class Chain:
+    """Hashes of a run as its messages come by.
+
+    h_0 = sha256(format name, /city); h_t = sha256(h_(t-1), then topic, zero byte, length as 8 little-endian bytes
+    and bytes of every message of step t but /snapshot and /scene/..., and at last of its /commit without the hash).
+    """
+
+    def __init__(self, city: Buffer) -> None:
+        self.hash = hashlib.sha256(FORMAT.encode() + bytes(city)).digest()
+        self._parts: list[Buffer] = []  # of the step under way: one long call of the hash beats many short ones
+
+    def add(self, topic: str, data: Buffer) -> None:
+        """Take in a message of the step under way; those of UNCHAINED topics and of the scene are left out."""
+        if topic not in UNCHAINED and not topic.startswith(SCENE_PREFIX):
+            self._update(topic, data)
+
+    def commit(self, *, step: int, terminated: bool, truncated: bool) -> Commit:
+        """Seal the step under way and return its commit."""
+        open_commit = Commit(step=step, terminated=terminated, truncated=truncated, hash=b"")
+        self._update(Commit.topic, encode(open_commit))
+        self.hash = hashlib.sha256(b"".join((self.hash, *self._parts))).digest()
+        self._parts.clear()
+        return Commit(step=step, terminated=terminated, truncated=truncated, hash=self.hash)
+
+    def _update(self, topic: str, data: Buffer) -> None:
+        self._parts += (topic.encode(), b"\0", len(data).to_bytes(8, "little"), data)
+
+
+def step_messages(record: StepRecord) -> list[tuple[str, bytes]]:
+    """Encode the topics of a step in the order in which things happen, without snapshot and commit."""
+    parts = vars(record)
+    return [(topic, encode(parts[name])) for topic, name in _PARTS]
+
+
+class Digest:
+    """The digest of a run that is not written to a file: the same as its log would have."""
+
+    def __init__(self, city: CityRecord) -> None:
+        self._chain = Chain(encode(city))
+
+    def add(self, record: StepRecord) -> None:
+        """Take in the next step."""
+        for topic, data in step_messages(record):
+            self._chain.add(topic, data)
+        self._chain.commit(step=record.step, terminated=record.terminated, truncated=record.truncated)
+
+    @property
+    def digest(self) -> str:
+        """The digest of the run so far, 64 hexadecimal digits."""
+        return self._chain.hash.hex()

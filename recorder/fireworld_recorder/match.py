@@ -1,0 +1,118 @@
+"""Decide whether two values are the same, and by which rules: tolerances and fields to ignore."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from fireworld.errors import LogError, expected
+from fireworld.records import STEP_TOPICS, Array, CityRecord, Snapshot
+from fireworld_recorder.schema import Commit, Field, message_of
+
+_TYPES: Final[tuple[type[Any], ...]] = (CityRecord, *STEP_TOPICS)
+_FIELDS: Final = {topic.topic: message_of(topic).fields for topic in _TYPES}
+_ENDINGS: Final = tuple(item for item in message_of(Commit).fields if item.wire == "bool")
+"""How a run ended: the fields of /commit that are no number of a step and no hash."""
+
+
+class Spot(NamedTuple):
+    """Where two values of one field differ."""
+
+    position: int | None  # in the array; None for a single value, and for arrays of different lengths
+    a: Any
+    b: Any
+    lengths: bool = False  # a and b are the lengths of two arrays
+    unequal: Array | None = None  # (length,) where the arrays differ; None for a single value, and for other lengths
+
+
+class Rules:
+    """Which fields are compared, and how exactly.
+
+    Args:
+        tolerances: by `topic.field` or `field`: the largest difference that counts as none.
+        ignore: topics, `topic.field`s or `field`s to leave out. A topic may begin with a slash.
+
+    Raises:
+        LogError: a name is not a field, or a tolerance is not a number >= 0.
+    """
+
+    def __init__(self, tolerances: Mapping[str, float], ignore: Collection[str]) -> None:
+        tolerances = {name.removeprefix("/"): tolerance for name, tolerance in tolerances.items()}
+        ignore = {name.removeprefix("/") for name in ignore}
+        for name, tolerance in tolerances.items():
+            check_field_name("tolerance", name)
+            if not (math.isfinite(tolerance) and tolerance >= 0):
+                raise LogError(expected("tolerance", name, "a number >= 0", tolerance))
+        for name in sorted(ignore):
+            check_field_name("ignore", name, topics=True)
+        # Snapshots hold what the topics hold, and more: what is let pass there would have to pass here too.
+        self.snapshots = not tolerances and not ignore
+        self.endings = [
+            item for item in _ENDINGS if {Commit.topic[1:], item.name, _full(Commit.topic, item)}.isdisjoint(ignore)
+        ]
+        self.fields: dict[str, list[tuple[Field, float]]] = {}
+        for topic, items in _FIELDS.items():
+            self.fields[topic] = [
+                (item, tolerances.get(_full(topic, item), tolerances.get(item.name, 0.0)))
+                for item in items
+                if {topic[1:], item.name, _full(topic, item)}.isdisjoint(ignore)
+            ]
+
+
+def check_field_name(where: str, name: str, *, topics: bool = False) -> None:
+    """Refuse a name that is not a field (or, with `topics`, a topic).
+
+    Raises:
+        LogError: with the nearest names.
+    """
+    fields = {**_FIELDS, Commit.topic: _ENDINGS} if topics else _FIELDS
+    known = {_full(topic, item) for topic, items in fields.items() for item in items}
+    known |= {item.name for items in fields.values() for item in items}
+    if topics:
+        known |= {topic[1:] for topic in (*fields, Snapshot.topic)}
+    if name.removeprefix("/") not in known:
+        import difflib
+
+        near = difflib.get_close_matches(name, sorted(known), n=3)
+        hint = f"try {', '.join(near)}" if near else "`fireworld info LOG --schema` lists them"
+        raise LogError(expected(where, "", "a field of the log", name, hint))
+
+
+def find(item: Field, a: Any, b: Any, tolerance: float = 0.0) -> Spot | None:
+    """Find the first place where two values of a field differ; None if they are the same."""
+    if not item.repeated:
+        return None if _values_equal(a, b, tolerance) else Spot(None, a, b)
+    if len(a) != len(b):
+        return Spot(None, len(a), len(b), lengths=True)
+    unequal = unequal_entries(a, b, tolerance)
+    if unequal is None:
+        return None
+    index = int(np.argmax(unequal))
+    return Spot(index, a[index].item(), b[index].item(), unequal=unequal)
+
+
+def unequal_entries(a: Array, b: Array, tolerance: float = 0.0) -> Array | None:
+    """Return at which entries two arrays of one length differ, (length,) bool; None if they are the same.
+
+    NaN equals NaN, -0.0 equals 0.0, and an infinity only itself, whatever the tolerance.
+    """
+    if a.tobytes() == b.tobytes():
+        return None
+    unequal: Array = (a != b) & ~((a != a) & (b != b))  # noqa: PLR0124  # only NaN differs from itself
+    if tolerance:
+        with np.errstate(invalid="ignore", over="ignore"):
+            unequal &= ~(np.abs(a.astype(np.float64) - b.astype(np.float64)) <= tolerance)
+    return unequal if unequal.any() else None
+
+
+def _values_equal(a: Any, b: Any, tolerance: float) -> bool:
+    if a == b or (a != a and b != b):  # noqa: PLR0124  # only NaN differs from itself
+        return True
+    return bool(tolerance) and not isinstance(a, str) and abs(a - b) <= tolerance
+
+
+def _full(topic: str, item: Field) -> str:
+    return f"{topic[1:]}.{item.name}"

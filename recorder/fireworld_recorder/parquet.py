@@ -1,0 +1,215 @@
+"""A recording as Parquet files, one for each table, for pandas, polars, DuckDB and the like."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any, Final, Self
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from fireworld.errors import LogError, OutputError, expected
+from fireworld.records import Array, StepRecord
+from fireworld_recorder.header import to_metadata
+from fireworld_recorder.reader import Log
+from fireworld_recorder.tables import TABLES, Column, Table
+
+SUFFIX: Final = ".parquet"
+ROWS_PER_GROUP: Final = 1 << 17
+"""Rows of a table that are held in memory before they are written."""
+
+
+def export(
+    log: Log,
+    folder: Path,
+    *,
+    tables: Collection[str] = tuple(TABLES),
+    force: bool = False,
+    rows_per_group: int = ROWS_PER_GROUP,
+    on_step: Callable[[StepRecord], object] = lambda _: None,
+) -> dict[str, int]:
+    """Write the committed steps of a log as a folder of Parquet files, which is there only once it is complete.
+
+    Args:
+        log: the recording, complete or not; every file says which, as `fireworld.state`.
+        folder: the folder to make.
+        tables: names of the tables to write.
+        force: replace an earlier export.
+        rows_per_group: rows of a table that are held in memory before they are written.
+        on_step: called after each step.
+
+    Returns:
+        Rows by table.
+
+    Raises:
+        LogError: the log changed since it was opened, or a step in it makes no sense.
+        OutputError: the folder exists, or cannot be written.
+    """
+    metadata = _metadata(log)
+    with _new_folder(folder, force=force) as scratch, ExitStack() as stack:
+        writers = {
+            name: stack.enter_context(_TableWriter(TABLES[name], scratch, metadata, rows_per_group))
+            for name in TABLES
+            if name in tables
+        }
+        try:
+            if "city" in writers:
+                writers["city"].add(log.city)
+            by_step = [writer for name, writer in writers.items() if name != "city"]
+            for record in log if by_step else ():
+                for writer in by_step:
+                    writer.add(record)
+                on_step(record)
+        except LogError as error:
+            name = str(log.path)
+            raise error if str(error).startswith(name) else LogError(f"{name}: {error}") from None
+        for writer in writers.values():
+            writer.flush()
+    return {name: writer.n_rows for name, writer in writers.items()}
+
+
+def _metadata(log: Log) -> dict[str, str]:
+    """Collect what every file says of its run: the header, how far the log is good, the digest."""
+    header = {key: text for key, text in to_metadata(log.header).items() if ":" not in key and key != "checksum"}
+    facts = {"digest": log.digest, "state": log.state, "damage": log.damage or "", "n_steps": str(len(log))}
+    return {f"fireworld.{key}": text for key, text in sorted({**header, **facts}.items())}
+
+
+class _TableWriter:
+    """Writes one table, a group of rows after the other."""
+
+    def __init__(self, table: Table, folder: Path, metadata: Mapping[str, str], rows_per_group: int) -> None:
+        self.n_rows = 0
+        self._table = table
+        self._rows_per_group = rows_per_group
+        self._held: list[list[Array | None]] = []
+        self._n_held = 0
+        self._schema = schema_of(table, metadata)
+        self._writer = pq.ParquetWriter(folder / f"{table.name}{SUFFIX}", self._schema, compression="zstd")
+
+    def add(self, record: Any) -> None:
+        """Take in the rows of a step, or of the city."""
+        values = self._table.read(record)
+        n_rows = next(len(value) for value in values if value is not None)
+        if n_rows:
+            self._held.append(values)
+            self._n_held += n_rows
+        if self._n_held >= self._rows_per_group:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write the rows that are held."""
+        if not self._n_held:
+            return
+        lengths = [next(len(value) for value in values if value is not None) for values in self._held]
+        arrays = [
+            _arrow(column, [values[k] for values in self._held], lengths)
+            for k, column in enumerate(self._table.columns)
+        ]
+        self._writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema), row_group_size=self._n_held)
+        self.n_rows += self._n_held
+        self._held, self._n_held = [], 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._writer.close()
+
+
+def schema_of(table: Table, metadata: Mapping[str, str]) -> Any:
+    """Return the Arrow schema of a table: units and meanings as field metadata, the run as the file's.
+
+    Units are given once more for the whole file, since few readers show the metadata of a field.
+    """
+    fields = []
+    for column in table.columns:
+        facts = {"doc": column.doc} | ({"unit": column.unit} if column.unit else {})
+        fields.append(pa.field(column.name, _arrow_type(column), metadata=facts))
+    units = {column.name: column.unit for column in table.columns if column.unit}
+    facts = {"fireworld.table": table.doc, "fireworld.units": json.dumps(units)}
+    return pa.schema(fields, metadata={**metadata, **facts})
+
+
+def _arrow_type(column: Column) -> Any:
+    return pa.dictionary(pa.int8(), pa.string()) if column.names else pa.from_numpy_dtype(np.dtype(column.dtype))
+
+
+def _arrow(column: Column, parts: list[Array | None], lengths: list[int]) -> Any:
+    """Join the values of several steps; where there are none stand nulls."""
+    values = np.concatenate(
+        [np.zeros(n, column.dtype if not column.names else "<i4") if part is None else part
+         for part, n in zip(parts, lengths, strict=True)]
+    )  # fmt: skip
+    missing = np.repeat([part is None for part in parts], lengths)
+    if not column.names:
+        return pa.array(values, _arrow_type(column), mask=missing if missing.any() else None)
+    nameless = missing | (values < 0) | (values >= len(column.names))
+    return pa.DictionaryArray.from_arrays(
+        pa.array(np.where(nameless, 0, values).astype(np.int8), mask=nameless), pa.array(column.names)
+    )
+
+
+@contextmanager
+def _new_folder(folder: Path, *, force: bool) -> Iterator[Path]:
+    """Make a folder beside its place, and move it there when all is in it; nothing is left of it if that fails.
+
+    Raises:
+        OutputError: something is in its place, or it cannot be made.
+    """
+    scratch, replaced = (folder.with_name(folder.name + suffix) for suffix in (".partial", ".replaced"))
+    with _output_errors(folder):
+        for path in (folder, scratch, replaced):
+            _refuse_foreign(path, force=force or path != folder)
+        for path in (scratch, replaced):
+            shutil.rmtree(path, ignore_errors=True)
+        scratch.mkdir()
+    try:
+        with _output_errors(folder):
+            yield scratch
+            _swap(scratch, folder, replaced)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+
+
+def _swap(scratch: Path, folder: Path, replaced: Path) -> None:
+    """Put a new folder into its place; the old one stays if that fails."""
+    try:
+        if folder.exists():
+            folder.rename(replaced)
+        scratch.rename(folder)
+    except BaseException:
+        if replaced.exists() and not folder.exists():
+            replaced.rename(folder)
+        raise
+    shutil.rmtree(replaced, ignore_errors=True)
+
+
+@contextmanager
+def _output_errors(folder: Path) -> Iterator[None]:
+    """Turn faults of the output into one-line errors."""
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be written: {error.strerror or error}") from None
+
+
+def _refuse_foreign(folder: Path, *, force: bool) -> None:
+    """Refuse a place that holds something, or, with `force`, anything but an earlier export."""
+    if not folder.exists():
+        return
+    products = {f"{name}{SUFFIX}" for name in TABLES}
+    found = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else [folder.name]
+    foreign = [name for name in found if name not in products]
+    if foreign:
+        got = f"{foreign[0]} in it" if folder.is_dir() else "a file"
+        raise OutputError(expected(str(folder), "", "a free name, or a folder of an earlier export", got))
+    if found and not force:
+        raise OutputError(
+            expected(str(folder), "", "a free name or an empty folder", "an earlier export", "--force replaces it")
+        )

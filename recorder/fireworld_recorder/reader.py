@@ -1,0 +1,184 @@
+"""Read a log step by step: only committed steps whose hash fits, of complete, cut-off and damaged files alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from fireworld.errors import LogError
+from fireworld.records import DTYPES, STEP_TOPICS, Array, CityRecord, RunHeader, Snapshot, StepRecord
+from fireworld_recorder.codec import decode, decode_field, decode_snapshot
+from fireworld_recorder.scan import Scan, State, TopicSize, messages, scan
+from fireworld_recorder.schema import Commit, Field, message_of
+
+RawStep = list[tuple[str, memoryview]]
+"""Topic and payload of every message of a step, /commit last."""
+
+_TYPES: Final = {topic.topic: topic for topic in STEP_TOPICS}
+
+
+def open_log(path: Path | str, *, partial: bool = False) -> Log:
+    """Open a log: every checksum and every step's hash is checked now, the steps are read when asked for.
+
+    Args:
+        path: the log.
+        partial: accept a cut-off or damaged log too; it ends at its last good step and `damage` says what is wrong.
+
+    Raises:
+        LogError: the file is not a log of this format, has lost its header or city, or (unless `partial`) is
+            cut off or damaged; says how far it is good.
+    """
+    path = Path(path)
+    log = Log(path, scan(path))
+    if log.damage is not None and not partial:
+        raise LogError(f"{path}: {log.damage}; try `fireworld recover {path}`")
+    return log
+
+
+class Log:
+    """A recorded run; implements `fireworld.records.Recording`. Made by `open_log`.
+
+    Only the places of the steps are held in memory; every access reads the file again.
+    """
+
+    def __init__(self, path: Path, found: Scan) -> None:
+        self.path = path
+        self.found = found
+        self.header: RunHeader = found.header
+        self.city: CityRecord = decode(CityRecord, found.city)
+
+    @property
+    def steps(self) -> Array:
+        """(k,) int64: the committed steps, rising."""
+        return np.array(self.found.steps, dtype=np.int64)
+
+    @property
+    def digest(self) -> str:
+        """The hash of the last committed step: the identity of the run up to there, 64 hexadecimal digits."""
+        return self.found.hash.hex()
+
+    @property
+    def state(self) -> State:
+        """Whether the log is complete, partial (cut off, or under way) or damaged."""
+        return self.found.state
+
+    @property
+    def damage(self) -> str | None:
+        """What is wrong and how far the log is good; None if nothing is wrong."""
+        return self.found.damage
+
+    @property
+    def snapshots(self) -> list[int]:
+        """Steps after which a snapshot was recorded."""
+        return list(self.found.snapshots)
+
+    @property
+    def topics(self) -> Mapping[str, TopicSize]:
+        """Messages and their bytes before compression, by topic."""
+        return self.found.topics
+
+    def __len__(self) -> int:
+        return len(self.found.steps)
+
+    def __iter__(self) -> Iterator[StepRecord]:
+        for raw in self.raw_steps():
+            yield self._record(raw)
+
+    def step(self, number: int) -> StepRecord:
+        """Read one step.
+
+        Raises:
+            LogError: the log has no such step, or changed since it was opened.
+        """
+        steps = self.found.steps
+        if number not in steps:
+            held = f"a step of the log, {steps[0]} to {steps[-1]}" if steps else "a log that holds steps"
+            raise LogError(f"{self.path}: expected {held}, got {number}")
+        return self._record(next(self.raw_steps(steps.index(number))))
+
+    def column(self, topic: str, name: str) -> Array:
+        """Return one field over all steps: (k, width) of an array field, (k,) of a value.
+
+        Raises:
+            ValueError: there is no such field, or its length changes from step to step; then use `ragged`.
+            LogError: the log changed since it was opened.
+        """
+        item = _field(topic, name)
+        table = np.empty(0)
+        for row, value in enumerate(self._values(topic, item)):
+            if row == 0:
+                table = np.empty((len(self), *np.shape(value)), DTYPES[item.wire])
+            if np.shape(value) != table.shape[1:]:
+                raise ValueError(f"{topic}: {name}: its length changes from step to step; use ragged")
+            table[row] = value
+        return table if len(self) else np.empty((0, 0) if item.repeated else 0, DTYPES[item.wire])
+
+    def ragged(self, topic: str, name: str) -> Sequence[Array]:
+        """Return one array field over all steps as a list of k arrays.
+
+        Raises:
+            ValueError: there is no such field.
+            LogError: the log changed since it was opened.
+        """
+        item = _field(topic, name)
+        return [np.asarray(value, DTYPES[item.wire]) for value in self._values(topic, item)]
+
+    def raw_steps(self, first: int = 0) -> Iterator[RawStep]:
+        """Yield the committed steps as they lie in the file.
+
+        Args:
+            first: position in `steps` of the step to begin with.
+
+        Raises:
+            LogError: the log changed since it was opened.
+        """
+        found, raw = self.found, RawStep()
+        left = len(found.steps) - first
+        if left == 0:
+            return
+        try:
+            with self.path.open("rb") as file:
+                for topic, payload in messages(file, found.n_bytes, found.starts[first], found.channels):
+                    raw.append((topic, payload))
+                    if topic == Commit.topic:
+                        yield raw
+                        raw, left = RawStep(), left - 1
+                        if left == 0:
+                            return
+        except OSError as error:
+            raise LogError(f"{self.path}: cannot be read: {error.strerror}") from error
+        except LogError as error:
+            raise LogError(f"{self.path}: {error}; it has changed since it was opened") from error
+
+    def _values(self, topic: str, item: Field) -> Iterator[Any]:
+        """Yield one field of every step, decoding nothing else."""
+        record_type = _TYPES["/" + topic.removeprefix("/")]
+        for raw in self.raw_steps():
+            yield decode_field(record_type, item.number, dict(raw).get(record_type.topic, b""))
+
+    def _record(self, raw: RawStep) -> StepRecord:
+        payloads = dict(raw)
+        commit = decode(Commit, payloads[Commit.topic])
+        try:
+            topics: dict[str, Any] = {
+                topic[1:]: decode(record_type, payloads.get(topic, b"")) for topic, record_type in _TYPES.items()
+            }
+            snapshot = decode_snapshot(payloads[Snapshot.topic]) if Snapshot.topic in payloads else None
+        except LogError as error:
+            raise LogError(f"{self.path}: step {commit.step}: {error}") from error
+        return StepRecord(
+            step=commit.step, terminated=commit.terminated, truncated=commit.truncated, snapshot=snapshot, **topics
+        )
+
+
+def _field(topic: str, name: str) -> Field:
+    record_type = _TYPES.get("/" + topic.removeprefix("/"))
+    if record_type is None:
+        raise ValueError(f"expected one of the topics {', '.join(_TYPES)}, got {topic!r}")
+    for item in message_of(record_type).fields:
+        if item.name == name:
+            return item
+    raise ValueError(f"{topic}: there is no field {name!r}")

@@ -1,0 +1,274 @@
+"""One pass over a log that finds its committed steps: checks every checksum and the chain, and says what is wrong."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Final, Literal, NamedTuple
+
+import zstandard
+from mcap.opcode import Opcode
+
+from fireworld.errors import LogError, expected
+from fireworld.records import STEP_SECONDS, CityRecord, RunHeader, Snapshot
+from fireworld_recorder import container
+from fireworld_recorder.chain import SCENE_PREFIX, Chain
+from fireworld_recorder.codec import decode
+from fireworld_recorder.container import Channel, Fields, Record, Schema, TruncatedError
+from fireworld_recorder.header import METADATA_NAME, PROFILE, ForeignError, check_format, from_metadata
+from fireworld_recorder.schema import Commit
+
+State = Literal["complete", "partial", "damaged"]
+# Plain integers, because comparing enumeration members takes as long as decoding a message.
+_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = (
+    int(opcode) for opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK)
+)
+_STEP_MAX: Final = (2**64 - 1) // (STEP_SECONDS * 1_000_000_000)
+"""The last step that the time of a message can hold."""
+_BARE: Final = frozenset({_SCHEMA, _CHANNEL, _MESSAGE})
+
+
+class Start(NamedTuple):
+    """Where a message begins: the offset of a record in the file, and a position inside its uncompressed chunk."""
+
+    offset: int
+    position: int
+
+
+@dataclass
+class TopicSize:
+    """How much of a log one topic takes, before compression."""
+
+    n_messages: int = 0
+    n_bytes: int = 0
+
+
+@dataclass
+class Scan:
+    """What one pass over a log has found; it grows step by step."""
+
+    n_bytes: int
+    metadata: Mapping[str, str]
+    header: RunHeader
+    city: bytes
+    schemas: Mapping[int, Schema]
+    channels: Mapping[int, Channel]
+    hash: bytes
+    state: State = "complete"
+    fault: str | None = None
+    steps: list[int] = field(default_factory=list)
+    starts: list[Start] = field(default_factory=list)
+    snapshots: list[int] = field(default_factory=list)
+    topics: dict[str, TopicSize] = field(default_factory=dict)
+
+    @property
+    def damage(self) -> str | None:
+        """What is wrong and how far the log is good; None if nothing is wrong."""
+        if self.fault is None:
+            return None
+        good = f"good up to step {self.steps[-1]}" if self.steps else "no step is good"
+        return f"{self.state}: {self.fault}; {good}"
+
+    def add(self, commit: Commit, start: Start, sizes: Mapping[str, TopicSize]) -> None:
+        """Take in a step whose hash fits."""
+        if not 0 <= commit.step <= _STEP_MAX:
+            raise LogError(f"a step has the number {commit.step}")
+        if self.steps and commit.step <= self.steps[-1]:
+            raise LogError(f"step {commit.step} follows step {self.steps[-1]}")
+        self.hash = commit.hash
+        self.steps.append(commit.step)
+        self.starts.append(start)
+        for topic, found in sizes.items():
+            size = self.topics.setdefault(topic, TopicSize())
+            size.n_messages += found.n_messages
+            size.n_bytes += found.n_bytes
+            if topic == Snapshot.topic:
+                self.snapshots.append(commit.step)
+
+
+def scan(path: Path) -> Scan:
+    """Read a whole log once, holding one chunk at a time.
+
+    Raises:
+        LogError: the file cannot be read, is no log of this format, or its header or city are lost.
+    """
+    try:
+        with path.open("rb") as file:
+            n_bytes = file.seek(0, 2)
+            file.seek(0)
+            return _scan(str(path), _Stream(file, n_bytes))
+    except OSError as error:
+        raise LogError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def _scan(path: str, stream: _Stream) -> Scan:
+    stream_of_messages = stream.messages()
+    try:
+        city = _read_city(stream_of_messages)
+        header = from_metadata(stream.metadata, stream.attachments)
+    except ForeignError as error:
+        raise LogError(f"{path}: {error}") from error
+    except LogError as error:
+        raise LogError(f"{path}: {error}; without header and city nothing can be read") from error
+    chain = Chain(city)
+    found = Scan(
+        n_bytes=stream.n_bytes,
+        metadata=stream.metadata,
+        header=header,
+        city=city,
+        schemas=stream.schemas,
+        channels=stream.channels,
+        hash=chain.hash,
+        topics={CityRecord.topic: TopicSize(1, len(city))},
+    )
+    try:
+        _follow(found, chain, stream_of_messages)
+    except LogError as error:
+        found.state = "partial" if isinstance(error, TruncatedError) else "damaged"
+        found.fault = str(error)
+    return found
+
+
+def _read_city(stream_of_messages: Iterator[tuple[str, memoryview, Start]]) -> bytes:
+    """Take the first message, which must be a city."""
+    for topic, payload, _ in stream_of_messages:
+        if topic != CityRecord.topic:
+            raise LogError(f"expected {CityRecord.topic} first, got {topic!r}")
+        decode(CityRecord, payload)
+        return bytes(payload)
+    raise LogError(f"expected {CityRecord.topic} first, got no message")
+
+
+def _follow(found: Scan, chain: Chain, stream_of_messages: Iterator[tuple[str, memoryview, Start]]) -> None:
+    """Take in step after step.
+
+    Raises:
+        LogError: the first fault; what was found before it is good.
+    """
+    start: Start | None = None
+    sizes: dict[str, TopicSize] = {}
+    for topic, payload, place in stream_of_messages:
+        start = start or place
+        if topic in sizes and not topic.startswith(SCENE_PREFIX):
+            raise LogError(f"a step holds {topic} twice")
+        size = sizes.setdefault(topic, TopicSize())
+        size.n_messages += 1
+        size.n_bytes += len(payload)
+        if topic != Commit.topic:
+            chain.add(topic, payload)
+            continue
+        commit = decode(Commit, payload)
+        sealed = chain.commit(step=commit.step, terminated=commit.terminated, truncated=commit.truncated)
+        if sealed.hash != commit.hash:
+            raise LogError(f"the hash of step {commit.step} does not fit")
+        found.add(commit, start, sizes)
+        start = None
+        sizes.clear()
+    if start is not None:
+        raise LogError("the last step is not committed")
+
+
+def messages(
+    file: IO[bytes], n_bytes: int, start: Start, channels: Mapping[int, Channel]
+) -> Iterator[tuple[str, memoryview]]:
+    """Yield topic and payload of every message from a step's start on.
+
+    Raises:
+        LogError: the log is damaged there.
+    """
+    decompressor = zstandard.ZstdDecompressor()
+    file.seek(start.offset)
+    for record in container.records(file, n_bytes):
+        position = start.position if record.offset == start.offset else 0
+        for _, opcode, body in container.split(_block(record, decompressor), position):
+            if opcode == _MESSAGE:
+                yield _channel_of(body, channels).topic, container.payload_of(body)
+
+
+def _block(record: Record, decompressor: zstandard.ZstdDecompressor) -> bytes:
+    """Return the records that a record of the file stands for: those in a chunk, or itself, or none."""
+    if record.opcode == _CHUNK:
+        return container.unpack_chunk(record.body, decompressor)
+    return record.head + record.body if record.opcode in _BARE else b""
+
+
+def _channel_of(message: memoryview, channels: Mapping[int, Channel]) -> Channel:
+    channel = channels.get(container.channel_id_of(message))
+    if channel is None:
+        raise LogError("a message belongs to no channel")
+    return channel
+
+
+class _Stream:
+    """The messages of a file in order; gathers what else the file holds as it comes by, and checks every checksum."""
+
+    def __init__(self, file: IO[bytes], n_bytes: int) -> None:
+        self.n_bytes = n_bytes
+        self.metadata: dict[str, str] = {}
+        self.attachments: dict[str, bytes] = {}
+        self.schemas: dict[int, Schema] = {}
+        self.channels: dict[int, Channel] = {}
+        self._file = file
+        self._decompressor = zstandard.ZstdDecompressor()
+
+    def messages(self) -> Iterator[tuple[str, memoryview, Start]]:
+        """Yield topic, payload and place of every message.
+
+        Raises:
+            LogError: at the first fault of the file.
+        """
+        found = self._file.read(len(container.MAGIC))
+        if found != container.MAGIC:
+            what = f"a file that begins with {found!r}" if found else "an empty file"
+            raise ForeignError(f"expected an MCAP recording, got {what}")
+        checksum = zlib.crc32(container.MAGIC)
+        for record in container.records(self._file, self.n_bytes):
+            if record.opcode == Opcode.DATA_END:
+                self._check_end(record, checksum)
+                return
+            checksum = zlib.crc32(record.body, zlib.crc32(record.head, checksum))
+            self._take(record)
+            n_registrations = 0
+            for position, opcode, body in container.split(_block(record, self._decompressor)):
+                if opcode == _MESSAGE:
+                    place = Start(record.offset, position)
+                    yield _channel_of(body, self.channels).topic, container.payload_of(body), place
+                else:
+                    n_registrations += 1
+                    if n_registrations > container.REGISTRATIONS_MAX:
+                        raise LogError("a chunk holds more schemas and channels than there can be")
+                    self._register(opcode, body)
+        raise LogError("the data section has no end")
+
+    def _take(self, record: Record) -> None:
+        if record.opcode == Opcode.HEADER:
+            fields = Fields(record.body)
+            profile, library = fields.text(), fields.text()
+            if profile != PROFILE:
+                raise ForeignError(expected("profile", "", PROFILE, profile, "this is no fireworld log"))
+            if library.startswith("fireworld-log/"):  # other tools that rewrite a log put their own name here
+                check_format(library)
+        elif record.opcode == Opcode.METADATA:
+            fields = Fields(record.body)
+            if fields.text() == METADATA_NAME:
+                self.metadata = fields.mapping()
+        elif record.opcode == Opcode.ATTACHMENT:
+            name, data = container.read_attachment(record.body)
+            self.attachments[name] = data
+
+    def _register(self, opcode: int, body: memoryview) -> None:
+        if opcode == _SCHEMA:
+            schema = container.read_schema(body)
+            self.schemas[schema.id] = schema
+        elif opcode == _CHANNEL:
+            channel = container.read_channel(body)
+            if self.channels.setdefault(channel.id, channel) != channel:
+                raise LogError(f"channel {channel.id} changes its topic")
+
+    def _check_end(self, record: Record, checksum: int) -> None:
+        if not container.data_checksum_fits(record.body, checksum):
+            raise LogError("bytes outside the steps were changed")
+        offset = self._file.tell()
+        container.check_tail(self._file.read(), offset)

@@ -1,0 +1,145 @@
+"""Say in words where two runs differ: the entity, the field and both values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Final
+
+from fireworld.records import (
+    ACTION_NAMES,
+    ACTIONS,
+    ACTIVITIES,
+    EVENT_KINDS,
+    FIERYNESS,
+    LEVELS,
+    MATERIALS,
+    VOLUMES,
+    Array,
+    CityRecord,
+    Decisions,
+    Draws,
+    Events,
+    StepRecord,
+)
+from fireworld_recorder.match import Spot
+from fireworld_recorder.schema import Field
+
+NAMES: Final[Mapping[str, tuple[str, ...]]] = {
+    "/city.material": MATERIALS,
+    "/observations.distance_from_center": LEVELS,
+    "/observations.distance_from_civilian": LEVELS,
+    "/observations.volume": VOLUMES,
+    "/decisions.action": ACTION_NAMES,
+    "/brigades.activity": ACTIVITIES,
+    "/buildings.fieryness": FIERYNESS,
+    "/events.kind": EVENT_KINDS,
+}
+"""Fields whose numbers stand for names."""
+
+_ENTITIES: Final = {
+    "n": "building",
+    "n_brigades": "brigade",
+    "n_brigades * 4": "brigade",
+    "n_civilians": "civilian",
+    "n_sites": "site",
+    "n_events": "event",
+}
+"""What an entry of an array belongs to, by the shape that the field's documentation begins with."""
+
+
+def entity_kind(item: Field) -> str:
+    """Return what an entry of this field belongs to: building, brigade, civilian, site, event, or entry."""
+    return _ENTITIES.get(item.shape, "entry")
+
+
+def entity_index(item: Field, index: int) -> int:
+    """Return the entity that an entry of this field belongs to; Q-values come four to a brigade."""
+    return index // len(ACTIONS) if item.shape == "n_brigades * 4" else index
+
+
+def entity_words(kind: str, index: int, *, city: CityRecord, step: StepRecord | None) -> str:
+    """Name an entity by kind and index, and by its identifier where it has one."""
+    if kind == "building" and index < len(city.building_id):
+        return f"building {index} (id {city.building_id[index]})"
+    if kind == "site" and step is not None and index < len(step.observations.site_id):
+        return f"site {step.observations.site_id[index]}"
+    return f"{kind} {index}"
+
+
+def show(topic: str, name: str, value: Any) -> str:
+    """Write a value: by its name if it stands for one, else as a number."""
+    names = NAMES.get(f"{topic}.{name}", ())
+    if names and 0 <= value < len(names):
+        return names[int(value)]
+    if topic == Decisions.topic and name in {"action", "target"} and value == -1:
+        return "none"
+    return str(value)
+
+
+def apart(a: Any, b: Any) -> str:
+    """Write how far two numbers are apart; empty if that says nothing."""
+    if isinstance(a, str | bool) or isinstance(b, str | bool) or not (math.isfinite(a) and math.isfinite(b)):
+        return ""
+    return f"{abs(a - b):.3g}"
+
+
+def sentence(topic: str, item: Field, entity: str | None, spot: Spot) -> str:
+    """Say what a value is in the second run (b) and was in the first (a)."""
+    shown_a, shown_b = show(topic, item.name, spot.a), show(topic, item.name, spot.b)
+    if topic == Decisions.topic and item.name == "action":
+        return f"{entity} chose {shown_b}, was {shown_a}"
+    if topic == Draws.topic and item.name == "key":
+        return "the runs had other luck: another seed, or another way to draw"
+    field = item.name.replace("_", " ")
+    if topic == Decisions.topic and item.name == "q_values" and spot.position is not None:
+        field = f"Q of {ACTIONS[spot.position % len(ACTIONS)]}"
+    distance = "" if f"{topic}.{item.name}" in NAMES else apart(spot.a, spot.b)
+    subject = f"{entity}: {field}" if entity else field
+    return f"{subject} is {shown_b}, was {shown_a}" + (f" (differs by {distance})" if distance else "")
+
+
+def length_sentence(item: Field, kind: str, n_a: int, n_b: int) -> str:
+    """Say that an array has another length."""
+    if kind == "entry":
+        return f"{item.name.replace('_', ' ')} has {n_b} entries, had {n_a}"
+    return f"{item.name.replace('_', ' ')} is there for {n_b} {kind}s, was for {n_a}"
+
+
+def reason(a: StepRecord, b: StepRecord, brigade: int) -> str:
+    """Say why a brigade chose another action: another Q-value, or an exploring draw; empty if neither tells."""
+    n = len(ACTIONS)
+    q_a, q_b = (step.decisions.q_values[brigade * n : (brigade + 1) * n] for step in (a, b))
+    if len(q_a) == len(q_b) == n:
+        chosen = (int(b.decisions.action[brigade]), int(a.decisions.action[brigade]), *range(n))
+        for action in chosen:
+            if 0 <= action < n and q_a[action] != q_b[action]:
+                state = _at(a.observations.state_index, brigade)
+                distance = apart(float(q_a[action]), float(q_b[action]))
+                return f"Q of {ACTIONS[action]} in state {state} differs by {distance}"
+    explored_a, explored_b = _at(a.decisions.explored, brigade), _at(b.decisions.explored, brigade)
+    if explored_a == explored_b:
+        return ""
+    return "it explored" if explored_b else "it did not explore"
+
+
+def events_sentence(a: Events, b: Events) -> str:
+    """Name the first event that differs."""
+    index = 0
+    while index < min(len(a.kind), len(b.kind)) and _event_words(a, index) == _event_words(b, index):
+        index += 1
+    return f"event {index} is {_event_words(b, index)}, was {_event_words(a, index)}"
+
+
+def _event_words(events: Events, index: int) -> str:
+    """Name one event, such as "burnt-out building 7"; "nothing" beyond the last."""
+    if index >= len(events.kind):
+        return "nothing"
+    code = int(events.kind[index])
+    kind = EVENT_KINDS[code] if code < len(EVENT_KINDS) else f"event of kind {code}"
+    owner = {"civilian": "civilian", "brigade": "brigade", "tank": "brigade", "refilled": "brigade", "site": "site"}
+    return f"{kind} {owner.get(kind.partition('-')[0], 'building')} {_at(events.entity, index)}"
+
+
+def _at(values: Array, index: int) -> Any:
+    return values[index].item() if index < len(values) else None

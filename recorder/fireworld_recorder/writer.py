@@ -1,0 +1,287 @@
+"""Write a run to a log that survives a kill at any moment: a step is a commit, and the name comes at the end."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Final, NamedTuple, Protocol, Self
+
+from fireworld.errors import OutputError, expected
+from fireworld.records import FORMAT, STEP_SECONDS, CityRecord, RunHeader, Snapshot, StepRecord
+from fireworld_recorder.chain import Chain, step_messages
+from fireworld_recorder.codec import encode, encode_snapshot
+from fireworld_recorder.container import CHUNK_BYTES_MAX
+from fireworld_recorder.container_writer import ContainerWriter
+from fireworld_recorder.header import METADATA_NAME, PROFILE, to_metadata
+from fireworld_recorder.schema import PACKAGE, Commit, descriptors
+
+PARTIAL_SUFFIX: Final = ".partial"
+_STEP_NANOSECONDS: Final = STEP_SECONDS * 1_000_000_000
+CHUNK_PAYLOAD_MAX: Final = CHUNK_BYTES_MAX - (1 << 20)
+"""Bytes of the messages of a chunk; the rest is for their heads, and for the schemas in the first one."""
+_MEDIA_TYPES: Final = {".yaml": "application/yaml", ".json": "application/json"}
+
+
+class Channel(NamedTuple):
+    """A topic and the schema of its messages."""
+
+    topic: str
+    schema_name: str
+    schema: bytes
+
+
+class Scene(Protocol):
+    """What a log holds besides, for tools that draw its steps: topics below /scene/, derived from the records."""
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        """The topics, in fixed order."""
+        ...
+
+    def messages(self, record: StepRecord) -> Sequence[tuple[str, bytes]]:
+        """Encode what is to be drawn of a step; steps come in rising order."""
+        ...
+
+
+def own_channels() -> list[Channel]:
+    """List the channels of a new log, in their fixed order."""
+    return [Channel(message.topic, f"{PACKAGE}.{message.name}", data) for message, data in descriptors()]
+
+
+class StepFile:
+    """A log under way: encoded steps go in, each is on the disk when `commit` returns.
+
+    Args:
+        path: the log to make.
+        metadata: the metadata `fireworld.run`.
+        attachments: files by name.
+        channels: topics that will be written; the first is /city.
+        city: the encoded city.
+        force: replace an existing log.
+        scratch_suffix: what the name ends in until the log is complete, for a copy that is worth nothing before:
+            a leftover of that name is replaced, and an error leaves none. Without it the partial log is kept.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        metadata: Mapping[str, str],
+        attachments: Mapping[str, bytes],
+        channels: Iterable[Channel],
+        city: bytes,
+        force: bool,
+        scratch_suffix: str = "",
+    ) -> None:
+        self.path = path
+        self.partial = path.with_name(path.name + (scratch_suffix or PARTIAL_SUFFIX))
+        self.n_commits = 0
+        self._force = force
+        self._keep_partial = not scratch_suffix
+        self._open = False
+        replace_partial = force or not self._keep_partial
+        _check_output(path, force=force)
+        if not replace_partial:
+            _refuse_leftover(self.partial)
+        with self._guard():
+            self._file = self.partial.open("wb" if replace_partial else "xb")
+            self._open = True
+            self._writer = ContainerWriter(self._file, profile=PROFILE, library=FORMAT)
+            self._writer.add_metadata(METADATA_NAME, metadata)
+            for name in sorted(attachments):
+                media_type = _MEDIA_TYPES.get(Path(name).suffix, "application/octet-stream")
+                self._writer.add_attachment(name, media_type, attachments[name])
+            self._channel_ids = {
+                channel.topic: self._writer.register(
+                    channel.topic, schema_name=channel.schema_name, schema=channel.schema, encoding="protobuf"
+                )
+                for channel in channels
+            }
+            self._write(0, [(CityRecord.topic, city)])
+
+    def commit(self, step: int, messages: Iterable[tuple[str, bytes]]) -> None:
+        """Write the messages of a step, /commit last; when this returns a kill cannot lose them.
+
+        Raises:
+            OutputError: the disk is full, or another fault of the output.
+        """
+        with self._guard():
+            self._write(step, messages)
+            self.n_commits += 1
+
+    def close(self) -> None:
+        """Write the index and give the log its name.
+
+        Raises:
+            OutputError: the disk is full, or another log has taken the name meanwhile.
+        """
+        if not self._open:
+            return
+        with self._guard():
+            self._writer.finish()
+            os.fsync(self._file.fileno())
+            self._file.close()
+            if not self._force:
+                _refuse_existing(self.path)
+            self.partial.replace(self.path)
+            self._open = False
+
+    def abort(self) -> None:
+        """Stop here; the partial file stays if it holds a step."""
+        if not self._open:
+            return
+        self._open = False
+        with contextlib.suppress(OSError):  # a full disk complains again; what it could not hold is lost anyway
+            self._file.close()
+        if not self._holds_steps:
+            self.partial.unlink(missing_ok=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        if kind is None:
+            self.close()
+        else:
+            self.abort()
+
+    @property
+    def _holds_steps(self) -> bool:
+        """Whether the partial file is worth keeping."""
+        return self._keep_partial and self.n_commits > 0
+
+    def _write(self, step: int, messages: Iterable[tuple[str, bytes]]) -> None:
+        """Write messages as a chunk."""
+        chunk = [(self._channel_ids[topic], data) for topic, data in messages]
+        n_bytes = sum([len(data) for _, data in chunk])
+        if n_bytes > CHUNK_PAYLOAD_MAX:  # a reader would refuse it
+            wanted = f"at most {CHUNK_PAYLOAD_MAX} bytes in a step"
+            raise OutputError(expected(str(self.path), f"step {step}", wanted, f"{n_bytes} bytes"))
+        self._writer.write_chunk(chunk, time=step * _STEP_NANOSECONDS, sequence=step)
+
+    @contextlib.contextmanager
+    def _guard(self) -> Iterator[None]:
+        """Turn faults of the output into one-line errors, and stop writing after one."""
+        try:
+            yield
+        except OSError as error:
+            self.abort()
+            reason = "no space is left on the disk" if error.errno == errno.ENOSPC else error.strerror or str(error)
+            kept = f"; {self.n_commits} steps are safe in {self.partial}" if self._holds_steps else ""
+            raise OutputError(f"{self.path}: cannot be written: {reason}{kept}") from error
+        except BaseException:
+            self.abort()
+            raise
+
+
+class LogWriter:
+    """Records a run. Use it as a context manager: an exception inside leaves the committed steps as NAME.partial.
+
+    Args:
+        path: the log to make.
+        header: what identifies the run.
+        city: the city it runs in.
+        force: replace an existing log.
+        scene: what to write besides, for other tools.
+
+    Raises:
+        OutputError: the log exists, its folder does not, or it cannot be written.
+    """
+
+    def __init__(
+        self,
+        path: Path | str,
+        header: RunHeader,
+        city: CityRecord,
+        *,
+        force: bool = False,
+        scene: Scene | None = None,
+    ) -> None:
+        encoded_city = encode(city)
+        self._chain = Chain(encoded_city)
+        self._scene = scene
+        self._last_step = -1
+        self._file = StepFile(
+            Path(path),
+            metadata=to_metadata(header),
+            attachments=header.attachments,
+            channels=[*own_channels(), *(scene.channels if scene is not None else ())],
+            city=encoded_city,
+            force=force,
+        )
+
+    @property
+    def digest(self) -> str:
+        """The digest of the run so far, 64 hexadecimal digits."""
+        return self._chain.hash.hex()
+
+    def write(self, record: StepRecord) -> None:
+        """Write one step; when this returns a kill cannot lose it.
+
+        Raises:
+            OutputError: the disk is full, or another fault of the output.
+        """
+        if record.step <= self._last_step:
+            raise ValueError(f"steps are written in rising order, got {record.step} after {self._last_step}")
+        messages = step_messages(record)
+        for topic, data in messages:
+            self._chain.add(topic, data)
+        if record.snapshot is not None:
+            messages.append((Snapshot.topic, encode_snapshot(record.snapshot.arrays)))
+        if self._scene is not None:
+            messages.extend(self._scene.messages(record))
+        commit = self._chain.commit(step=record.step, terminated=record.terminated, truncated=record.truncated)
+        messages.append((Commit.topic, encode(commit)))
+        self._file.commit(record.step, messages)
+        self._last_step = record.step
+
+    def close(self) -> None:
+        """Write the index and give the log its name.
+
+        Raises:
+            OutputError: the disk is full, or another log has taken the name meanwhile.
+        """
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._file.__exit__(kind, error, traceback)
+
+
+def _refuse_existing(path: Path) -> None:
+    if path.exists():
+        raise OutputError(
+            expected(str(path), "", "a name that is free", "an existing file", "use --force to replace it")
+        )
+
+
+def _refuse_leftover(partial: Path) -> None:
+    if partial.exists():
+        raise OutputError(
+            f"{partial}: a run that did not end left this, or one is under way;"
+            " try `fireworld recover` to keep its steps, or --force to replace it"
+        )
+
+
+def _check_output(path: Path, *, force: bool) -> None:
+    """Refuse an output that would overwrite something or that cannot be made.
+
+    Raises:
+        OutputError: with what to try.
+    """
+    if not path.parent.is_dir():
+        raise OutputError(expected(str(path), "", f"an existing folder {path.parent}", "none", "make it first"))
+    if path.is_dir():
+        raise OutputError(expected(str(path), "", "the name of a file", "a folder"))
+    if not force:
+        _refuse_existing(path)

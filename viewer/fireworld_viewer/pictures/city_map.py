@@ -1,0 +1,256 @@
+"""A city from above on matplotlib axes: its streets drawn once, what changes from step to step set anew."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fireworld.records import ACTIVITIES, CityRecord, StepRecord
+from fireworld_viewer import colors
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.collections import PolyCollection
+
+INK: Final = "#333333"
+STREET: Final = "#ffffff"
+GROUND: Final = "#dedad2"
+JET_EDGE: Final = "#174a7c"
+MARGIN_M: Final = 12.0
+WIDTH_INCHES: Final = 7.6
+"""Of a map on which everything has its full size; on smaller ones, balls and letters are smaller too."""
+
+_SMALLEST_SCALE: Final = 0.7
+_BALL_POINTS: Final = 14.0
+_GAUGE_POINTS: Final = (3.6, 15.0)
+"""Width and height of the gauge of a full tank."""
+_DRIVING: Final = ACTIVITIES.index("driving")
+_SPRAYING: Final = ACTIVITIES.index("spraying")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Crews:
+    """The brigades of a moment; n of them."""
+
+    xy_m: NDArray[np.float64]
+    """(n, 2) positions."""
+    activity: NDArray[Any] | None = None
+    """(n,) index into ACTIVITIES; unknown if left out."""
+    tank_share: NDArray[np.float64] | None = None
+    """(n,) share of the tank that is full, 0..1; unknown if left out."""
+    target: NDArray[Any] | None = None
+    """(n,) index of the building each goes for, -1 none; unknown if left out."""
+
+    def goes_for(self, activity: int) -> NDArray[np.intp]:
+        """Which brigades do this, for a target: (k,) indices."""
+        if self.activity is None or self.target is None:
+            return np.zeros(0, dtype=np.intp)
+        return np.flatnonzero((self.activity == activity) & (self.target >= 0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapState:
+    """What a map shows of a moment."""
+
+    fieryness: NDArray[Any]
+    """(n,) official codes 0..8."""
+    civilian_hp: NDArray[Any]
+    """(n_civilians,) health points."""
+    crews: Crews | None = None
+    """None are drawn if left out."""
+
+
+def state_of(city: CityRecord, record: StepRecord) -> MapState:
+    """Return what a map shows of a step."""
+    brigades, n = record.brigades, len(record.brigades.x_m)
+    target = np.full(n, -1, dtype=np.int64)
+    target[: len(record.decisions.target)] = record.decisions.target
+    full = np.maximum(np.asarray(city.brigade_tank_litres, dtype=np.float64), 1.0)
+    return MapState(
+        fieryness=record.buildings.fieryness,
+        civilian_hp=record.civilians.hp,
+        crews=Crews(
+            xy_m=np.column_stack([brigades.x_m, brigades.y_m]).astype(np.float64),
+            activity=brigades.activity,
+            tank_share=np.clip(brigades.tank_litres / full, 0.0, 1.0),
+            target=target,
+        ),
+    )
+
+
+def extent_m(city: CityRecord) -> tuple[float, float, float, float]:
+    """Return what a map shows of the plane: west, east, south, north."""
+    x, y = np.asarray(city.outline_x_m), np.asarray(city.outline_y_m)
+    edges = x.min() - MARGIN_M, x.max() + MARGIN_M, y.min() - 2 * MARGIN_M, y.max() + MARGIN_M
+    west, east, south, north = (float(edge) for edge in edges)
+    return west, east, south, north
+
+
+class CityMap:
+    """A map on axes of a known width; `show` sets what is on it."""
+
+    def __init__(self, axes: Axes, city: CityRecord, *, inches: float, n_brigades: int = 0) -> None:
+        from matplotlib.collections import LineCollection, PolyCollection
+
+        self.axes, self.city = axes, city
+        west, east, south, north = extent_m(city)
+        axes.set(xlim=(west, east), ylim=(south, north), aspect="equal", xticks=[], yticks=[], facecolor=GROUND)
+        axes.spines[:].set_visible(False)
+        self._scale = float(np.clip(inches / WIDTH_INCHES, _SMALLEST_SCALE, 1.0))
+        self._m_per_point = (east - west) / (inches * 72.0) * self._scale
+        self._draw_ground()
+        line: dict[str, Any] = {"capstyle": "round", "zorder": 5}
+        self._way_casing = LineCollection([], colors="white", linewidths=2.6 * self._scale, **line)
+        self._ways = LineCollection([], colors=INK, linewidths=1.1 * self._scale, linestyles=(0, (3, 2)), zorder=5)
+        self._jet_casing = LineCollection([], colors=JET_EDGE, linewidths=4.2 * self._scale, **line)
+        self._jets = LineCollection([], colors=hexadecimal(colors.WATER_RGB), linewidths=2.6 * self._scale, **line)
+        self._buildings = self._draw_buildings()
+        self._refuges = [self._letter(index, "R") for index in np.asarray(city.refuge_building).tolist()]
+        self._civilians = self._draw_civilians()
+        self._balls = axes.scatter(
+            [], [], s=(_BALL_POINTS * self._scale) ** 2, edgecolors=INK, linewidths=0.8, zorder=7
+        )
+        self._gauges = PolyCollection([], facecolors="white", edgecolors=INK, linewidths=0.8, zorder=7)
+        self._water = PolyCollection([], facecolors=hexadecimal(colors.WATER_RGB), edgecolors="none", zorder=7.1)
+        self._numbers = [self._number(index) for index in range(n_brigades)]
+        for item in (self._way_casing, self._ways, self._jet_casing, self._jets, self._gauges, self._water):
+            axes.add_collection(item, autolim=False)
+
+    @property
+    def changing(self) -> list[Artist]:
+        """What `show` sets, in the order in which it is drawn."""
+        lines = (self._way_casing, self._ways, self._jet_casing, self._jets)
+        return [self._buildings, *self._refuges, *lines, self._civilians, self._balls, self._gauges, self._water,
+                *self._numbers]  # fmt: skip
+
+    def show(self, state: MapState) -> None:
+        """Set the map to a moment."""
+        table = _table(colors.FIERYNESS_RGB)
+        faces = table[np.asarray(state.fieryness, dtype=np.int64)]
+        faces[np.asarray(self.city.refuge_building, dtype=np.int64)] = np.array(colors.REFUGE_RGB) / 255.0
+        self._buildings.set_facecolor(list(map(tuple, faces)))
+        hp = np.asarray(state.civilian_hp)
+        self._civilians.set_facecolor(colors.health_rgb(hp, np.asarray(self.city.civilian_hp)) / 255.0)
+        self._civilians.set_edgecolor(["white" if points <= 0 else INK for points in hp.tolist()])  # seen on black
+        self._civilians.set_paths([_marker("X" if points <= 0 else "o") for points in hp.tolist()])
+        self._show_crews(state.crews or Crews(xy_m=np.zeros((0, 2))))
+
+    def _show_crews(self, crews: Crews) -> None:
+        xy = _side_by_side(crews.xy_m, self._m_per_point * np.array([21.0, 15.0]))
+        n = len(xy)
+        activity = np.full(n, _SPRAYING) if crews.activity is None else np.asarray(crews.activity, dtype=np.int64)
+        self._balls.set_offsets(xy)
+        self._balls.set_facecolor(_table(colors.ACTIVITY_RGB)[activity])
+        share = np.zeros(0) if crews.tank_share is None else crews.tank_share
+        self._gauges.set_verts(list(self._bars(xy, np.ones(len(share)))))
+        self._water.set_verts(list(self._bars(xy, share)))
+        for index, number in enumerate(self._numbers):
+            number.set_visible(index < n)
+            if index < n:
+                number.set_position(tuple(xy[index]))
+                number.set_color(contrasting(colors.ACTIVITY_RGB[activity[index]]))
+        aim = np.column_stack([self.city.center_x_m, self.city.center_y_m])
+        for lines, what in (
+            ((self._way_casing, self._ways), _DRIVING),
+            ((self._jet_casing, self._jets), _SPRAYING),
+        ):
+            chosen = crews.goes_for(what)
+            target = aim[crews.target[chosen]] if crews.target is not None else np.zeros((0, 2))
+            for line in lines:
+                line.set_segments(list(np.stack([xy[chosen], target], axis=1)))
+
+    def _bars(self, xy: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Corners of upright bars to the right of the balls, as high as the shares: (n, 4, 2)."""
+        wide, high = self._m_per_point * np.array(_GAUGE_POINTS)
+        west = xy[: len(share), 0] + self._m_per_point * (_BALL_POINTS / 2 + 1.0)
+        south = xy[: len(share), 1] - high / 2
+        north = south + high * share
+        corners = [(west, south), (west + wide, south), (west + wide, north), (west, north)]
+        return np.stack([np.column_stack(corner) for corner in corners], axis=1).reshape(-1, 4, 2)
+
+    def _draw_ground(self) -> None:
+        """Draw what never changes: streets, hydrants and a bar of a round length, about a fifth of the map."""
+        from matplotlib.collections import LineCollection
+
+        axes, city = self.axes, self.city
+        node = np.column_stack([city.node_x_m, city.node_y_m])
+        lines = list(zip(node[city.street_from], node[city.street_to], strict=True))
+        width = 3.0 * self._scale
+        axes.add_collection(LineCollection(lines, colors=STREET, linewidths=width, capstyle="round", zorder=1))
+        rgb = hexadecimal(colors.HYDRANT_RGB)
+        axes.scatter(city.hydrant_x_m, city.hydrant_y_m, s=14 * self._scale, color=rgb, marker="s", zorder=4)
+        (west, east), south = axes.get_xlim(), axes.get_ylim()[0]
+        longest = max(10.0, (east - west) / 4)
+        length = max(step for step in (10, 20, 50, 100, 200, 500, 1000, 2000) if step <= longest)
+        x, y = west + 0.6 * MARGIN_M, south + 0.6 * MARGIN_M
+        axes.plot([x, x + length], [y, y], color=INK, linewidth=2.5, solid_capstyle="butt", zorder=8)
+        axes.annotate(
+            f"{length} m", (x + length, y), xytext=(4, 0), textcoords="offset points", va="center", color=INK,
+            fontsize=10 * max(self._scale, 0.75),
+        )  # fmt: skip
+
+    def _draw_buildings(self) -> PolyCollection:
+        from matplotlib.collections import PolyCollection
+
+        ptr = np.asarray(self.city.outline_ptr)
+        corners = np.column_stack([self.city.outline_x_m, self.city.outline_y_m])
+        outlines = [corners[ptr[index] : ptr[index + 1]] for index in range(len(ptr) - 1)]
+        drawn = PolyCollection(outlines, edgecolors=INK, linewidths=0.35 * self._scale, zorder=2)
+        self.axes.add_collection(drawn, autolim=False)
+        return drawn
+
+    def _draw_civilians(self) -> Any:
+        xy = np.column_stack([self.city.civilian_x_m, self.city.civilian_y_m]).astype(np.float64)
+        xy = _side_by_side(xy, self._m_per_point * np.array([7.0, 7.0]))
+        return self.axes.scatter(
+            xy[:, 0], xy[:, 1], s=34 * self._scale, edgecolors=INK, linewidths=0.8 * self._scale, zorder=6
+        )
+
+    def _letter(self, index: int, letter: str) -> Artist:
+        at = (self.city.center_x_m[index], self.city.center_y_m[index])
+        style: dict[str, Any] = {"ha": "center", "va": "center", "color": "white", "weight": "bold", "zorder": 5}
+        return self.axes.annotate(letter, at, fontsize=8 * self._scale, **style)
+
+    def _number(self, index: int) -> Any:
+        style: dict[str, Any] = {"ha": "center", "va": "center_baseline", "weight": "bold", "zorder": 7.2}
+        return self.axes.text(0.0, 0.0, str(index), fontsize=8 * self._scale, **style)
+
+
+def hexadecimal(rgb: Sequence[int]) -> str:
+    """Write a color as #rrggbb."""
+    return "#" + "".join(f"{part:02x}" for part in rgb)
+
+
+def contrasting(rgb: Sequence[int]) -> str:
+    """Return the color of letters on a ground: dark on what is light, white on what is dark."""
+    red, green, blue = rgb
+    return INK if 299 * red + 587 * green + 114 * blue > 140_000 else "white"
+
+
+def _table(rgb: Sequence[colors.Rgb]) -> NDArray[np.float64]:
+    return np.array(rgb) / 255.0
+
+
+def _side_by_side(xy: NDArray[np.float64], apart_m: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Move eastward what would cover something of a lower number: (n, 2) to (n, 2)."""
+    placed = np.array(xy, dtype=np.float64).reshape(-1, 2)
+    for index in range(1, len(placed)):
+        while True:
+            covers = (np.abs(placed[:index] - placed[index]) < 0.999 * apart_m).all(axis=1)
+            if not covers.any():
+                break
+            placed[index, 0] = placed[:index][covers, 0].max() + apart_m[0]
+    return placed
+
+
+def _marker(shape: str) -> Any:
+    """Return the outline of a marker of size 1."""
+    from matplotlib.markers import MarkerStyle
+
+    style = MarkerStyle(shape)
+    return style.get_path().transformed(style.get_transform())

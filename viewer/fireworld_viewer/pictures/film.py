@@ -1,0 +1,208 @@
+"""Films of recordings, GIF or MP4: the city is drawn once, and on it what changes, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from fractions import Fraction
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Final, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fireworld.errors import ViewError
+from fireworld.records import Recording
+from fireworld_viewer import colors
+from fireworld_viewer.pictures.city_map import GROUND, INK, STREET
+from fireworld_viewer.pictures.figure_files import PAPER, written_beside
+from fireworld_viewer.pictures.map_legend import LABELS, count_marks
+from fireworld_viewer.pictures.maps import cells_of
+from fireworld_viewer.pictures.moments import Moment
+from fireworld_viewer.pictures.sheet import Sheet
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+FPS: Final = 10.0
+_DPI: Final = 100
+_MAP_INCHES: Final = 6.0
+_PAIR_INCHES: Final = 4.6
+_HOLD_SECONDS: Final = 2.0
+"""How long the last frame stays."""
+_TRANSPARENT: Final = 255
+"""Number of the color that lets the frame before be seen; it comes after all others."""
+_NEAR: Final = 6
+Frame = NDArray[np.uint8]
+"""(height, width, 3) sRGB; both even."""
+
+
+def save_film(
+    recordings: Sequence[Recording],
+    moments: Sequence[Moment],
+    path: Path,
+    *,
+    fps: float = FPS,
+    on_frame: Callable[[], object] = lambda: None,
+) -> None:
+    """Write a film, of the kind that the file's ending names; nothing is left of it after an error or Ctrl-C.
+
+    Args:
+        recordings: one, or two of the same city.
+        moments: one for each frame, from moments.moments_between.
+        path: the file; one that exists is replaced.
+        fps: frames a second.
+        on_frame: called after each frame.
+
+    Raises:
+        OutputError: the file cannot be written.
+        ViewError: matplotlib, or for MP4 PyAV, is not installed.
+    """
+    write = FILMS[path.suffix.lower()]
+    if write is _write_mp4:
+        import_av()
+    reel = Reel(recordings, moments)
+    with written_beside(path) as partial:
+        write(reel, partial, fps, on_frame)
+
+
+class Reel:
+    """The frames of a film, drawn when asked for; the city is drawn once.
+
+    Args:
+        recordings: one, or two of the same city.
+        moments: one for each frame.
+
+    Raises:
+        ViewError: matplotlib is not installed.
+    """
+
+    def __init__(self, recordings: Sequence[Recording], moments: Sequence[Moment]) -> None:
+        self._recordings, self._moments = recordings, moments
+        inches = _MAP_INCHES if len(recordings) == 1 else _PAIR_INCHES
+        there = {label for moment in moments for cell in cells_of(recordings, moment)
+                 for label in count_marks(cell.city, cell.state)}  # fmt: skip
+        labels = [label for label in LABELS if label in there]
+        first = cells_of(recordings, moments[0])
+        self._sheet = Sheet(first, columns=len(recordings), map_inches=inches, labels=labels, dpi=_DPI)
+        self._canvas = cast("Any", self._sheet.figure.canvas)  # matplotlib does not say its types
+        for _, item in self._sheet.changing:
+            item.set_animated(True)
+        for row in self._sheet.legend_rows:  # not drawn, but given their places
+            row.set_alpha(0.0)
+        self._canvas.draw()
+        self._ground = self._canvas.copy_from_bbox(self._sheet.figure.bbox)
+        self._rows: dict[tuple[int, str], Any] = {}
+
+    def __len__(self) -> int:
+        return len(self._moments)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels, both even."""
+        width, height = self._canvas.get_width_height(physical=True)
+        return int(width), int(height)
+
+    def frame(self, index: int) -> Frame:
+        """Draw a frame."""
+        self._canvas.restore_region(self._ground)
+        self._sheet.show(cells_of(self._recordings, self._moments[index]))
+        for axes, item in self._sheet.changing:
+            axes.draw_artist(item)
+        self._draw_legend()
+        return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
+
+    def _draw_legend(self) -> None:
+        """Draw the rows of the legend, those that were drawn before as they were: letters take most of the time."""
+        for index, row in enumerate(self._sheet.legend_rows):
+            key = index, row.get_text()
+            if key in self._rows:
+                self._canvas.restore_region(self._rows[key])
+                continue
+            row.set_alpha(None)
+            row.draw(self._canvas.get_renderer())
+            self._rows[key] = self._canvas.copy_from_bbox(row.get_window_extent().padded(2.0))
+
+
+def import_av() -> ModuleType:
+    """Import PyAV.
+
+    Raises:
+        ViewError: it is not installed.
+    """
+    try:
+        import av
+    except ImportError:
+        hint = "try pip install 'fireworld[film]', or a film that ends in .gif"
+        raise ViewError(f"film: PyAV, which writes .mp4, is not installed; {hint}") from None
+    module: ModuleType = av
+    return module
+
+
+def _write_gif(reel: Reel, path: Path, fps: float, on_frame: Callable[[], object]) -> None:
+    """Write a GIF: one palette for all frames, and of each frame what has changed."""
+    samples = [reel.frame(place) for place in sorted({round(k * (len(reel) - 1) / 2) for k in range(3)})]
+    pictures = _differences(reel, _palette(samples), on_frame)
+    durations = [round(1000.0 / fps)] * (len(reel) - 1) + [round(1000.0 * _HOLD_SECONDS)]
+    with path.open("wb") as file:
+        next(pictures).save(
+            file, format="GIF", save_all=True, append_images=pictures, duration=durations, loop=0, disposal=1,
+            optimize=False,
+        )  # fmt: skip
+
+
+def _differences(reel: Reel, palette: Image, on_frame: Callable[[], object]) -> Iterator[Image]:
+    """Yield the frames in the colors of a palette; what is as it was in the frame before is transparent."""
+    from PIL import Image
+
+    table = np.zeros((256, 3), dtype=np.uint8)  # all of it, so that the last number is one of the file's too
+    own = np.array(palette.getpalette(), dtype=np.uint8).reshape(-1, 3)
+    table[: len(own)] = own
+    before: NDArray[np.uint8] | None = None
+    for index in range(len(reel)):
+        now = np.asarray(Image.fromarray(reel.frame(index)).quantize(palette=palette, dither=Image.Dither.NONE))
+        picture = Image.fromarray(now if before is None else np.where(now == before, np.uint8(_TRANSPARENT), now))
+        picture.putpalette(table.tobytes())
+        picture.info["transparency"] = _TRANSPARENT
+        yield picture
+        on_frame()
+        before = now
+
+
+def _palette(samples: Sequence[Frame]) -> Image:
+    """Return a picture whose palette has every color of the table, and the most useful others of some frames."""
+    from PIL import Image, ImageColor
+
+    exact = [*colors.FIERYNESS_RGB, *colors.ACTIVITY_RGB, colors.REFUGE_RGB, colors.WATER_RGB, colors.HYDRANT_RGB]
+    exact += [ImageColor.getrgb(color)[:3] for color in (PAPER, GROUND, STREET, INK)]
+    mixed = Image.fromarray(np.concatenate(samples)).quantize(
+        _TRANSPARENT - len(exact), method=Image.Quantize.MEDIANCUT
+    )
+    others = np.array(mixed.getpalette(), dtype=np.int64).reshape(-1, 3)[: _TRANSPARENT - len(exact)]
+    # Pillow takes a color for another that is very near: none may be very near to an exact one.
+    apart = np.abs(others[:, np.newaxis] - np.array(exact)).max(axis=2).min(axis=1) > _NEAR
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([*np.array(exact).ravel().tolist(), *others[apart].ravel().tolist()])
+    return palette
+
+
+def _write_mp4(reel: Reel, path: Path, fps: float, on_frame: Callable[[], object]) -> None:
+    """Write H.264 that every browser plays; one thread, so that the bytes are the same on every machine."""
+    av = import_av()
+    options = {"crf": "20", "preset": "veryfast", "threads": "1"}
+    with av.open(str(path), mode="w", format="mp4", options={"movflags": "+faststart"}) as film:
+        stream = film.add_stream("libx264", rate=Fraction(fps).limit_denominator(1000), options=options)
+        stream.width, stream.height, stream.pix_fmt = *reel.size, "yuv420p"
+        for index in range(len(reel) + round(_HOLD_SECONDS * fps) - 1):
+            if index < len(reel):
+                frame = reel.frame(index)
+                on_frame()
+            film.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24")))
+        film.mux(stream.encode(None))
+
+
+FILMS: Final[Mapping[str, Callable[[Reel, Path, float, Callable[[], object]], None]]] = {
+    ".gif": _write_gif,
+    ".mp4": _write_mp4,
+}
+"""Endings of films, and who writes them."""

@@ -1,0 +1,117 @@
+"""The legend of a map: what is on it, in the map's own marks, and how many of each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from fireworld.records import ACTIVITIES, FIERYNESS, CityRecord
+from fireworld_viewer import colors
+from fireworld_viewer.pictures.city_map import INK, JET_EDGE, MapState, hexadecimal
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.legend import Legend
+
+HEALTH: Final[Mapping[str, colors.Rgb]] = {
+    "well": colors.HEALTHY_RGB,
+    "hurt": colors.HURT_RGB,
+    "dying": colors.DYING_RGB,
+    "dead": colors.DEAD_RGB,
+}
+"""Civilians with more than 3/4 of their health, more than 1/4, less, and none."""
+
+_JET: Final = "water jet"
+_WAY: Final = "way to a target"
+_TANK: Final = "water in the tank"
+_BRIGADE: Final = "brigade"
+_DOING: Final = tuple(f"brigade {activity.removeprefix('driving-').replace('-', ' ')}" for activity in ACTIVITIES)
+_CIVILIAN: Final = tuple(f"civilian {health}" for health in HEALTH)
+_CODES: Final = tuple(name.replace("-", " ") for name in FIERYNESS)
+LABELS: Final = (
+    *_CODES, "refuge", "hydrant", *_CIVILIAN, _BRIGADE, *_DOING, _TANK, _JET, _WAY,
+)  # fmt: skip
+"""All that can be on a map, in the order of the legend."""
+_UNCOUNTED: Final = frozenset({_TANK, _JET, _WAY})
+
+
+def count_marks(city: CityRecord, state: MapState) -> dict[str, int]:
+    """Count what is on a map, by label; what is not there is left out."""
+    outside = np.delete(np.asarray(state.fieryness, dtype=np.int64), np.asarray(city.refuge_building, dtype=np.int64))
+    counts = dict(zip(_CODES, np.bincount(outside, minlength=len(_CODES)).tolist(), strict=True))
+    counts |= {"refuge": len(city.refuge_building), "hydrant": len(city.hydrant_x_m)}
+    hp, start = np.asarray(state.civilian_hp, dtype=np.float64), np.maximum(city.civilian_hp, 1)
+    band = np.digitize(hp / start, [0.0, 0.25, 0.75], right=True)  # 0 dead, 3 well
+    counts |= dict(zip(reversed(_CIVILIAN), np.bincount(band, minlength=4).tolist(), strict=True))
+    crews = state.crews
+    if crews is not None and crews.activity is None:
+        counts[_BRIGADE] = len(crews.xy_m)
+    elif crews is not None:
+        doing = np.bincount(np.asarray(crews.activity, dtype=np.int64), minlength=len(_DOING)).tolist()
+        counts |= dict(zip(_DOING, doing, strict=True))
+        counts[_TANK] = len(crews.xy_m)
+        counts[_JET] = len(crews.goes_for(ACTIVITIES.index("spraying")))
+        counts[_WAY] = len(crews.goes_for(ACTIVITIES.index("driving")))
+    return {label: count for label, count in counts.items() if count}
+
+
+def draw_legend(axes: Axes, labels: Sequence[str], *, n_maps: int) -> Legend:
+    """Draw a legend to the right of a map.
+
+    Args:
+        axes: of the map.
+        labels: of LABELS, what is named.
+        n_maps: on how many maps the marks will be counted.
+    """
+    handles = [_handle(label) for label in labels]
+    title = "how many: (A | B)" if n_maps > 1 else None
+    return axes.legend(
+        handles=handles, labels=list(labels), loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False,
+        labelcolor=INK, borderaxespad=0, handlelength=1.7, fontsize=10.0, title=title,
+        title_fontsize=10.0, alignment="left",
+    )  # fmt: skip
+
+
+def show_counts(legend: Legend, labels: Sequence[str], counts: Sequence[Mapping[str, int]]) -> None:
+    """Write beside each label how many there are, on each of the maps the legend is for."""
+    for text, label in zip(legend.get_texts(), labels, strict=True):
+        numbers = " | ".join(str(count.get(label, 0)) for count in counts)
+        text.set_text(label if label in _UNCOUNTED or not counts else f"{label} ({numbers})")
+
+
+def _handle(label: str) -> Any:
+    """Return the mark of a label as it is on the map."""
+    from matplotlib.lines import Line2D
+
+    def mark(rgb: colors.Rgb, shape: Any = "s", size: float = 9.0, *, edge: str = INK) -> Line2D:
+        style: dict[str, Any] = {"markerfacecolor": hexadecimal(rgb), "markeredgecolor": edge, "markersize": size}
+        return Line2D([], [], linestyle="", marker=shape, **style)
+
+    if label in _CODES:
+        return mark(colors.FIERYNESS_RGB[_CODES.index(label)])
+    if label in _CIVILIAN:
+        dead = label == "civilian dead"
+        return mark(HEALTH[label.removeprefix("civilian ")], "X" if dead else "o", 6.0, edge="white" if dead else INK)
+    if label in _DOING:
+        return mark(colors.ACTIVITY_RGB[_DOING.index(label)], "o", 10.0)
+    if label == _JET:
+        return _outlined(hexadecimal(colors.WATER_RGB), JET_EDGE)
+    if label == _WAY:
+        return Line2D([], [], color=INK, linewidth=1.1, linestyle=(0, (3, 2)))
+    upright = [(-0.25, -1.0), (0.25, -1.0), (0.25, 1.0), (-0.25, 1.0), (-0.25, -1.0)]
+    return {
+        "refuge": mark(colors.REFUGE_RGB),
+        "hydrant": mark(colors.HYDRANT_RGB, size=5.0),
+        _BRIGADE: mark(colors.ACTIVITY_RGB[2], "o", 10.0),
+        _TANK: mark(colors.WATER_RGB, upright, 11.0),
+    }[label]
+
+
+def _outlined(color: str, edge: str) -> Any:
+    """Return a thick line with an edge."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patheffects import Normal, Stroke
+
+    return Line2D([], [], color=color, linewidth=2.6, path_effects=[Stroke(linewidth=4.2, foreground=edge), Normal()])

@@ -1,0 +1,141 @@
+"""Maps in rows and columns on one figure, each with its heading, and one legend for all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from fireworld.records import CityRecord
+from fireworld_viewer.pictures.city_map import INK, WIDTH_INCHES, CityMap, MapState, extent_m
+from fireworld_viewer.pictures.figure_files import DPI, new_figure
+from fireworld_viewer.pictures.map_legend import LABELS, count_marks, draw_legend, show_counts
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.figure import Figure
+
+_LEGEND_INCHES: Final = 2.35
+_GAP_INCHES: Final = 0.14
+_LINE_INCHES: Final = 0.24
+_LEGEND_LINE_INCHES: Final = 0.205
+_POINTS_WIDE: Final = 0.56
+"""How wide a letter is on average, of its size."""
+_MAPS_COUNTED: Final = 2
+"""Above this many maps, and in strips, the legend has no counts."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell:
+    """One map of a sheet."""
+
+    city: CityRecord
+    state: MapState
+    title: str
+    facts: str = ""
+    """A second line of the heading."""
+
+
+class Sheet:
+    """A figure of maps; `show` sets all of them anew.
+
+    Args:
+        cells: row by row.
+        columns: maps side by side.
+        map_inches: width of a map.
+        heading: above everything, if there is something to say.
+        labels: what the legend names; what is on these maps if left out.
+        dpi: pixels an inch.
+
+    Raises:
+        ViewError: matplotlib is not installed.
+    """
+
+    def __init__(
+        self,
+        cells: Sequence[Cell],
+        *,
+        columns: int = 1,
+        map_inches: float = WIDTH_INCHES,
+        heading: str = "",
+        labels: Sequence[str] = (),
+        dpi: int = DPI,
+    ) -> None:
+        west, east, south, north = extent_m(cells[0].city)
+        self._map_inches = map_inches
+        map_height = min(max(map_inches * (north - south) / (east - west), 0.4 * map_inches), 2.0 * map_inches)
+        self._labels = list(labels) or _labels_of(cells)
+        rows = -(-len(cells) // columns)
+        n_lines = 1 + any(cell.facts for cell in cells)
+        row_height = map_height + n_lines * _LINE_INCHES + _GAP_INCHES
+        above = _GAP_INCHES / 2 + (1.7 * _LINE_INCHES if heading else 0.0)
+        needed = above + n_lines * _LINE_INCHES + (len(self._labels) + 1) * _LEGEND_LINE_INCHES + 2 * _GAP_INCHES
+        self._width = _GAP_INCHES + columns * (map_inches + _GAP_INCHES) + _LEGEND_INCHES
+        self._height = max(above + rows * row_height + _GAP_INCHES, needed)
+        self.figure: Figure = new_figure(_even(self._width, dpi), _even(self._height, dpi), dpi=dpi)
+        self._maps: list[CityMap] = []
+        self._facts: list[Any] = []
+        if heading:
+            self._write(
+                _GAP_INCHES, above - 0.5 * _LINE_INCHES, heading, points=13.0, inches=self._width - 2 * _GAP_INCHES
+            )
+        for index, cell in enumerate(cells):
+            row, column = divmod(index, columns)
+            left = _GAP_INCHES + column * (map_inches + _GAP_INCHES)
+            top = above + row * row_height + n_lines * _LINE_INCHES
+            self._add(cell, left, top, map_height, alone=len(cells) == 1 and not heading, n_lines=n_lines)
+        corner = self._maps[min(columns, len(self._maps)) - 1]
+        self._counted = len(cells) <= _MAPS_COUNTED and not heading
+        self._legend = draw_legend(corner.axes, self._labels, n_maps=len(cells) if self._counted else 0)
+        self.show(cells)
+
+    @property
+    def changing(self) -> list[tuple[Any, Artist]]:
+        """What `show` sets beside the legend, in the order of drawing, with the axes to draw it on."""
+        on_maps = [(one.axes, item) for one in self._maps for item in one.changing]
+        return [*on_maps, *((self._maps[0].axes, item) for item in self._facts)]
+
+    @property
+    def legend_rows(self) -> list[Any]:
+        """The words of the legend, which `show` sets too."""
+        return list(self._legend.get_texts())
+
+    def show(self, cells: Sequence[Cell]) -> None:
+        """Set every map; `cells` are as many as before, of the same cities."""
+        for one, facts, cell in zip(self._maps, self._facts, cells, strict=True):
+            one.show(cell.state)
+            facts.set_text(cell.facts)
+        counts = [count_marks(cell.city, cell.state) for cell in cells] if self._counted else []
+        show_counts(self._legend, self._labels, counts)
+
+    def _add(self, cell: Cell, left: float, top: float, height: float, *, alone: bool, n_lines: int) -> None:
+        """Add a map whose upper left corner is there, in inches from the upper left one of the figure."""
+        wide, high = self._width, self._height
+        box = (left / wide, 1.0 - (top + height) / high, self._map_inches / wide, height / high)
+        axes = self.figure.add_axes(box)
+        n_brigades = len(cell.city.brigade_tank_litres)
+        if cell.state.crews is not None:
+            n_brigades = max(n_brigades, len(cell.state.crews.xy_m))
+        self._maps.append(CityMap(axes, cell.city, inches=self._map_inches, n_brigades=n_brigades))
+        room = wide - 2 * _GAP_INCHES if alone else self._map_inches
+        size = 13.0 if alone else 11.0
+        title_at = top - (n_lines - 1) * _LINE_INCHES
+        self._write(left, title_at, cell.title, points=size, inches=room)
+        self._facts.append(self._write(left, top, cell.facts, points=size - 2.0, inches=room))
+
+    def _write(self, left: float, bottom: float, text: str, *, points: float, inches: float) -> Any:
+        """Write a line, in smaller letters if it would be too long; names in it are whoever's, and no formulas."""
+        fitting = inches * 72.0 / (_POINTS_WIDE * max(1, len(text)))
+        place = (left / self._width, 1.0 - (bottom - 0.07) / self._height)
+        style: dict[str, Any] = {"ha": "left", "va": "baseline", "color": INK, "parse_math": False}
+        return self.figure.text(*place, text, fontsize=min(points, max(fitting, 6.0)), **style)
+
+
+def _labels_of(cells: Sequence[Cell]) -> list[str]:
+    there: set[str] = set().union(*(count_marks(cell.city, cell.state) for cell in cells))
+    return [label for label in LABELS if label in there]
+
+
+def _even(inches: float, dpi: int) -> float:
+    """Return inches that are an even number of pixels, as films want it."""
+    return 2 * round(inches * dpi / 2) / dpi

@@ -1,0 +1,1 @@
+"""Recordings and trainings in Rerun."""

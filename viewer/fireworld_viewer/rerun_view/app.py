@@ -1,0 +1,236 @@
+"""Ways to look at recordings: save them for Rerun, open Rerun's window, or serve Rerun to a browser."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import Final
+
+from fireworld.errors import OutputError, ViewError, expected
+from fireworld.records import Recording
+from fireworld_viewer.pictures.figure_files import written_beside
+from fireworld_viewer.rerun_view.outcome_panel import Outcome
+
+RERUN_MINOR: Final = "0.41."
+INSTALL_HINT: Final = "try pip install 'fireworld[view]'"
+LOCALHOST: Final = "127.0.0.1"
+WEB_PORT: Final = 9090
+APPLICATION_ID: Final = "fireworld"
+
+
+def save(
+    recordings: Sequence[Recording],
+    path: Path,
+    *,
+    focus: Sequence[int] = (),
+    force: bool = False,
+    outcome: Outcome | None = None,
+) -> None:
+    """Write one recording, or two side by side, as a Rerun file; an unfinished file never bears the final name.
+
+    Args:
+        recordings: one, or two of the same city.
+        path: the .rrd file.
+        focus: ids of buildings whose temperatures are plotted; if there are none, those that burn first.
+        force: replace an existing file.
+        outcome: what the runs came to, and where two first differ; left out of the view if not given.
+
+    Raises:
+        OutputError: the file exists or cannot be written.
+        ViewError: Rerun is missing, the cities differ or a building of the focus is unknown.
+    """
+    if path.exists() and not force:
+        raise OutputError(f"{path}: exists already; try --force")
+    if not path.parent.is_dir():
+        raise OutputError(f"{path}: its folder does not exist")
+    content = _rrd(recordings, focus, outcome)
+    with written_beside(path) as partial:
+        partial.write_bytes(content)
+
+
+def show(recordings: Sequence[Recording], *, focus: Sequence[int] = (), outcome: Outcome | None = None) -> None:
+    """Open recordings in Rerun's own window and return when it is closed; the arguments are those of `save`.
+
+    Raises:
+        ViewError: there is no display, or no viewer.
+    """
+    _import_rerun()
+    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise ViewError("view: no display here; try --save FILE.rrd, --web, or `fireworld render` for pictures")
+    _run_viewer(recordings, focus, outcome, ["--port", str(free_port()), "--hide-welcome-screen"])
+
+
+def serve(
+    recordings: Sequence[Recording],
+    *,
+    focus: Sequence[int] = (),
+    outcome: Outcome | None = None,
+    port: int = WEB_PORT,
+    announce: Callable[[str], None],
+) -> None:
+    """Serve Rerun with the recordings to browsers on this machine until interrupted.
+
+    Args:
+        recordings: one, or two of the same city.
+        focus: as `save` has it.
+        outcome: as `save` has it.
+        port: of the page.
+        announce: told the address of the page.
+
+    Raises:
+        ViewError: the port is taken, or there is no viewer.
+    """
+    _import_rerun()
+    if not _is_free(port):
+        raise ViewError(expected("view", "--port", "a free port", port, "try another one"))
+    data_port = free_port()
+    announce(f"http://{LOCALHOST}:{port}?url=rerun%2Bhttp%3A%2F%2F{LOCALHOST}%3A{data_port}%2Fproxy")
+    ports = ["--web-viewer-port", str(port), "--port", str(data_port)]
+    _run_viewer(recordings, focus, outcome, ["--serve-web", *ports])
+
+
+def viewer_executable() -> Path:
+    """Path of Rerun's viewer itself; the `rerun` script is a wrapper that leaves it running when it is stopped.
+
+    Raises:
+        ViewError: it is not there.
+    """
+    rerun = _import_rerun()
+    folder = Path(str(rerun.__file__)).parents[1] / "rerun_cli"
+    path = folder / ("rerun.exe" if os.name == "nt" else "rerun")
+    if not path.is_file():
+        raise ViewError(f"view: expected Rerun's viewer at {path}; {INSTALL_HINT}")
+    return path
+
+
+def viewer_environment(environment: Mapping[str, str]) -> dict[str, str]:
+    """Environment for Rerun's viewer: it reports usage unless it believes to run in continuous integration."""
+    kept = {name: value for name, value in environment.items() if name != "RERUN_ANALYTICS"}
+    return {**kept, "CI": "1", "RUST_LOG": environment.get("RUST_LOG", "error")}
+
+
+def free_port() -> int:
+    """A port of this machine that nobody listens on at the moment."""
+    with socket.socket() as probe:
+        probe.bind((LOCALHOST, 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome | None) -> bytes:
+    """Make the Rerun file of one recording, or of two of the same city, in memory.
+
+    Rerun can write files too, in a thread of its own that tells nobody when the disk is full.
+    """
+    rerun = _import_rerun()
+    from fireworld_viewer.rerun_view import blueprint, comparison, mapping, plots
+    from fireworld_viewer.rerun_view import legend_page as legend
+    from fireworld_viewer.rerun_view.outcome_panel import log_outcome
+
+    comparing = len(recordings) > 1
+    if comparing:
+        comparison.check_same_city(*(one.city for one in recordings))
+    stream = rerun.RecordingStream(APPLICATION_ID, recording_id=_identity(recordings), send_properties=False)
+    if not rerun.is_enabled(stream):
+        raise ViewError("view: Rerun is switched off by the environment variable RERUN; try unsetting it")
+    stream.set_log_time_enabled(False)
+    stream.set_log_tick_enabled(False)
+    memory = stream.memory_recording()
+    with warnings.catch_warnings():
+        # Rerun warns of data it cannot take and goes on; a view that lacks something is worse than none.
+        warnings.simplefilter("error", rerun.error_utils.RerunWarning)
+        plotted = focus or plots.first_burning(recordings[0])
+        lay_out = blueprint.pair if comparing else blueprint.single
+        stream.send_blueprint(lay_out(*recordings, focus=bool(plotted), outcome=outcome))
+        stream.send_recording_name(" | ".join(map(blueprint.title, recordings)))
+        legend.log_legend(stream, comparing=comparing)
+        if outcome is not None:
+            log_outcome(stream, outcome)
+        if comparing:
+            comparison.log_comparison(stream, *recordings, focus=plotted, outcome=outcome)
+        else:
+            mapping.log_recording(stream, *recordings, focus=plotted)
+    content: bytes = memory.drain_as_bytes()
+    return content
+
+
+def _identity(recordings: Sequence[Recording]) -> str:
+    """Name what is shown: Rerun merges what has one name, so that different runs must have different ones."""
+    digest = hashlib.sha256()
+    for one in recordings:
+        digest.update(f"{one.header.scenario_digest} {one.header.seed} {one.header.policy_digest}".encode())
+        for numbers in (one.steps, one.column("/buildings", "energy"), one.column("/brigades", "x_m")):
+            digest.update(numbers.tobytes())
+    return digest.hexdigest()[:32]
+
+
+def _run_viewer(
+    recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome | None, options: list[str]
+) -> None:
+    """Run Rerun's viewer on recordings until it ends or we are told to stop; it never outlives us."""
+    with tempfile.TemporaryDirectory(prefix="fireworld-") as folder:
+        path = Path(folder) / "view.rrd"
+        save(recordings, path, focus=focus, outcome=outcome)
+        command = [str(viewer_executable()), "--bind", LOCALHOST, *options, str(path)]
+        before = signal.signal(signal.SIGTERM, _stop)
+        with (Path(folder) / "said").open("w+", encoding="utf-8", errors="replace") as said:
+            viewer = subprocess.Popen(command, env=viewer_environment(os.environ), stderr=said)  # noqa: S603 - our own
+            try:
+                status = viewer.wait()
+            except KeyboardInterrupt:
+                status = 0
+            finally:
+                signal.signal(signal.SIGTERM, before)
+                viewer.terminate()
+                viewer.wait()
+            said.seek(0)
+            reason = " ".join(said.read().split())
+    if status:
+        why = f": {reason.rpartition(': ')[2][-120:]}" if reason else ""
+        hint = "try --save FILE.rrd, --web, or `fireworld render`"
+        raise ViewError(f"view: Rerun's viewer ended with code {status}{why}; {hint}")
+
+
+def _stop(number: int, frame: object) -> None:
+    del number, frame
+    raise KeyboardInterrupt
+
+
+def _is_free(port: int) -> bool:
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((LOCALHOST, port))
+        except OSError:
+            return False
+    return True
+
+
+def _import_rerun() -> ModuleType:
+    """Import Rerun, quietly: its own log would stand between the user and our one line.
+
+    Raises:
+        ViewError: it is not installed, or is of another minor version.
+    """
+    spoken = os.environ.get("RUST_LOG")
+    os.environ["RUST_LOG"] = spoken or "off"  # read once, when Rerun is first imported
+    try:
+        import rerun
+    except ImportError:
+        raise ViewError(f"view: Rerun is not installed; {INSTALL_HINT}") from None
+    finally:
+        if spoken is None:
+            del os.environ["RUST_LOG"]
+    if not rerun.__version__.startswith(RERUN_MINOR):
+        raise ViewError(expected("rerun-sdk", "version", f"{RERUN_MINOR}*", rerun.__version__, INSTALL_HINT))
+    module: ModuleType = rerun
+    return module

@@ -1,0 +1,98 @@
+"""The legend: every color of the map with its name, and a page on how to read the view."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from fireworld.records import ACTIVITIES, FIERYNESS
+from fireworld_viewer import colors
+
+if TYPE_CHECKING:
+    import rerun
+
+LEGEND_PATH: Final = "/legend"
+HELP_PATH: Final = "/help"
+
+_COLUMN_WIDTH: Final = 3.9
+"""In rows: a name is so wide, and a row as high as a dot with its name."""
+
+HELP: Final = """\
+# How to read this
+
+**Buildings** stand as they are, 3 m a storey. Grey ones are untouched; yellow, orange and dark red ones burn; blue ones
+were watered or put out; black ones are burnt out; green ones are refuges, where tanks are refilled. Click the dot on a
+roof and open the panel on the right (the button at the top right) to read the building's temperature, fuel, water and
+fieryness at this step.
+
+**Brigades** are balls, colored by what they do. The blue bar above a brigade is the water in its tank; the label is
+its name and the litres. A blue arc is water on its way to the target; a thin white one leads to the target that a
+brigade drives to. Brigades on one spot are drawn side by side. Click a ball to read what it chose, and by which values.
+
+**Civilians** are small dots above roofs: green when well, white when hurt, magenta when dying, black when dead.
+
+**Fire sites** are thin boxes, as the brigades saw them before the step; a pink side is one over which the fire can
+still spread.
+
+**Air**: a recording holds the heat of the air only every 50 steps. The third tab of the map shows the last one that
+there was, and says of which step it is; `fireworld view --air` works out every step. From purple over pink to white it
+gets hotter.
+
+**The log** tells what happened, and each choice that is new: what a brigade goes for, the value (Q) of that beside the
+best other action's, and the state that it saw. A rule has no values.
+
+The slider below moves through the steps, one simulated minute each; the space bar plays them. With two recordings the
+marked part of the slider begins where they first differ.
+"""
+
+
+def entries(*, comparing: bool) -> list[list[tuple[str, colors.Rgb]]]:
+    """Rows of names and colors of all that is on the map."""
+    buildings = list(zip(FIERYNESS, colors.FIERYNESS_RGB, strict=True))
+    names = [f"brigade {activity}".replace("driving-to", "to") for activity in ACTIVITIES]
+    brigades = list(zip(names, colors.ACTIVITY_RGB, strict=True))
+    rows = [
+        buildings[:4],
+        buildings[4:8],
+        [buildings[8], ("refuge", colors.REFUGE_RGB), ("hydrant", colors.HYDRANT_RGB), ("hot air", colors.AIR_RGB[1])],
+        [*brigades[:3], ("water", colors.WATER_RGB)],
+        [*brigades[3:], ("fire can spread", colors.FREE_SIDE_RGB)],
+        [
+            ("civilian, well", colors.HEALTHY_RGB),
+            ("civilian, hurt", colors.HURT_RGB),
+            ("civilian, dying", colors.DYING_RGB),
+            ("civilian, dead", colors.DEAD_RGB),
+        ],
+    ]
+    if comparing:
+        rows.append(list(zip(("B is better", "the same", "B is worse"), colors.DIFFERENCE_RGB, strict=True)))
+    return rows
+
+
+def bounds(*, comparing: bool) -> tuple[tuple[float, float], tuple[float, float]]:
+    """What of the legend's plane is to be seen: its range in x and in y."""
+    rows = entries(comparing=comparing)
+    n_columns = max(map(len, rows))
+    return (-_COLUMN_WIDTH / 2, _COLUMN_WIDTH * (n_columns - 0.5)), (-0.4, len(rows) - 0.1)
+
+
+def log_legend(stream: rerun.RecordingStream, *, comparing: bool) -> None:
+    """Send the legend, as dots in rows with their names below them, and the page of help."""
+    import rerun
+
+    rows = entries(comparing=comparing)
+    place = [(_COLUMN_WIDTH * x, float(y)) for y, row in enumerate(rows) for x in range(len(row))]
+    named = [entry for row in rows for entry in row]
+    dots = rerun.Points2D(
+        place, colors=colors.packed_table([rgb for _, rgb in named]), radii=rerun.Radius.ui_points(6.0)
+    )
+    # The names hang on points of their own: a name takes the color of its point, and black ones could not be read.
+    names = rerun.Points2D(
+        place,
+        colors=colors.single(colors.LABEL_RGB),
+        labels=[name for name, _ in named],
+        show_labels=True,
+        radii=rerun.Radius.ui_points(0.5),
+    )
+    stream.log(f"{LEGEND_PATH}/dots", dots, static=True)
+    stream.log(f"{LEGEND_PATH}/names", names, static=True)
+    stream.log(HELP_PATH, rerun.TextDocument(HELP, media_type=rerun.MediaType.MARKDOWN), static=True)
