@@ -61,17 +61,17 @@ def check(
     Exit code: 0 all the same, 1 one is different, 2 one cannot be run or compared, or there is none.
     """
     from fireworld.cli.golden_junit import junit_xml
-    from fireworld.files import check_free, write_file
+    from fireworld.files import check_output, write_file
     from fireworld.recording.golden.check import find_goldens, make_golden_folder, store_recording
 
     if keep is not None and keep.resolve() == folder.resolve():
         raise click.UsageError("--keep: expected another folder than that of the goldens.")
     paths = find_goldens(folder)
     if junit is not None:
-        check_free(junit, force=force)
+        check_output(junit, force=force)
     if keep is not None and not force:
         for taken in (keep / path.name for path in paths if (keep / path.name).exists()):
-            check_free(taken)
+            check_output(taken)
     results = []
     for checked in _check_all(paths, quiet=as_json):
         if keep is not None and checked.fresh is not None and checked.result == "different":

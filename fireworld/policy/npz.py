@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from fireworld.errors import TrainingError, expected
-from fireworld.files import check_free, written_beside
+from fireworld.files import check_output, written_beside
 from fireworld.records import Array
 
 SUFFIX: Final = ".npz"
@@ -33,7 +33,7 @@ def write_arrays(path: Path, header: Mapping[str, Any], arrays: Mapping[str, Arr
     Raises:
         OutputError: the file exists, or cannot be written.
     """
-    check_free(path, force=force)
+    check_output(path, force=force)
     text = np.frombuffer(json.dumps(header, sort_keys=True).encode(), dtype=np.uint8)
     with written_beside(path) as partial, zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, array in {"header": text, **arrays}.items():

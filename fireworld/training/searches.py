@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from fireworld.errors import OutputError, TrainingError, expected
-from fireworld.files import check_free
+from fireworld.files import check_output
 from fireworld.kernels.ranking import N_WEIGHTS
 from fireworld.policy.npz import check_arrays, check_finite, read_bytes
 from fireworld.policy.ranking import Ranking, parse_ranking, save_ranking
@@ -43,7 +43,7 @@ class SearchRun:
         Raises:
             OutputError: something is.
         """
-        check_free(self.path, force=self.force)
+        check_output(self.path, force=self.force)
         check_no_checkpoint(self.checkpoint, force=self.force)
 
     def resume(self) -> bool:

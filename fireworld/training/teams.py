@@ -12,7 +12,7 @@ from threading import Event
 from typing import Final
 
 from fireworld.errors import OutputError, TrainingError, expected
-from fireworld.files import check_free, write_file
+from fireworld.files import check_output, write_file
 from fireworld.policy.team import Team, read_team, save_team
 from fireworld.training.checkpoint import (
     check_identity,
@@ -54,7 +54,7 @@ class Training:
         """
         for path in (self.path, self.log_path):
             if path is not None:
-                check_free(path, force=self.force)
+                check_output(path, force=self.force)
         check_no_checkpoint(self.checkpoint, force=self.force)
 
     def resume(self) -> bool:
@@ -71,7 +71,7 @@ class Training:
             return True
         if self.checkpoint.exists():
             if self.log_path is not None:
-                check_free(self.log_path)
+                check_output(self.log_path)
             try:
                 self.log = restore_checkpoint(self.trainer, self.checkpoint).decode()
             except UnicodeDecodeError:

@@ -164,7 +164,7 @@ def test_from_the_command_line(here, fireworld):
         (("-o", "a.npz", "--set", "cooperation=maybe"), "cooperation: expected true or false, got 'maybe'"),
         (("-o", "a.npz", "--set", "n_best=60"), "n_best: expected at most n_candidates, 48"),
         (("-o", "a.npz", "--resume"), "expected a checkpoint to go on from"),
-        (("-o", "nowhere/a.npz"), "expected a file in an existing folder"),
+        (("-o", "nowhere/a.npz"), "expected an existing folder"),
     ],
 )
 def test_mistakes(here, fireworld, words, wanted):

@@ -1,0 +1,171 @@
+"""How a run came out: one table of quantities, which the terminal, pages, JSON, results and comparisons walk.
+
+To add a score that follows from what is recorded, add a property to `Outcome` and a row to `QUANTITIES`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from fireworld.records import CityRecord, StepRecord
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """How a run stands after its last step."""
+
+    steps: int
+    """Last step done."""
+    completed: bool
+    """Nothing burns any more."""
+    score: float
+    """Official score of the paper's time."""
+    score_max: float
+    """Number of civilians + 1."""
+    score_now: float
+    """Official score of today."""
+    n_buildings: int
+    n_burning: int
+    n_water_damaged: int
+    n_burnt_out: int
+    n_civilians: int
+    n_civilians_alive: int
+    total_reward: float
+    """Undiscounted return of the team."""
+    water_used_litres: float
+    """Sprayed by all brigades."""
+
+    @property
+    def score_share(self) -> float:
+        """Score as a share of its maximum."""
+        return self.score / self.score_max
+
+    @property
+    def time_to_complete(self) -> int | None:
+        """The step at which nothing burned any more; None if something still burns."""
+        return self.steps if self.completed else None
+
+
+def outcome_of(record: StepRecord, city: CityRecord) -> Outcome:
+    """Return how a run stands after a recorded step.
+
+    Args:
+        record: the step.
+        city: where it was.
+    """
+    score = record.score
+    return Outcome(
+        steps=record.step,
+        completed=record.terminated,
+        score=score.score,
+        score_max=score.score_max,
+        score_now=score.score_now,
+        n_buildings=len(city.building_id),
+        n_burning=score.n_burning,
+        n_water_damaged=score.n_water_damaged,
+        n_burnt_out=score.n_burnt_out,
+        n_civilians=len(city.civilian_hp),
+        n_civilians_alive=score.n_civilians_alive,
+        total_reward=record.rewards.sum_so_far,
+        water_used_litres=score.water_used_litres,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
+    """One thing that is said of how a run came out."""
+
+    name: str
+    """Attribute of `Outcome`, and key in JSON."""
+    label: str
+    unit: str
+    digits: int
+    """Decimals of a mean."""
+    higher_is_better: bool | None
+    """None: neither is better by itself."""
+    text: Callable[[Outcome], str]
+    """Write it for people, with its unit."""
+    field: str = ""
+    """Where a log has it step by step, as in "score.n_burnt_out"; empty if it only follows from other fields."""
+
+
+def _time(outcome: Outcome) -> str:
+    return f"{outcome.steps} steps" if outcome.completed else f"not within {outcome.steps} steps"
+
+
+QUANTITIES: Final = (
+    Quantity(
+        name="score",
+        label="score",
+        unit="",
+        digits=3,
+        higher_is_better=True,
+        text=lambda outcome: f"{outcome.score:.3f} of {outcome.score_max:.0f}",
+        field="score.score",
+    ),
+    Quantity(
+        name="time_to_complete",
+        label="time to complete",
+        unit="steps",
+        digits=1,
+        higher_is_better=False,
+        text=_time,
+    ),
+    Quantity(
+        name="n_burnt_out",
+        label="burnt out",
+        unit="buildings",
+        digits=1,
+        higher_is_better=False,
+        text=lambda outcome: f"{outcome.n_burnt_out} of {outcome.n_buildings} buildings",
+        field="score.n_burnt_out",
+    ),
+    Quantity(
+        name="n_burning",
+        label="still burning",
+        unit="buildings",
+        digits=1,
+        higher_is_better=False,
+        text=lambda outcome: str(outcome.n_burning),
+        field="score.n_burning",
+    ),
+    Quantity(
+        name="n_water_damaged",
+        label="water-damaged",
+        unit="buildings",
+        digits=1,
+        higher_is_better=None,
+        text=lambda outcome: str(outcome.n_water_damaged),
+        field="score.n_water_damaged",
+    ),
+    Quantity(
+        name="n_civilians_alive",
+        label="civilians alive",
+        unit="civilians",
+        digits=2,
+        higher_is_better=True,
+        text=lambda outcome: f"{outcome.n_civilians_alive} of {outcome.n_civilians}",
+        field="score.n_civilians_alive",
+    ),
+    Quantity(
+        name="total_reward",
+        label="return",
+        unit="",
+        digits=0,
+        higher_is_better=True,
+        text=lambda outcome: f"{outcome.total_reward:,.0f}",
+        field="rewards.sum_so_far",
+    ),
+    Quantity(
+        name="water_used_litres",
+        label="water used",
+        unit="litres",
+        digits=0,
+        higher_is_better=None,
+        text=lambda outcome: f"{outcome.water_used_litres:,.0f} litres",
+        field="score.water_used_litres",
+    ),
+)
+"""What is said of a run, the most important first."""
