@@ -1,4 +1,4 @@
-"""Who does work that comes in many parts: threads, processes, or an executor that is given; the results are the same."""
+"""Who does work that comes in many parts: threads, processes, or an executor that is given, with the same results."""
 
 from __future__ import annotations
 

@@ -178,9 +178,9 @@ class Document(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     name: Annotated[str, Meta(description="Name of the scenario; by default the file's.")] = ""
     description: Annotated[str, Meta(description="What is to see here, in one line.")] = ""
     preset: Annotated[Preset, Meta(description="Physical parameters to start from.")] = "paper"
-    overrides: Annotated[
+    parameters: Annotated[
         Overrides, Meta(description="Physical parameters that differ from the preset, by section.")
-    ] = msgspec.field(default=Overrides(), name="parameters")
+    ] = Overrides()
     city: Annotated[CitySource, Meta(description="The city.")]
     fires: Annotated[tuple[Fire, ...], Meta(min_length=1, description="What burns at the start.")]
     civilians: Annotated[Civilians, Meta(description="The people to save.")] = Civilians(n=0)
@@ -204,7 +204,7 @@ Section = TypeVar("Section", FireParameters, HealthParameters, BrigadeParameters
 
 def resolve_parameters(document: Document) -> Parameters:
     """Return the preset's parameters with the document's overrides."""
-    preset, overrides = PRESETS[document.preset], document.overrides
+    preset, overrides = PRESETS[document.preset], document.parameters
     return Parameters(
         fire=_override(preset.fire, overrides.fire),
         health=_override(preset.health, overrides.health),

@@ -21,19 +21,56 @@ from fireworld.scenario.yaml_text import read_yaml, write_yaml
 SIZE_MAX_BYTES: Final = 1_000_000
 
 
-class Scenario(Document, frozen=True, kw_only=True):
-    """A scenario ready to be placed in its city.
+_DEFAULTS: Final = dict(zip(Document.__struct_fields__, Document.__struct_defaults__, strict=True))
+"""Defaults of a scenario's keys."""
 
-    `city.file` is an absolute path; or as written, where the city does not come from a file (see `parse_scenario`).
+
+class Scenario(Document, frozen=True, kw_only=True):
+    """A scenario ready to be placed in its city: from YAML, from plain values, or from keyword arguments.
+
+    Scenario(city={"generated": {"columns": 6, "rows": 4}}, fires=[{"at": [0.5, 0.5]}], steps=50) checks its values as
+    a scenario file's are. `city.file` is an absolute path; or as written, where the city does not come from a file.
     """
 
-    source: str
+    source: str = ""
     """The file (or flag) that errors name."""
-    city_sha256: str | None
+    city_sha256: str | None = None
     """Digest of the city file, None for a generated city."""
 
+    def __post_init__(self) -> None:
+        """Check values that were given as keyword arguments, and not read from a file."""
+        if self.source:
+            return
+        values = {key: getattr(self, key) for key in Document.__struct_fields__}
+        given = {key: value for key, value in values.items() if value is not _DEFAULTS.get(key)}
+        checked = scenario_of(to_plain(given, source="Scenario"), source="Scenario", folder=Path())
+        for key in Scenario.__struct_fields__:
+            msgspec.structs.force_setattr(self, key, getattr(checked, key))
+
+    @classmethod
+    def from_yaml(cls, text: str | bytes, *, folder: Path | str = ".") -> Scenario:
+        """Read a scenario from the text of a scenario file.
+
+        Args:
+            text: YAML.
+            folder: where city files are relative to.
+
+        Raises:
+            ScenarioError: broken YAML, or a scenario that makes no sense.
+        """
+        return parse_scenario(text, source="Scenario", folder=Path(folder))
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], *, folder: Path | str = ".") -> Scenario:
+        """Make a scenario of the keys and values that its file would have.
+
+        Raises:
+            ScenarioError: a key or value that a scenario file could not have either.
+        """
+        return scenario_of(to_plain(values, source="Scenario"), source="Scenario", folder=Path(folder))
+
     @property
-    def parameters(self) -> Parameters:
+    def resolved_parameters(self) -> Parameters:
         """The physical parameters: the preset's with the scenario's overrides."""
         return resolve_parameters(self)
 
@@ -41,7 +78,7 @@ class Scenario(Document, frozen=True, kw_only=True):
     def resolved(self) -> dict[str, Any]:
         """The scenario as plain values with nothing left to presets, defaults or the place of files."""
         content = self._document()
-        content["parameters"] = asdict(self.parameters)
+        content["parameters"] = asdict(self.resolved_parameters)
         if self.city.file is not None:
             content["city"] |= {"file": Path(self.city.file).name, "sha256": self.city_sha256}
         resolved: dict[str, Any] = _without_nulls(content)
@@ -61,7 +98,7 @@ class Scenario(Document, frozen=True, kw_only=True):
         return write_yaml(self.resolved)
 
     def with_settings(self, settings: Mapping[str, str]) -> Scenario:
-        """Return the scenario with other values.
+        """Return the scenario with other values, given as text.
 
         Args:
             settings: YAML values by dotted key, as in {"brigades.n": "7", "fires.0.n_buildings": "12"}.
@@ -69,12 +106,31 @@ class Scenario(Document, frozen=True, kw_only=True):
         Raises:
             ScenarioError: a key or value that a scenario file could not have either.
         """
+        values = {key: read_yaml(text, source=f"--set {key}") for key, text in settings.items()}
+        return self._with(values, words=[f"--set {key}={text}" for key, text in settings.items()])
+
+    def with_values(self, values: Mapping[str, Any]) -> Scenario:
+        """Return the scenario with other values.
+
+        Args:
+            values: by dotted key, as in {"brigades.n": 7, "fires.0.n_buildings": 12}.
+
+        Raises:
+            ScenarioError: a key or value that a scenario file could not have either.
+        """
+        plain = to_plain(values, source="set")
+        return self._with(plain, words=[f"--set {key}={json.dumps(value)}" for key, value in plain.items()])
+
+    def _with(self, values: Mapping[str, Any], *, words: list[str]) -> Scenario:
         document = self._document()
-        for key, text in settings.items():
-            source = f"--set {key}"
-            _assign(document, key, read_yaml(text, source=source), source=source)
-        source = f"{self.source} with " + " ".join(f"--set {key}={text}" for key, text in settings.items())
-        return build_scenario(document, source=source if settings else self.source, folder=Path())
+        for key, value in values.items():
+            _assign(document, key, value, source=f"--set {key}")
+        source = f"{self.source} with " + " ".join(words)
+        return scenario_of(document, source=source if values else self.source, folder=Path())
+
+    def __repr__(self) -> str:
+        people = f"{self.brigades.n} brigades, {self.civilians.count} civilians"
+        return f"<Scenario {self.name or 'without a name'}: {self.city.summary}, {people}, {self.steps} steps>"
 
     def _document(self) -> dict[str, Any]:
         """Return what the scenario's file says, as plain values."""
@@ -98,10 +154,34 @@ def parse_scenario(text: bytes | str, *, source: str, folder: Path | None = None
     document = read_yaml(text, source=source)
     if not isinstance(document, dict):
         raise ScenarioError(expected(source, "", "a scenario (keys and values)", _kind_of(document)))
-    return build_scenario(document, source=source, folder=folder)
+    return scenario_of(document, source=source, folder=folder)
 
 
-def build_scenario(values: Mapping[str, Any], *, source: str, folder: Path | None) -> Scenario:
+def to_plain(values: Mapping[str, Any], *, source: str) -> dict[str, Any]:
+    """Return values as a YAML reader would: dicts, lists, text, numbers, booleans and None.
+
+    Raises:
+        ScenarioError: there is something else among them.
+    """
+    try:
+        plain = msgspec.to_builtins(values, enc_hook=_plain_number)
+    except (TypeError, NotImplementedError, ValueError) as error:
+        raise ScenarioError(expected(source, "", "keys with plain values", str(error))) from None
+    if not isinstance(plain, dict) or not all(isinstance(key, str) for key in plain):
+        raise ScenarioError(expected(source, "", "keys with plain values", type(values).__name__))
+    as_read: dict[str, Any] = json.loads(json.dumps(plain))  # tuples become lists
+    return as_read
+
+
+def _plain_number(value: object) -> Any:
+    """Return a number of numpy as a Python one."""
+    item = getattr(value, "tolist", None)
+    if item is None:
+        raise NotImplementedError(f"a value of type {type(value).__name__}")
+    return item()
+
+
+def scenario_of(values: Mapping[str, Any], *, source: str, folder: Path | None) -> Scenario:
     """Validate plain values as a scenario; arguments as for `parse_scenario`."""
     try:
         document = msgspec.convert(values, Document)

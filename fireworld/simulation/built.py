@@ -41,7 +41,7 @@ class BuiltScenario:
         """
         return World(
             self.city,
-            self.scenario.parameters,
+            self.scenario.resolved_parameters,
             ignited=self.placement.ignited,
             civilian_building=self.placement.civilian_building,
             civilian_mm=self.placement.civilian_mm,
@@ -56,7 +56,7 @@ class BuiltScenario:
 
     def city_record(self) -> CityRecord:
         """Return the city as it is recorded."""
-        parameters = self.scenario.parameters
+        parameters = self.scenario.resolved_parameters
         n_civilians = len(self.placement.civilian_building)
         return city_record(
             self.city,
@@ -110,7 +110,7 @@ class CityCache:
             ScenarioError: the city has not what the scenario asks for.
             CityError: the city cannot be built.
         """
-        key = repr((scenario.city, scenario.city_sha256, scenario.parameters.fire))
+        key = repr((scenario.city, scenario.city_sha256, scenario.resolved_parameters.fire))
         bare = self._built.get(key)
         if bare is None:
             bare = self._built[key] = _build_bare_city(scenario, city_json=city_json)
@@ -126,6 +126,6 @@ def build_scenario(scenario: Scenario, *, city_json: bytes | None = None) -> Bui
 
 def _build_bare_city(scenario: Scenario, *, city_json: bytes | None) -> BareCity:
     plan = scenario_plan(scenario, city_json=city_json)
-    fire = scenario.parameters.fire
+    fire = scenario.resolved_parameters.fire
     city = build_city(plan, fire, seed=scenario.city.ray_seed)
     return BareCity(plan=plan, city=city, arrays=city_arrays(city, fire))

@@ -131,7 +131,7 @@ def shipped(name: str, *, in_turn: bool = True) -> Play:
     scenario = load_scenario(name)
     built = build_scenario(scenario)
     tables = episode.Tables.of_city(
-        built.city, scenario.parameters, unit_volume_m3=scenario.unit_volume_m3, in_turn=in_turn
+        built.city, scenario.resolved_parameters, unit_volume_m3=scenario.unit_volume_m3, in_turn=in_turn
     )
     setup = built.placement
     start = {

@@ -31,7 +31,7 @@ def town(choices):
     built = build_scenario(load_scenario("quick").with_settings(settings))
     scenario, setup = built.scenario, built.placement
     tables = episode.Tables.of_city(
-        built.city, scenario.parameters, unit_volume_m3=scenario.unit_volume_m3, in_turn=choices == "in-turn"
+        built.city, scenario.resolved_parameters, unit_volume_m3=scenario.unit_volume_m3, in_turn=choices == "in-turn"
     )
     start = {
         "ignited": setup.ignited,

@@ -40,13 +40,13 @@ def error_of(call):
 def test_defaults():
     scenario = parse()
     assert (scenario.preset, scenario.steps, scenario.reward, scenario.brigades.n) == ("paper", 500, "stock", 4)
-    assert scenario.parameters == PAPER
-    assert parse(preset="official-2011").parameters == OFFICIAL_2011
+    assert scenario.resolved_parameters == PAPER
+    assert parse(preset="official-2011").resolved_parameters == OFFICIAL_2011
 
 
 def test_overrides_replace_the_presets_values():
     overrides = {"brigades": {"power_litres": 700}, "fire": {"burn_rate_mean": 0.2}, "health": {"initial_hp": 50}}
-    parameters = parse(parameters=overrides).parameters
+    parameters = parse(parameters=overrides).resolved_parameters
     assert parameters.brigades.power_litres == 700
     assert parameters.fire.burn_rate_mean == 0.2
     assert parameters.health.initial_hp == 50
@@ -175,11 +175,11 @@ def test_settings():
     assert scenario.with_settings({"brigades.n": "7"}).brigades.n == 7
     assert scenario.with_settings({"fires.0.n_buildings": "2"}).fires[0].n_buildings == 2
     assert scenario.with_settings({"fires.1.buildings": "[4]"}).fires[1].buildings == (4,)
-    assert scenario.with_settings({"parameters.brigades.range_m": "30"}).parameters.brigades.range_m == 30
+    assert scenario.with_settings({"parameters.brigades.range_m": "30"}).resolved_parameters.brigades.range_m == 30
     assert scenario.with_settings({"description": "no"}).description == "no"
     assert scenario.with_settings({}) == scenario
     changed = parse(parameters={"brigades": {"range_m": 9}}).with_settings({"preset": "official-2011"})
-    assert (changed.parameters.brigades.range_m, changed.parameters.brigades.tank_litres) == (9, 7500)
+    assert (changed.resolved_parameters.brigades.range_m, changed.resolved_parameters.brigades.tank_litres) == (9, 7500)
 
 
 @pytest.mark.parametrize(
@@ -267,7 +267,7 @@ def test_the_papers_scenarios(name):
     scenario = load_scenario(name)
     assert (scenario.fires[0].n_buildings, scenario.civilians.n, scenario.brigades.n) == TABLE_1[name]
     assert (scenario.preset, scenario.steps, scenario.reward) == ("paper", 500, "stock")
-    assert scenario.parameters == PAPER
+    assert scenario.resolved_parameters == PAPER
     generated = scenario.city.generated
     assert generated is not None
     assert (generated.columns, generated.rows, generated.lot_m, generated.block) == (24, 26, 14.0, (3, 2))

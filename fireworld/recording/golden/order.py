@@ -171,7 +171,7 @@ def kind_of(scenario: Scenario) -> str:
 
     Scenarios that differ in places, numbers of buildings or people, or luck alone are of one kind.
     """
-    changed = scenario.parameters != PRESETS[scenario.preset]
+    changed = scenario.resolved_parameters != PRESETS[scenario.preset]
     return ", ".join(
         (
             f"{'generated city' if scenario.city.generated else 'city'} of {scenario.city.summary}",
