@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Event
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C that ended some work; the text says what is left of it."""
 
 
 @contextmanager
@@ -13,7 +18,8 @@ def gentle_interrupt() -> Iterator[Event]:
     """Let the first Ctrl-C but set an event, so that what is under way is done and kept; a second one stops it."""
     asked = Event()
     previous = signal.getsignal(signal.SIGINT)
-    if previous is not signal.default_int_handler:  # ignored, as below nohup, or somebody else's concern
+    in_main = threading.current_thread() is threading.main_thread()
+    if not in_main or previous is not signal.default_int_handler:  # ignored, as below nohup, or handled by others
         yield asked
         return
 

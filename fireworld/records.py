@@ -347,8 +347,8 @@ PHASES: Final[Mapping[str, str]] = {
 """The phase of a step that each topic tells of."""
 
 
-class Recording(Protocol):
-    """A recorded run as a viewer or a table reads it."""
+class Steps(Protocol):
+    """A run as it can be walked through, from its first step on."""
 
     @property
     def header(self) -> RunHeader:
@@ -360,12 +360,16 @@ class Recording(Protocol):
         """The city it ran in."""
         ...
 
+    def __iter__(self) -> Iterator[StepRecord]: ...
+
+
+class Recording(Steps, Protocol):
+    """A recorded run as a viewer or a table reads it."""
+
     @property
     def steps(self) -> Array:
         """(k,) int64: the committed steps, rising."""
         ...
-
-    def __iter__(self) -> Iterator[StepRecord]: ...
 
     def column(self, topic: str, name: str) -> Array:
         """Return one field over all steps: (k, width) of an array field, (k,) of a value.
@@ -382,9 +386,11 @@ class Recording(Protocol):
 class MemoryRecording:
     """A recording held in memory: the steps of a run that was not written to a file."""
 
-    def __init__(self, header: RunHeader, city: CityRecord, records: Sequence[StepRecord]) -> None:
+    def __init__(self, header: RunHeader, city: CityRecord, records: Sequence[StepRecord], *, digest: str = "") -> None:
         self.header = header
         self.city = city
+        self.digest = digest
+        """Of the whole run; empty if it is not known."""
         self._records = list(records)
 
     @property

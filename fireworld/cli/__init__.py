@@ -50,6 +50,16 @@ class LazyGroup(click.Group):
         command: click.Command = module.command
         return command
 
+    def invoke(self, ctx: click.Context) -> object:
+        """Run a command; one that was interrupted says itself what is left of its work."""
+        from fireworld.interrupt import Interrupted
+
+        try:
+            return super().invoke(ctx)
+        except Interrupted as error:
+            click.echo(str(error), err=True)
+            return INTERRUPTED
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of commands from the table, so that --help imports none of them."""
         del ctx

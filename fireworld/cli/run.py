@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from contextlib import ExitStack
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -14,17 +14,15 @@ from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.live import find_screen, view_options, watched_run
 from fireworld.cli.options import record_options, seed_option, settings_option, steps_option
 from fireworld.cli.progress import BAR, ELAPSED, bars, is_watched
-from fireworld.interrupt import gentle_interrupt
 from fireworld.policy.shipped import team_names
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from fireworld_recorder.writer import Scene
     from fireworld_viewer.rerun_view.live import Screen
 
-    from fireworld.records import CityRecord, RunHeader, StepRecord
-    from fireworld.simulation.run import Run
+    from fireworld.records import CityRecord, RunHeader, StepRecord, Steps
 
 POLICIES_HELP: Final = (
     "easiest, nearest-to-civilian, nearest-to-center, nearest-to-me, each-another, random, chief, "
@@ -101,7 +99,7 @@ def command(
 
 
 def carry_out(
-    run: Run,
+    run: Steps,
     *,
     output: Path | None,
     force: bool,
@@ -109,7 +107,7 @@ def carry_out(
     foxglove: bool = False,
     screen: Screen | None = None,
 ) -> tuple[StepRecord, str]:
-    """Let a run happen, recorded if there is an output; return its last record and its digest.
+    """Run a prepared run under a progress display, and shown live; return its last record and its digest.
 
     Args:
         run: the run.
@@ -121,42 +119,20 @@ def carry_out(
 
     Raises:
         PolicyError: the policy failed; the steps before are in the partial recording.
-        SystemExit: a second Ctrl-C; likewise.
+        Interrupted: a second Ctrl-C; likewise.
         OutputError: the recording cannot be written.
     """
-    from fireworld_recorder.chain import Digest
-    from fireworld_recorder.writer import PARTIAL_SUFFIX, LogWriter
+    from fireworld.recording.record import play
 
-    from fireworld.errors import PolicyError
+    scene = make_scene(run.header, run.city) if foxglove else None
+    with watched_run(screen, run.header, run.city) as show, _progress(run.header, quiet=quiet) as advance:
 
-    last: StepRecord | None = None
-    try:
-        with ExitStack() as stack:
-            interrupted = stack.enter_context(gentle_interrupt())
-            if output is not None:
-                scene = make_scene(run.header, run.city) if foxglove else None
-                writer = LogWriter(output, run.header, run.city, force=force, scene=scene)
-                sink: LogWriter | Digest = stack.enter_context(writer)
-            else:
-                sink = Digest(run.city)
-            write = sink.write if isinstance(sink, LogWriter) else sink.add
-            show = stack.enter_context(watched_run(screen, run.header, run.city))
-            for record in _with_progress(run, quiet=quiet):
-                write(record)
-                show(record)
-                last = record
-                if interrupted.is_set():
-                    break
-    except (PolicyError, KeyboardInterrupt) as error:
-        where = ""
-        if output is not None and last is not None:
-            where = f"; steps 0 to {last.step} are kept in {output}{PARTIAL_SUFFIX}"
-        if isinstance(error, PolicyError):
-            raise PolicyError(f"{error}{where}") from error
-        click.echo(f"interrupted within a step{where}", err=True)
-        raise SystemExit(INTERRUPTED) from error
-    assert last is not None  # noqa: S101 - a run yields its start before anything else
-    return last, sink.digest
+        def on_step(record: StepRecord) -> None:
+            show(record)
+            advance(record)
+
+        played = play(run, record=output, force=force, scene=scene, on_step=on_step)
+    return played.last, played.digest
 
 
 def make_scene(header: RunHeader, city: CityRecord) -> Scene:
@@ -166,20 +142,20 @@ def make_scene(header: RunHeader, city: CityRecord) -> Scene:
     return FoxgloveScene(header, city)
 
 
-def _with_progress(run: Run, *, quiet: bool) -> Iterator[StepRecord]:
-    """Yield the steps of a run, under a progress display where people watch."""
+@contextmanager
+def _progress(header: RunHeader, *, quiet: bool) -> Iterator[Callable[[StepRecord], None]]:
+    """Show progress where people watch; yield what is to be called after each step."""
     if quiet or not is_watched():
-        yield from run
+        yield lambda _: None
         return
     with bars(STEP, BAR, STATE, ELAPSED) as progress:
-        task = progress.add_task("run", total=run.header.n_steps_max, burning=0, score=0.0)
-        for record in run:
-            score = record.score
-            progress.update(task, completed=record.step, burning=score.n_burning, score=score.score)
-            yield record
+        task = progress.add_task("run", total=header.n_steps_max, burning=0, score=0.0)
+        yield lambda record: progress.update(
+            task, completed=record.step, burning=record.score.n_burning, score=record.score.score
+        )
 
 
-def outcome_of(run: Run, last: StepRecord, *, digest: str, output: Path | None) -> dict[str, Any]:
+def outcome_of(run: Steps, last: StepRecord, *, digest: str, output: Path | None) -> dict[str, Any]:
     """Collect how a run ended."""
     score = last.score
     ended = "terminated" if last.terminated else "truncated" if last.truncated else "interrupted"

@@ -23,7 +23,7 @@ from fireworld.recording.decisions import (
 from fireworld.recording.resume import Resumed
 from fireworld.records import CityRecord, Recording, RunHeader, StepRecord
 from fireworld.simulation.observer import Observer
-from fireworld.simulation.run import Run
+from fireworld.simulation.run import PreparedRun
 from fireworld.simulation.state import copy_world
 from fireworld.simulation.world import World
 
@@ -61,7 +61,7 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Fork(Run):
+class Fork(PreparedRun):
     """A run whose first steps are recorded ones: iterate over it to let the rest happen."""
 
     recorded: Sequence[StepRecord]
@@ -69,9 +69,10 @@ class Fork(Run):
     def __iter__(self) -> Iterator[StepRecord]:
         """Yield the recorded steps and then every new one, until nothing burns or the last step is done."""
         yield from self.recorded
-        observer = Observer(self.world)
-        while not (self.world.terminated or self.world.truncated):
-            yield observer.record(self.world.step(self.policy))
+        world = self.start.copy()
+        observer = Observer(world)
+        while not (world.terminated or world.truncated):
+            yield observer.record(world.step(self.policy))
 
 
 def prepare_fork(
@@ -123,7 +124,7 @@ def prepare_fork(
             attachments=attachments,
         ),
         city=recording.city,
-        world=world,
+        start=world,
         policy=ToldPolicy(change.named.policy, told),
         recorded=records,
     )

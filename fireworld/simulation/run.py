@@ -1,4 +1,4 @@
-"""Runs: a policy in a world, step by step, as records."""
+"""A prepared run: a policy in a world, step by step, as records."""
 
 from __future__ import annotations
 
@@ -15,33 +15,41 @@ from fireworld.simulation.world import World
 
 
 @dataclass(frozen=True)
-class Run:
-    """A run that is about to happen: iterate over it to let it happen."""
+class PreparedRun:
+    """A prepared run; iterating runs it, from its start each time.
+
+    Attributes:
+        header: what identifies the run.
+        city: where it takes place.
+        start: the world before the first step; it stays as it is.
+        policy: what the brigades follow.
+    """
 
     header: RunHeader
     city: CityRecord
-    world: World
+    start: World
     policy: Policy
 
     def __iter__(self) -> Iterator[StepRecord]:
         """Yield the start and then every step, until nothing burns or the last step is done."""
-        begin(self.policy, self.world.city_arrays, n_brigades=self.world.n_brigades, seed=self.world.seed)
-        observer = Observer(self.world)
+        world = self.start.copy()
+        begin(self.policy, world.city_arrays, n_brigades=world.n_brigades, seed=world.seed)
+        observer = Observer(world)
         yield observer.record()
-        while not (self.world.terminated or self.world.truncated):
-            yield observer.record(self.world.step(self.policy))
+        while not (world.terminated or world.truncated):
+            yield observer.record(world.step(self.policy))
 
 
-def prepare_run(built: BuiltScenario, named: NamedPolicy, *, seed: int, n_steps_max: int | None = None) -> Run:
-    """Get a run ready.
+def prepare_run(built: BuiltScenario, named: NamedPolicy, *, seed: int, n_steps_max: int | None = None) -> PreparedRun:
+    """Prepare a run.
 
     Args:
         built: the scenario, built.
         named: the policy.
-        seed: of the run's luck.
+        seed: of the run's random draws.
         n_steps_max: last step; None: the scenario's.
     """
     world = built.world(seed=seed, n_steps_max=n_steps_max)
     header = built.header(seed=seed, policy=named.name, policy_digest=named.digest, n_steps_max=world.n_steps_max)
     header = replace(header, attachments={**header.attachments, **named.attachments})
-    return Run(header=header, city=built.city_record(), world=world, policy=named.policy)
+    return PreparedRun(header=header, city=built.city_record(), start=world, policy=named.policy)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,7 @@ from fireworld.parameters import Parameters
 from fireworld.policy.asking import ask
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
 from fireworld.simulation.city_arrays import city_arrays, world_constants
-from fireworld.simulation.state import NO_LEARNER, fresh_world
+from fireworld.simulation.state import NO_LEARNER, copy_world, fresh_world
 
 NO_DECISION = Decision(-1)
 
@@ -112,6 +113,12 @@ class World:
     def truncated(self) -> bool:
         """Whether the last step is done while something burns."""
         return not self.terminated and self.step_number >= self.n_steps_max
+
+    def copy(self) -> World:
+        """Return a world in the same state, which shares nothing that a step changes."""
+        copied = copy.copy(self)
+        copied.state = copy_world(self.state)
+        return copied
 
     def step(self, policy: Policy) -> Choices:
         """Run one step: look, decide one after another, act, burn, hurt, assess."""

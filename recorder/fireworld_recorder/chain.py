@@ -57,7 +57,7 @@ class Digest:
     def __init__(self, city: CityRecord) -> None:
         self._chain = Chain(encode(city))
 
-    def add(self, record: StepRecord) -> None:
+    def write(self, record: StepRecord) -> None:
         """Take in the next step."""
         for topic, data in step_messages(record):
             self._chain.add(topic, data)

@@ -94,7 +94,7 @@ def compare(
     _check_steps(a, b, steps)
     header = header_differences(a.header, b.header)
     digest = getattr(a, "digest", None)
-    if digest is not None and digest == getattr(b, "digest", None):
+    if digest and digest == getattr(b, "digest", None):
         totals = _totals_within(a, steps)
         return Difference(None, (totals, totals), header, totals.n_steps, {})
     first = find_city_difference(a.city, b.city, rules)

@@ -87,7 +87,7 @@ conftest.write_log(pathlib.Path(sys.argv[1]), synthetic.run(30))
 def test_digest_without_a_file_is_that_of_the_log(log_path, records, city):
     digest = Digest(city)
     for record in records:
-        digest.add(record)
+        digest.write(record)
     assert digest.digest == open_log(log_path).digest
 
 

@@ -60,5 +60,5 @@ def test_its_records_still_have_its_digest():
     log = open_log(DATA / "fireworld-log-1.mcap")
     digest = Digest(log.city)
     for record in log:
-        digest.add(record)
+        digest.write(record)
     assert digest.digest == log.digest

@@ -31,7 +31,7 @@ def digest_of(scenario: str, policy: str, seed: int, n_steps: int) -> str:
     run = prepare_run(build_scenario(load_scenario(scenario)), load_policy(policy), seed=seed, n_steps_max=n_steps)
     digest = Digest(run.city)
     for record in run:
-        digest.add(record)
+        digest.write(record)
     return digest.digest
 
 

@@ -76,9 +76,9 @@ def test_a_restored_run_has_the_same_digest(middle, town_record):
     for restored in (False, True):
         world = town_world(seed=6, n_fires=6)
         observer, policy, digest = Observer(world), begin(policy_named("each-another"), world), Digest(town_record)
-        digest.add(observer.record())
+        digest.write(observer.record())
         while not (world.terminated or world.truncated):
-            digest.add(observer.record(world.step(policy)))
+            digest.write(observer.record(world.step(policy)))
             if restored and world.step_number == middle:
                 snapshot = take_snapshot(world.state)
                 world = town_world(seed=6)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from fireworld.recording.golden.order import Order
     from fireworld.simulation.built import CityCache
-    from fireworld.simulation.run import Run
+    from fireworld.simulation.run import PreparedRun
 
 SUFFIX: Final = ".mcap"
 TEXT_SUFFIX: Final = ".txt"
@@ -106,7 +106,7 @@ def check_golden(path: Path, *, cities: CityCache | None = None) -> Checked:
         return Checked(path=path, header=header, error=str(error))
 
 
-def carry_out(run: Run) -> MemoryRecording:
+def carry_out(run: PreparedRun) -> MemoryRecording:
     """Let a run happen.
 
     Raises:

@@ -26,7 +26,7 @@ from fireworld.scenario import Scenario, load_scenario, parse_scenario, scenario
 from fireworld.scenario.document import DIRECTIONS
 from fireworld.simulation.built import CityCache
 from fireworld.simulation.placement import SCENARIO_ATTACHMENT
-from fireworld.simulation.run import Run, prepare_run
+from fireworld.simulation.run import PreparedRun, prepare_run
 
 ORDER_ATTACHMENT: Final = "golden.json"
 """What a golden recording calls the order that it was made by."""
@@ -112,7 +112,7 @@ def prepare_golden(
     recorded: RunHeader | None = None,
     policy: NamedPolicy | None = None,
     cities: CityCache | None = None,
-) -> Run:
+) -> PreparedRun:
     """Get the run of an order ready, with everything as it is now.
 
     Args:
@@ -199,7 +199,7 @@ def _where_people_are(scenario: Scenario) -> str:
     return "civilians all around" if set(civilians.directions) == set(DIRECTIONS) else "civilians on some sides"
 
 
-def _prepare_recorded(order: Order, recorded: RunHeader | None) -> Run:
+def _prepare_recorded(order: Order, recorded: RunHeader | None) -> PreparedRun:
     """Get a run ready whose scenario, and team if there is one, are those in the recording."""
     if recorded is None:
         raise LogError(expected(ORDER_ATTACHMENT, "scenario", "a name or a file", "none"))
@@ -215,7 +215,7 @@ def _prepare_recorded(order: Order, recorded: RunHeader | None) -> Run:
     built = build_recorded(recorded)
     world = built.world(seed=order.seed, n_steps_max=order.steps)
     header = replace(recorded, policy_digest=named.digest, fireworld_version=__version__)
-    return Run(header=header, city=built.city_record(), world=world, policy=named.policy)
+    return PreparedRun(header=header, city=built.city_record(), start=world, policy=named.policy)
 
 
 def _seen_from(folder: Path, path: Path) -> str:
