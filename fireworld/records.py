@@ -16,6 +16,12 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 Wire = Literal["double", "float", "sfixed32", "fixed64", "uint8", "bool", "string", "bytes"]
+Entity = Literal[
+    "building", "brigade", "civilian", "site", "event", "link", "corner", "node", "street", "refuge", "hydrant",
+    "offset", "axis",
+]  # fmt: skip
+"""What an array can have an entry for. An offset says where the entries of a building begin in another array, and the
+last one where they end."""
 
 FORMAT: Final = "fireworld-log/1"
 STEP_SECONDS: Final = 60
@@ -72,12 +78,30 @@ DTYPES: Final[Mapping[str, str]] = {
 """numpy type of an array field, by wire type ("uint8" travels as packed uint32 varints below 128)."""
 
 
-def column(number: int, wire: Wire, doc: str, *, unit: str = "", added: bool = False) -> Any:
-    """Declare a packed repeated field: a one-dimensional array. Its unit is said where its name does not end in it.
+def column(
+    number: int,
+    wire: Wire,
+    doc: str,
+    *,
+    per: Entity,
+    width: int = 1,
+    names: tuple[str, ...] = (),
+    unit: str = "",
+    added: bool = False,
+) -> Any:
+    """Declare a packed repeated field: a one-dimensional array.
 
-    A field that was added later is empty in recordings made before, and so by default.
+    Args:
+        number: of the field in its message.
+        wire: how its numbers travel.
+        doc: what they mean; nothing but text is made of it.
+        per: what the array has entries for; with the topic it decides in which exported table they are.
+        width: entries for each of these, which stand together.
+        names: what the numbers 0, 1, 2, ... stand for.
+        unit: where the field's name does not end in it.
+        added: the field came later: it is empty in recordings made before, and so by default.
     """
-    metadata = {"number": number, "wire": wire, "repeated": True, "doc": doc, "unit": unit}
+    metadata = {"number": number, "wire": wire, "doc": doc, "unit": unit, "per": per, "width": width, "names": names}
     return field(metadata=metadata, default_factory=_empty) if added else field(metadata=metadata)
 
 
@@ -86,8 +110,8 @@ def _empty() -> Array:
 
 
 def value(number: int, wire: Wire, doc: str, *, unit: str = "") -> Any:
-    """Declare a single value; its unit is said where its name does not end in it."""
-    return field(metadata={"number": number, "wire": wire, "repeated": False, "doc": doc, "unit": unit})
+    """Declare a single value, with its unit where its name does not end in it."""
+    return field(metadata={"number": number, "wire": wire, "doc": doc, "unit": unit})
 
 
 @dataclass(frozen=True)
@@ -113,38 +137,40 @@ class CityRecord:
 
     topic: ClassVar[str] = "/city"
     name: str = value(1, "string", "name of the city")
-    building_id: Array = column(2, "sfixed32", "(n,) identifier of each building in its source")
-    outline_ptr: Array = column(3, "sfixed32", "(n+1,) start of each building's corners in outline_x_m")
-    outline_x_m: Array = column(4, "double", "corners, x; the closing corner is not repeated")
-    outline_y_m: Array = column(5, "double", "corners, y")
-    center_x_m: Array = column(6, "double", "(n,) centroid, x")
-    center_y_m: Array = column(7, "double", "(n,) centroid, y")
-    floors: Array = column(8, "sfixed32", "(n,) storeys of 3 m")
-    material: Array = column(9, "uint8", "(n,) 0 wood, 1 steel, 2 concrete")
-    inflammable: Array = column(10, "uint8", "(n,) 1 if it can burn")
-    ground_area_m2: Array = column(11, "float", "(n,)")
-    volume_m3: Array = column(12, "float", "(n,)")
-    initial_fuel: Array = column(13, "float", "(n,) energy units", unit="energy units")
-    heat_capacity: Array = column(14, "float", "(n,) energy units per degree", unit="energy units per degree")
-    ignition_point: Array = column(15, "float", "(n,) degrees above ambient", unit="degrees above ambient")
-    wall_area_m2: Array = column(16, "double", "(n,) radiating wall")
-    link_ptr: Array = column(17, "sfixed32", "(n+1,) start of each building's radiation links")
-    link_building: Array = column(18, "sfixed32", "index of the building a link leads to")
-    link_share: Array = column(19, "float", "share of the emitted radiation that reaches it", unit="share")
-    node_x_m: Array = column(20, "double", "street nodes, x")
-    node_y_m: Array = column(21, "double", "street nodes, y")
-    street_from: Array = column(22, "sfixed32", "first node of each street")
-    street_to: Array = column(23, "sfixed32", "second node of each street")
-    refuge_building: Array = column(24, "sfixed32", "index of each refuge's building")
-    hydrant_x_m: Array = column(25, "double", "hydrants, x")
-    hydrant_y_m: Array = column(26, "double", "hydrants, y")
-    civilian_x_m: Array = column(27, "double", "(n_civilians,) position, x")
-    civilian_y_m: Array = column(28, "double", "(n_civilians,) position, y")
-    civilian_building: Array = column(29, "sfixed32", "(n_civilians,) building a civilian is in, -1 outdoors")
-    civilian_hp: Array = column(30, "sfixed32", "(n_civilians,) health points at the start", unit="health points")
-    brigade_tank_litres: Array = column(31, "sfixed32", "(n_brigades,) size of the tank")
-    brigade_power_litres: Array = column(32, "sfixed32", "(n_brigades,) most litres sprayed in a step")
-    brigade_range_m: Array = column(33, "double", "(n_brigades,) reach of the water jet")
+    building_id: Array = column(2, "sfixed32", "identifier of each building in its source", per="building")
+    outline_ptr: Array = column(3, "sfixed32", "start of each building's corners in outline_x_m", per="offset")
+    outline_x_m: Array = column(4, "double", "corners, x; the closing corner is not repeated", per="corner")
+    outline_y_m: Array = column(5, "double", "corners, y", per="corner")
+    center_x_m: Array = column(6, "double", "centroid, x", per="building")
+    center_y_m: Array = column(7, "double", "centroid, y", per="building")
+    floors: Array = column(8, "sfixed32", "storeys of 3 m", per="building")
+    material: Array = column(9, "uint8", "0 wood, 1 steel, 2 concrete", per="building", names=MATERIALS)
+    inflammable: Array = column(10, "uint8", "1 if it can burn", per="building")
+    ground_area_m2: Array = column(11, "float", "", per="building")
+    volume_m3: Array = column(12, "float", "", per="building")
+    initial_fuel: Array = column(13, "float", "energy units", per="building", unit="energy units")
+    heat_capacity: Array = column(
+        14, "float", "energy units per degree", per="building", unit="energy units per degree"
+    )
+    ignition_point: Array = column(15, "float", "degrees above ambient", per="building", unit="degrees above ambient")
+    wall_area_m2: Array = column(16, "double", "radiating wall", per="building")
+    link_ptr: Array = column(17, "sfixed32", "start of each building's radiation links", per="offset")
+    link_building: Array = column(18, "sfixed32", "index of the building a link leads to", per="link")
+    link_share: Array = column(19, "float", "share of the emitted radiation that reaches it", per="link", unit="share")
+    node_x_m: Array = column(20, "double", "street nodes, x", per="node")
+    node_y_m: Array = column(21, "double", "street nodes, y", per="node")
+    street_from: Array = column(22, "sfixed32", "first node of each street", per="street")
+    street_to: Array = column(23, "sfixed32", "second node of each street", per="street")
+    refuge_building: Array = column(24, "sfixed32", "index of each refuge's building", per="refuge")
+    hydrant_x_m: Array = column(25, "double", "hydrants, x", per="hydrant")
+    hydrant_y_m: Array = column(26, "double", "hydrants, y", per="hydrant")
+    civilian_x_m: Array = column(27, "double", "position, x", per="civilian")
+    civilian_y_m: Array = column(28, "double", "position, y", per="civilian")
+    civilian_building: Array = column(29, "sfixed32", "building a civilian is in, -1 outdoors", per="civilian")
+    civilian_hp: Array = column(30, "sfixed32", "health points at the start", per="civilian", unit="health points")
+    brigade_tank_litres: Array = column(31, "sfixed32", "size of the tank", per="brigade")
+    brigade_power_litres: Array = column(32, "sfixed32", "most litres sprayed in a step", per="brigade")
+    brigade_range_m: Array = column(33, "double", "reach of the water jet", per="brigade")
     air_origin_x_m: float = value(34, "double", "west edge of the air grid")
     air_origin_y_m: float = value(35, "double", "south edge of the air grid")
     air_cell_m: float = value(36, "double", "side of an air cell")
@@ -169,24 +195,24 @@ class Observations:
     """What each brigade saw before it chose; then the fire sites of the moment."""
 
     topic: ClassVar[str] = "/observations"
-    site: Array = column(1, "sfixed32", "(n_brigades,) fire site the brigade belongs to, -1 none")
-    free_edges: Array = column(2, "uint8", "(n_brigades,) sides of the site over which fire can spread, 0..4")
-    distance_from_center: Array = column(3, "uint8", "(n_brigades,) 0 low, 1 medium, 2 high")
-    distance_from_civilian: Array = column(4, "uint8", "(n_brigades,) 0 low, 1 medium, 2 high")
-    volume: Array = column(5, "uint8", "(n_brigades,) burning volume, 0 very low .. 5 huge")
-    others_easiest: Array = column(6, "uint8", "(n_brigades,) 1 if another brigade does `easiest`")
-    others_nearest_to_civilian: Array = column(7, "uint8", "(n_brigades,) the same for `nearest-to-civilian`")
-    others_nearest_to_center: Array = column(8, "uint8", "(n_brigades,) the same for `nearest-to-center`")
-    others_nearest_to_me: Array = column(9, "uint8", "(n_brigades,) the same for `nearest-to-me`")
-    state_index: Array = column(10, "sfixed32", "(n_brigades,) 0..4319, mixed radix of the eight features; -1 none")
-    site_id: Array = column(11, "sfixed32", "(n_sites,) fire sites that burn, by rising number")
-    site_free_sides: Array = column(12, "uint8", "(n_sites,) bits 0 N, 1 E, 2 S, 3 W: free sides")
-    site_n_burning: Array = column(13, "sfixed32", "(n_sites,) burning buildings")
-    site_volume_m3: Array = column(14, "double", "(n_sites,) volume of the burning buildings")
-    site_west_m: Array = column(15, "double", "(n_sites,) bounding box of the burning buildings")
-    site_south_m: Array = column(16, "double", "(n_sites,)")
-    site_east_m: Array = column(17, "double", "(n_sites,)")
-    site_north_m: Array = column(18, "double", "(n_sites,)")
+    site: Array = column(1, "sfixed32", "fire site the brigade belongs to, -1 none", per="brigade")
+    free_edges: Array = column(2, "uint8", "sides of the site over which fire can spread, 0..4", per="brigade")
+    distance_from_center: Array = column(3, "uint8", "0 low, 1 medium, 2 high", per="brigade", names=LEVELS)
+    distance_from_civilian: Array = column(4, "uint8", "0 low, 1 medium, 2 high", per="brigade", names=LEVELS)
+    volume: Array = column(5, "uint8", "burning volume, 0 very low .. 5 huge", per="brigade", names=VOLUMES)
+    others_easiest: Array = column(6, "uint8", "1 if another brigade does `easiest`", per="brigade")
+    others_nearest_to_civilian: Array = column(7, "uint8", "the same for `nearest-to-civilian`", per="brigade")
+    others_nearest_to_center: Array = column(8, "uint8", "the same for `nearest-to-center`", per="brigade")
+    others_nearest_to_me: Array = column(9, "uint8", "the same for `nearest-to-me`", per="brigade")
+    state_index: Array = column(10, "sfixed32", "0..4319, mixed radix of the eight features; -1 none", per="brigade")
+    site_id: Array = column(11, "sfixed32", "fire sites that burn, by rising number", per="site")
+    site_free_sides: Array = column(12, "uint8", "bits 0 N, 1 E, 2 S, 3 W: free sides", per="site")
+    site_n_burning: Array = column(13, "sfixed32", "burning buildings", per="site")
+    site_volume_m3: Array = column(14, "double", "volume of the burning buildings", per="site")
+    site_west_m: Array = column(15, "double", "bounding box of the burning buildings", per="site")
+    site_south_m: Array = column(16, "double", "", per="site")
+    site_east_m: Array = column(17, "double", "", per="site")
+    site_north_m: Array = column(18, "double", "", per="site")
 
 
 @dataclass(frozen=True)
@@ -194,14 +220,22 @@ class Decisions:
     """What each brigade chose, and why."""
 
     topic: ClassVar[str] = "/decisions"
-    action: Array = column(1, "sfixed32", "(n_brigades,) index of the action, -1 none (refilling, dead, nothing burns)")
-    target: Array = column(2, "sfixed32", "(n_brigades,) index of the building it goes for, -1 none")
-    explored: Array = column(3, "uint8", "(n_brigades,) 1 if the action was an exploring draw")
-    q_values: Array = column(4, "double", "(n_brigades * 4,) values of the four actions, brigade by brigade; or empty")
+    action: Array = column(
+        1,
+        "sfixed32",
+        "index of the action, -1 none (refilling, dead, nothing burns)",
+        per="brigade",
+        names=ACTION_NAMES,
+    )
+    target: Array = column(2, "sfixed32", "index of the building it goes for, -1 none", per="brigade")
+    explored: Array = column(3, "uint8", "1 if the action was an exploring draw", per="brigade")
+    q_values: Array = column(
+        4, "double", "values of the four actions, brigade by brigade; or empty", per="brigade", width=len(ACTIONS)
+    )
     epsilon: float = value(5, "double", "probability of exploring", unit="probability")
-    td_error: Array = column(6, "double", "(n_brigades,) SARSA's error of the last update; or empty")
+    td_error: Array = column(6, "double", "SARSA's error of the last update; or empty", per="brigade")
     target_value: Array = column(
-        7, "double", "(n_brigades,) value of the target, where targets are ranked; or empty", added=True
+        7, "double", "value of the target, where targets are ranked; or empty", per="brigade", added=True
     )
 
 
@@ -210,16 +244,16 @@ class Brigades:
     """Where the brigades are after the step and what they did in it."""
 
     topic: ClassVar[str] = "/brigades"
-    x_m: Array = column(1, "double", "(n_brigades,) position, x")
-    y_m: Array = column(2, "double", "(n_brigades,) position, y")
+    x_m: Array = column(1, "double", "position, x", per="brigade")
+    y_m: Array = column(2, "double", "position, y", per="brigade")
     activity: Array = column(
-        3, "uint8", "(n_brigades,) 0 idle, 1 driving, 2 spraying, 3 to refuge, 4 refilling, 5 dead"
+        3, "uint8", "0 idle, 1 driving, 2 spraying, 3 to refuge, 4 refilling, 5 dead", per="brigade", names=ACTIVITIES
     )
-    tank_litres: Array = column(4, "sfixed32", "(n_brigades,) water in the tank")
-    sprayed_litres: Array = column(5, "sfixed32", "(n_brigades,) water sprayed in this step")
-    driven_m: Array = column(6, "double", "(n_brigades,) way driven in this step")
-    hp: Array = column(7, "sfixed32", "(n_brigades,) health points", unit="health points")
-    damage: Array = column(8, "double", "(n_brigades,) health points lost per step", unit="health points per step")
+    tank_litres: Array = column(4, "sfixed32", "water in the tank", per="brigade")
+    sprayed_litres: Array = column(5, "sfixed32", "water sprayed in this step", per="brigade")
+    driven_m: Array = column(6, "double", "way driven in this step", per="brigade")
+    hp: Array = column(7, "sfixed32", "health points", per="brigade", unit="health points")
+    damage: Array = column(8, "double", "health points lost per step", per="brigade", unit="health points per step")
 
 
 @dataclass(frozen=True)
@@ -230,15 +264,16 @@ class Buildings:
     temperature: Array = column(
         1,
         "float",
-        "(n,) degrees above ambient, to the nearest 1/64; exact is energy / heat_capacity",
+        "degrees above ambient, to the nearest 1/64; exact is energy / heat_capacity",
+        per="building",
         unit="degrees above ambient",
     )
-    energy: Array = column(2, "double", "(n,) heat, energy units, exact", unit="energy units")
+    energy: Array = column(2, "double", "heat, energy units, exact", per="building", unit="energy units")
     fuel_share: Array = column(
-        3, "float", "(n,) share of the initial fuel that is left, single precision", unit="share"
+        3, "float", "share of the initial fuel that is left, single precision", per="building", unit="share"
     )
-    water_litres: Array = column(4, "sfixed32", "(n,) water lying on the building")
-    fieryness: Array = column(5, "uint8", "(n,) official code 0..8")
+    water_litres: Array = column(4, "sfixed32", "water lying on the building", per="building")
+    fieryness: Array = column(5, "uint8", "official code 0..8", per="building", names=FIERYNESS)
 
 
 @dataclass(frozen=True)
@@ -246,8 +281,8 @@ class Civilians:
     """The civilians' health after the step."""
 
     topic: ClassVar[str] = "/civilians"
-    hp: Array = column(1, "sfixed32", "(n_civilians,) health points, 0 dead", unit="health points")
-    damage: Array = column(2, "double", "(n_civilians,) health points lost per step", unit="health points per step")
+    hp: Array = column(1, "sfixed32", "health points, 0 dead", per="civilian", unit="health points")
+    damage: Array = column(2, "double", "health points lost per step", per="civilian", unit="health points per step")
 
 
 @dataclass(frozen=True)
@@ -283,8 +318,8 @@ class Events:
     """What happened in the step, parallel arrays, in the order of the phases."""
 
     topic: ClassVar[str] = "/events"
-    kind: Array = column(1, "uint8", "(n_events,) index into EVENT_KINDS")
-    entity: Array = column(2, "sfixed32", "(n_events,) index of the building, civilian or brigade; number of the site")
+    kind: Array = column(1, "uint8", "index into EVENT_KINDS", per="event", names=EVENT_KINDS)
+    entity: Array = column(2, "sfixed32", "index of the building, civilian or brigade; number of the site", per="event")
 
 
 @dataclass(frozen=True)

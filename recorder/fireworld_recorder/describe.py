@@ -109,7 +109,7 @@ def _field(part: Any, ours: Mapping[int, Field], prefix: str) -> FieldWords:
         return FieldWords(
             number, prefix + name, f"repeated {scalar}" if repeated else scalar, "any" if repeated else ""
         )
-    return FieldWords(number, prefix + name, known.proto_type, known.shape, known.unit, known.meaning)
+    return FieldWords(number, prefix + name, known.proto_type, known.shape, known.unit, known.doc)
 
 
 def _parts(data: Any, number: int) -> Iterator[Any]:

@@ -35,7 +35,7 @@ class FirstDifference:
     topic: str
     field: str
     entity: str | None
-    """building, brigade, civilian, site, event or entry; None for a single value."""
+    """As in `records.Entity`, or an entry of a snapshot's array; None for a single value."""
     index: int | None
     """Of the entity."""
     a: Any
@@ -86,9 +86,9 @@ def _turn(place: Place) -> int:
     """
     if place.item.name == "td_error" or place.spot.lengths:
         return sys.maxsize
-    if place.spot.position is None or words.entity_kind(place.item) != "brigade":
+    if place.spot.position is None or place.item.per != "brigade":
         return -1
-    return words.entity_index(place.item, place.spot.position)
+    return place.spot.position // place.item.width
 
 
 def find_city_difference(a: CityRecord, b: CityRecord, rules: Rules) -> FirstDifference | None:
@@ -142,13 +142,11 @@ def _describe(step: StepRecord | None, found: Place, city: CityRecord) -> FirstD
     """Put a difference into words; `step` is the first run's, None for the city."""
     topic, item, spot = found
     phase = PHASES.get(topic, "end")
-    kind = words.entity_kind(item) if item.repeated else None
-    index = None if spot.position is None else words.entity_index(item, spot.position)
+    index = None if spot.position is None else spot.position // item.width
     if spot.lengths:
-        n_a, n_b = (words.entity_index(item, length) for length in (spot.a, spot.b))
-        text = words.length_sentence(item, kind or "entry", n_a, n_b)
+        text = words.length_sentence(item, spot.a // item.width, spot.b // item.width)
     else:
-        entity = None if index is None else words.entity_words(kind or "entry", index, city=city, step=step)
+        entity = None if index is None else words.entity_words(item.per, index, city=city, step=step)
         text = words.sentence(topic, item, entity, spot)
     place = phase if step is None else f"step {step.step}, {phase}"
     return FirstDifference(
@@ -156,7 +154,7 @@ def _describe(step: StepRecord | None, found: Place, city: CityRecord) -> FirstD
         phase=phase,
         topic=topic,
         field=item.name,
-        entity=kind,
+        entity=item.per or None,
         index=index,
         a=spot.a,
         b=spot.b,

@@ -9,8 +9,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import inspect
-import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final
@@ -26,6 +25,15 @@ PROTO: Final = Path(__file__).with_name("fireworld_log.proto")
 DOCS: Final = Path(__file__).parents[2] / "docs" / "log-format.md"
 UNITS: Final = ("m", "m2", "m3", "litres")
 """Units that a name can end in."""
+COUNTS: Final[Mapping[str, str]] = {
+    "building": "n",
+    "offset": "n+1",
+    "brigade": "n_brigades",
+    "civilian": "n_civilians",
+    "site": "n_sites",
+    "event": "n_events",
+}
+"""What the number of some kinds of entities is called in shapes."""
 DOCS_BEGIN: Final = "<!-- generated from fireworld/records.py by `python -m fireworld_recorder.schema --write` -->\n"
 DOCS_END: Final = "<!-- end of the generated part -->\n"
 
@@ -36,7 +44,7 @@ class NamedArray:
 
     name: str = value(1, "string", "name of the array")
     dtype: str = value(2, "string", "numpy type, such as <f8")
-    shape: Array = column(3, "sfixed32", "length of each axis")
+    shape: Array = column(3, "sfixed32", "length of each axis", per="axis")
     data: bytes = value(4, "bytes", "the values, little-endian, last axis fastest")
 
 
@@ -58,23 +66,33 @@ class Field:
     number: int
     name: str
     wire: Wire
-    repeated: bool
     doc: str
     unit: str
     """What it is measured in; empty for counts, indices and codes."""
+    per: str = ""
+    """What an array has entries for; empty for a single value."""
+    width: int = 1
+    """Entries of an array for each of these."""
+    names: tuple[str, ...] = ()
+    """What the numbers 0, 1, 2, ... stand for."""
+
+    @property
+    def repeated(self) -> bool:
+        """Whether it is an array."""
+        return self.per != ""
 
     @property
     def shape(self) -> str:
-        """What an array has an entry for, as in "n_brigades"; "any" if it does not say, empty for a single value."""
+        """Length of an array in words, as in "n_brigades"; "any" if it has no name, empty for a single value."""
         if not self.repeated:
             return ""
-        found = re.match(r"\(([^,]*),\)", self.doc)
-        return found[1] if found else "any"
+        count = COUNTS.get(self.per, "any")
+        return count if self.width == 1 else f"{count} * {self.width}"
 
     @property
-    def meaning(self) -> str:
-        """The documentation without the shape that it may begin with."""
-        return self.doc.removeprefix(f"({self.shape},)").strip()
+    def text(self) -> str:
+        """The documentation after the shape, where that has a name."""
+        return f"({self.shape},) {self.doc}".strip() if self.per in COUNTS else self.doc
 
     @property
     def proto_type(self) -> str:
@@ -183,7 +201,7 @@ def proto_text() -> str:
     ]
 
     def body(message: Message, indent: str) -> list[str]:
-        return [f"{indent}  {item.proto_type} {item.name} = {item.number};  // {item.doc}" for item in message.fields]
+        return [f"{indent}  {item.proto_type} {item.name} = {item.number};  // {item.text}" for item in message.fields]
 
     for record_type in TOPICS:
         message = message_of(record_type)
@@ -206,7 +224,7 @@ def docs_text() -> str:
             lines += ["Field 1, `arrays`, repeats this message:", ""]
             fields = message_of(NamedArray).fields
         lines += ["| no. | field | type | meaning |", "|---|---|---|---|"]
-        lines += [f"| {item.number} | `{item.name}` | {item.proto_type} | {item.doc} |" for item in fields]
+        lines += [f"| {item.number} | `{item.name}` | {item.proto_type} | {item.text} |" for item in fields]
         lines += [""]
     return "\n".join(lines)
 

@@ -9,24 +9,15 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from fireworld.records import STEP_TOPICS, Array, Buildings, CityRecord, StepRecord
-from fireworld_recorder import words
+from fireworld.records import Array, Buildings, CityRecord, StepRecord
 from fireworld_recorder.match import Rules
 from fireworld_recorder.places import FirstDifference, Place, find_places
-from fireworld_recorder.schema import message_of
 
 KINDS: Final = ("building", "brigade", "civilian")
 """The entities that are counted: those that are the same ones in both runs all the time."""
 
 Counts = tuple[int | None, int | None, int | None, int | None]
 """Of a row: buildings, states, brigades, civilians."""
-
-_KIND_OF: Final = {
-    (topic.topic, item.name): words.entity_kind(item)
-    for topic in STEP_TOPICS
-    for item in message_of(topic).fields
-    if item.repeated
-}
 
 
 class Pair(NamedTuple):
@@ -175,7 +166,7 @@ def _differing(found: list[list[Place]], n_entities: Mapping[str, int]) -> dict[
     """
     differing = {kind: np.zeros(n, dtype=bool) for kind, n in n_entities.items()}
     for place in chain(*found):
-        kind, unequal = _KIND_OF.get((place.topic, place.item.name)), place.spot.unequal
+        kind, unequal = place.item.per, place.spot.unequal
         if kind in differing and unequal is not None and n_entities[kind] and len(unequal) % n_entities[kind] == 0:
             differing[kind] |= unequal.reshape(n_entities[kind], -1).any(axis=1)
     return differing
@@ -191,4 +182,4 @@ def _n_states(found: list[list[Place]]) -> int:
 
 def _is_of(kind: str, place: Place) -> bool:
     """Whether a difference is one of single entities of a kind."""
-    return place.spot.unequal is not None and _KIND_OF.get((place.topic, place.item.name)) == kind
+    return place.spot.unequal is not None and place.item.per == kind

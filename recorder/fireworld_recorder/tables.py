@@ -24,6 +24,7 @@ from fireworld.records import (
     Civilians,
     Decisions,
     Draws,
+    Entity,
     Events,
     Observations,
     Rewards,
@@ -31,9 +32,7 @@ from fireworld.records import (
     StepRecord,
 )
 from fireworld_recorder.schema import Commit, Field, message_of
-from fireworld_recorder.words import NAMES
 
-_BY_BRIGADE_AND_ACTION: Final = "n_brigades * 4"
 _NUMPY_TYPES: Final[Mapping[str, str]] = {**DTYPES, "bool": "|b1"}
 
 
@@ -68,38 +67,37 @@ class Table:
     read: Callable[[Any], list[Array | None]]
 
 
-def _columns_of(topic: type[Any], shape: str, prefix: str = "") -> dict[Field, list[Column]]:
-    """List the columns of a topic's fields of one shape: a coded field has a second one for its names."""
+def _columns_of(topic: type[Any], per: str, prefix: str = "") -> dict[Field, list[Column]]:
+    """List the columns of a topic's fields per entity: a coded field has a second one for its names."""
     found = {}
     for item in message_of(topic).fields:
-        if item.shape == shape:
-            column = Column(prefix + item.name, _NUMPY_TYPES[item.wire], item.meaning, item.unit)
-            names = NAMES.get(f"{topic.topic}.{item.name}", ())
-            named = Column(f"{column.name}_name", "U", f"name of {column.name}", names=names)
-            found[item] = [column, named] if names else [column]
+        if item.per == per and item.width == 1:
+            column = Column(prefix + item.name, _NUMPY_TYPES[item.wire], item.doc, item.unit)
+            named = Column(f"{column.name}_name", "U", f"name of {column.name}", names=item.names)
+            found[item] = [column, named] if item.names else [column]
     return found
 
 
 def _column(topic: type[Any], name: str) -> Column:
     """Return the column of one field."""
     (item,) = (item for item in message_of(topic).fields if item.name == name)
-    return Column(name, _NUMPY_TYPES[item.wire], item.meaning, item.unit)
+    return Column(name, _NUMPY_TYPES[item.wire], item.doc, item.unit)
 
 
 _STEP: Final = dataclasses.replace(_column(Commit, "step"), doc="step, a simulated minute; 0 is the state before")
 
 
-def _entities(name: str, doc: str, index: Column | None, shape: str, *topics: type[Any]) -> Table:
+def _entities(name: str, doc: str, index: Column | None, per: Entity, *topics: type[Any]) -> Table:
     """Make the table with a row for each step and entity, of all fields with an entry for each entity.
 
     Args:
         name: of the table.
         doc: what a row is.
         index: numbers the entities; None if one of the fields identifies them.
-        shape: of these fields.
+        per: what these fields have an entry for.
         topics: whose fields they are.
     """
-    fields = {topic: _columns_of(topic, shape) for topic in topics}
+    fields = {topic: _columns_of(topic, per) for topic in topics}
     columns = [_STEP, *([index] if index else [])]
     columns += [column for topic in topics for columns_of in fields[topic].values() for column in columns_of]
 
@@ -128,8 +126,8 @@ def _step_rows(table: str, step: int, values: list[Array | None], *, numbered: b
 
 def _decisions() -> Table:
     """Make the table of what the brigades saw and chose, with a column for the Q-value of each action."""
-    plain = _entities("decisions", "", _BRIGADE, "n_brigades", Observations, Decisions)
-    (q_values,) = (item for item in message_of(Decisions).fields if item.shape == _BY_BRIGADE_AND_ACTION)
+    plain = _entities("decisions", "", _BRIGADE, "brigade", Observations, Decisions)
+    (q_values,) = (item for item in message_of(Decisions).fields if item.width > 1)
     columns = [
         Column(f"q_{action.replace('-', '_')}", DTYPES[q_values.wire], f"value of the action `{action}`")
         for action in ACTIONS
@@ -167,7 +165,7 @@ def _steps() -> Table:
 
 def _city() -> Table:
     """Make the table with a row for each building, of what never changes."""
-    fields = _columns_of(CityRecord, "n")
+    fields = _columns_of(CityRecord, "building")
     columns = [column for columns_of in fields.values() for column in columns_of]
 
     def read(city: CityRecord) -> list[Array | None]:
@@ -184,22 +182,22 @@ TABLES: Final[Mapping[str, Table]] = {
     table.name: table
     for table in (
         _city(),
-        _entities("buildings", "a building after a step", _BUILDING, "n", Buildings),
-        _entities("brigades", "a brigade after a step", _BRIGADE, "n_brigades", Brigades),
+        _entities("buildings", "a building after a step", _BUILDING, "building", Buildings),
+        _entities("brigades", "a brigade after a step", _BRIGADE, "brigade", Brigades),
         _decisions(),
         _entities(
             "civilians",
             "a civilian after a step",
             Column("civilian", "<i4", "index of the civilian"),
-            "n_civilians",
+            "civilian",
             Civilians,
         ),
-        _entities("sites", "a fire site before the brigades chose", None, "n_sites", Observations),
+        _entities("sites", "a fire site before the brigades chose", None, "site", Observations),
         _entities(
             "events",
             "something that happened in a step",
             Column("event", "<i4", "number of the event in its step"),
-            "n_events",
+            "event",
             Events,
         ),
         _steps(),

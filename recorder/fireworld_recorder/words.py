@@ -3,59 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any
 
-from fireworld.records import (
-    ACTION_NAMES,
-    ACTIONS,
-    ACTIVITIES,
-    EVENT_KINDS,
-    FIERYNESS,
-    LEVELS,
-    MATERIALS,
-    VOLUMES,
-    Array,
-    CityRecord,
-    Decisions,
-    Draws,
-    Events,
-    StepRecord,
-)
+from fireworld.records import ACTIONS, EVENT_KINDS, Array, CityRecord, Decisions, Draws, Events, StepRecord
 from fireworld_recorder.match import Spot
 from fireworld_recorder.schema import Field
-
-NAMES: Final[Mapping[str, tuple[str, ...]]] = {
-    "/city.material": MATERIALS,
-    "/observations.distance_from_center": LEVELS,
-    "/observations.distance_from_civilian": LEVELS,
-    "/observations.volume": VOLUMES,
-    "/decisions.action": ACTION_NAMES,
-    "/brigades.activity": ACTIVITIES,
-    "/buildings.fieryness": FIERYNESS,
-    "/events.kind": EVENT_KINDS,
-}
-"""Fields whose numbers stand for names."""
-
-_ENTITIES: Final = {
-    "n": "building",
-    "n_brigades": "brigade",
-    "n_brigades * 4": "brigade",
-    "n_civilians": "civilian",
-    "n_sites": "site",
-    "n_events": "event",
-}
-"""What an entry of an array belongs to, by the shape that the field's documentation begins with."""
-
-
-def entity_kind(item: Field) -> str:
-    """Return what an entry of this field belongs to: building, brigade, civilian, site, event, or entry."""
-    return _ENTITIES.get(item.shape, "entry")
-
-
-def entity_index(item: Field, index: int) -> int:
-    """Return the entity that an entry of this field belongs to; Q-values come four to a brigade."""
-    return index // len(ACTIONS) if item.shape == "n_brigades * 4" else index
 
 
 def entity_words(kind: str, index: int, *, city: CityRecord, step: StepRecord | None) -> str:
@@ -67,12 +19,11 @@ def entity_words(kind: str, index: int, *, city: CityRecord, step: StepRecord | 
     return f"{kind} {index}"
 
 
-def show(topic: str, name: str, value: Any) -> str:
+def show(topic: str, item: Field, value: Any) -> str:
     """Write a value: by its name if it stands for one, else as a number."""
-    names = NAMES.get(f"{topic}.{name}", ())
-    if names and 0 <= value < len(names):
-        return names[int(value)]
-    if topic == Decisions.topic and name in {"action", "target"} and value == -1:
+    if item.names and 0 <= value < len(item.names):
+        return item.names[int(value)]
+    if topic == Decisions.topic and item.name in {"action", "target"} and value == -1:
         return "none"
     return str(value)
 
@@ -86,24 +37,22 @@ def apart(a: Any, b: Any) -> str:
 
 def sentence(topic: str, item: Field, entity: str | None, spot: Spot) -> str:
     """Say what a value is in the second run (b) and was in the first (a)."""
-    shown_a, shown_b = show(topic, item.name, spot.a), show(topic, item.name, spot.b)
+    shown_a, shown_b = show(topic, item, spot.a), show(topic, item, spot.b)
     if topic == Decisions.topic and item.name == "action":
         return f"{entity} chose {shown_b}, was {shown_a}"
     if topic == Draws.topic and item.name == "key":
         return "the runs had other luck: another seed, or another way to draw"
     field = item.name.replace("_", " ")
     if topic == Decisions.topic and item.name == "q_values" and spot.position is not None:
-        field = f"Q of {ACTIONS[spot.position % len(ACTIONS)]}"
-    distance = "" if f"{topic}.{item.name}" in NAMES else apart(spot.a, spot.b)
+        field = f"Q of {ACTIONS[spot.position % item.width]}"
+    distance = "" if item.names else apart(spot.a, spot.b)
     subject = f"{entity}: {field}" if entity else field
     return f"{subject} is {shown_b}, was {shown_a}" + (f" (differs by {distance})" if distance else "")
 
 
-def length_sentence(item: Field, kind: str, n_a: int, n_b: int) -> str:
+def length_sentence(item: Field, n_a: int, n_b: int) -> str:
     """Say that an array has another length."""
-    if kind == "entry":
-        return f"{item.name.replace('_', ' ')} has {n_b} entries, had {n_a}"
-    return f"{item.name.replace('_', ' ')} is there for {n_b} {kind}s, was for {n_a}"
+    return f"{item.name.replace('_', ' ')} is there for {n_b} {item.per}s, was for {n_a}"
 
 
 def reason(a: StepRecord, b: StepRecord, brigade: int) -> str:

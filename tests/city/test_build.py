@@ -137,7 +137,7 @@ def test_the_record_has_every_field_in_its_type():
     )
     for item in fields(record):
         held, wire = getattr(record, item.name), item.metadata["wire"]
-        if item.metadata["repeated"]:
+        if "per" in item.metadata:
             assert held.dtype == np.dtype(DTYPES[wire]), item.name
             assert held.ndim == 1, item.name
         else:

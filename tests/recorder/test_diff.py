@@ -254,6 +254,10 @@ def test_runs_in_other_cities_differ_in_the_city(run, records, city):
     assert difference.first.step is None
     assert difference.n_steps_compared == 0
     assert difference.totals[1].n_steps == 31
+    drawn = dataclasses.replace(city, outline_x_m=put(city.outline_x_m, 2, 11.0))
+    assert compare(run, MemoryRecording(synthetic.header(), drawn, records)).first.sentence == (
+        "city: corner 2: outline x m is 11.0, was 12.0 (differs by 1)"
+    )
     renamed = dataclasses.replace(city, name="other")
     assert compare(run, MemoryRecording(synthetic.header(), renamed, records)).first.sentence == (
         "city: name is other, was row"

@@ -1,10 +1,16 @@
 """What is generated from the records is current, and what can never change has not changed."""
 
-from fireworld_recorder import schema
-from fireworld_recorder.schema import TOPICS, message_of
+import dataclasses
+import importlib.util
+import sys
+from types import MappingProxyType
+from typing import get_args
+
+from fireworld_recorder import schema, tables
+from fireworld_recorder.schema import COUNTS, TOPICS, Commit, message_of
 from google.protobuf import descriptor_pb2
 
-from fireworld.records import DTYPES
+from fireworld.records import DTYPES, STEP_TOPICS, CityRecord, Entity
 
 
 def test_checked_in_descriptors_are_those_of_the_records():
@@ -48,3 +54,59 @@ def test_channel_order_is_fixed():
         "/city", "/draws", "/observations", "/decisions", "/brigades", "/buildings", "/civilians", "/rewards",
         "/score", "/events", "/snapshot", "/commit",
     ]  # fmt: skip
+
+
+def columns_of(module):
+    """What the tables of an export look like, but for the words."""
+    return {
+        table.name: [(column.name, column.dtype, column.unit, column.names) for column in table.columns]
+        for table in module.TABLES.values()
+    }
+
+
+def test_rewording_the_docs_changes_no_shape_and_no_column(monkeypatch):
+    shapes = [[(item.shape, item.per) for item in message_of(topic).fields] for topic in TOPICS]
+    for topic in TOPICS:
+        for item in dataclasses.fields(topic):
+            if item.metadata:
+                reworded = MappingProxyType({**item.metadata, "doc": "(n_sites,) 0 words, 1 other words"})
+                monkeypatch.setattr(item, "metadata", reworded)
+    assert {item.doc for topic in TOPICS for item in message_of(topic).fields} == {"(n_sites,) 0 words, 1 other words"}
+    assert [[(item.shape, item.per) for item in message_of(topic).fields] for topic in TOPICS] == shapes
+    spec = importlib.util.spec_from_file_location("tables_reworded", tables.__file__)
+    again = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, "tables_reworded", again)
+    spec.loader.exec_module(again)
+    assert "words" in again.TABLES["buildings"].columns[2].doc
+    assert columns_of(again) == columns_of(tables)
+
+
+def test_every_array_says_what_it_has_entries_for():
+    assert set(COUNTS) < set(get_args(Entity))
+    for topic in TOPICS:
+        for item in message_of(topic).fields:
+            declared = next(field for field in dataclasses.fields(topic) if field.name == item.name)
+            assert item.repeated == (declared.type == "Array")
+            assert item.per in (get_args(Entity) if item.repeated else [""])
+
+
+def test_every_field_of_a_step_is_in_one_table_of_the_export():
+    indices = {"step", "building", "brigade", "civilian", "event"}
+    q_columns = {column.name for column in tables.TABLES["decisions"].columns if column.name.startswith("q_")}
+    assert len(q_columns) == 4
+    found = [
+        column.name
+        for table in tables.TABLES.values()
+        for column in table.columns
+        if table.name != "city" and column.name not in indices and not column.names and column.name not in q_columns
+    ]
+    prefixes = {"/draws": "draw_", "/rewards": "reward_"}
+    expected = [
+        prefixes.get(topic.topic, "") + item.name
+        for topic in (*STEP_TOPICS, Commit)
+        for item in message_of(topic).fields
+        if item.name not in {"q_values", "step", "hash"}
+    ]
+    assert sorted(found) == sorted(expected)
+    names = {column.name for column in tables.TABLES["city"].columns} - {"building", "material_name"}
+    assert names == {item.name for item in message_of(CityRecord).fields if item.per == "building"}
