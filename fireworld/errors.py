@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 
 class FireworldError(Exception):
     """Base of every error that a user's input, file or flag can cause; its message is one printable line."""
@@ -34,6 +36,10 @@ class LogError(FireworldError):
     """A recording that cannot be read, written, compared or replayed."""
 
 
+class FieldError(LogError, ValueError):
+    """A field that recordings do not have, or that has another length in every step."""
+
+
 class ViewError(FireworldError):
     """A view that cannot be made here: no viewer, no display, cities that differ."""
 
@@ -57,6 +63,14 @@ def expected(where: str, key: str, wanted: str, got: object, hint: str = "") -> 
         shown = shown[:77] + "..."
     place = f"{where}: {key}" if key else where
     return one_line(f"{place}: expected {wanted}, got {shown}" + (f"; {hint}" if hint else ""))
+
+
+def nearest(name: str, known: Iterable[str], *, n: int = 1, otherwise: str = "") -> str:
+    """Return a hint for a name that is not known: "try" and the n most like it, or `otherwise` if none is like it."""
+    from difflib import get_close_matches
+
+    found = get_close_matches(name, sorted(known), n=n)
+    return f"try {', '.join(found)}" if found else otherwise
 
 
 def one_line(message: str) -> str:

@@ -7,12 +7,15 @@ A field number is for ever: a field may be added with a new number, never renumb
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, ClassVar, Final, Literal, Protocol
+from dataclasses import Field, dataclass, field, fields
+from typing import Any, ClassVar, Final, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
+
+from fireworld.errors import FieldError, LogError, expected, nearest
 
 Array = NDArray[Any]
 Wire = Literal["double", "float", "sfixed32", "fixed64", "uint8", "bool", "string", "bytes"]
@@ -382,8 +385,37 @@ PHASES: Final[Mapping[str, str]] = {
 """The phase of a step that each topic tells of."""
 
 
+_STEP_TOPICS: Final = {topic.topic.removeprefix("/"): topic for topic in STEP_TOPICS}
+
+
+def find_field(topic: str, name: str = "") -> tuple[type[Any], Field[Any]]:
+    """Find a recorded field of a step; this is the one place that knows how one can be called.
+
+    Args:
+        topic: as "buildings" or "/buildings", or with the field, as "buildings.temperature".
+        name: of the field, where `topic` does not have it.
+
+    Returns:
+        The record type of the topic, and the field with what it declares as metadata.
+
+    Raises:
+        FieldError: there is none; with all there are, and the nearest.
+    """
+    full = f"{topic}.{name}" if name else topic
+    topic, _, name = full.removeprefix("/").partition(".")
+    if topic not in _STEP_TOPICS:
+        known = {f"{one}.{item.name}": item.name for one, record in _STEP_TOPICS.items() for item in fields(record)}
+        named = [one for one, last in known.items() if last == topic]
+        hint = f"try {', '.join(named)}" if named else nearest(full.removeprefix("/"), [*known, *_STEP_TOPICS])
+        raise FieldError(expected("topic of a recording", "", f"one of {', '.join(_STEP_TOPICS)}", topic, hint))
+    found = {item.name: item for item in fields(_STEP_TOPICS[topic])}
+    if name not in found:
+        raise FieldError(expected(f"field of {topic}", "", f"one of {', '.join(found)}", name, nearest(name, found)))
+    return _STEP_TOPICS[topic], found[name]
+
+
 class Steps(Protocol):
-    """A run as it can be walked through, from its first step on."""
+    """A run, step by step: all that a recording or a comparison needs. Iterating may compute it."""
 
     @property
     def header(self) -> RunHeader:
@@ -398,28 +430,123 @@ class Steps(Protocol):
     def __iter__(self) -> Iterator[StepRecord]: ...
 
 
+@runtime_checkable
 class Recording(Steps, Protocol):
-    """A recorded run as a viewer or a table reads it."""
+    """A recorded run as a viewer or a table reads it: which steps there are, and single fields over all of them."""
 
     @property
     def steps(self) -> Array:
         """(k,) int64: the committed steps, rising."""
         ...
 
-    def column(self, topic: str, name: str) -> Array:
-        """Return one field over all steps: (k, width) of an array field, (k,) of a value.
+    def column(self, topic: str, name: str = "") -> Array:
+        """Return one field, named as for `find_field`, over all steps: (k, width) of an array field, (k,) of a value.
 
-        Fields whose length changes from step to step (sites, events) raise ValueError; use `ragged`.
+        Raises:
+            FieldError: there is no such field, or its length changes from step to step (sites, events); for those
+                there is `ragged`.
         """
         ...
 
-    def ragged(self, topic: str, name: str) -> Sequence[Array]:
+    def ragged(self, topic: str, name: str = "") -> Sequence[Array]:
         """Return one array field over all steps as a list of k arrays."""
         ...
 
 
-class MemoryRecording:
-    """A recording held in memory: the steps of a run that was not written to a file."""
+@runtime_checkable
+class StoredRun(Recording, Protocol):
+    """A recorded run of which each step can be had by its number, and which may know its digest."""
+
+    @property
+    def digest(self) -> str:
+        """The identity of the run, 64 hexadecimal digits; empty if it is not known."""
+        ...
+
+    @property
+    def state(self) -> str:
+        """complete, partial or damaged."""
+        ...
+
+    @property
+    def damage(self) -> str | None:
+        """What is wrong, and up to which step it is good; None if nothing is wrong."""
+        ...
+
+    def __len__(self) -> int: ...
+
+    def step(self, number: int) -> StepRecord:
+        """Return one step.
+
+        Raises:
+            LogError: there is no such step.
+        """
+        ...
+
+
+class RecordingBase(ABC):
+    """What recordings have in common that hold their steps: fields over all steps, from the field of each step."""
+
+    header: RunHeader
+    city: CityRecord
+
+    @property
+    @abstractmethod
+    def steps(self) -> Array:
+        """(k,) int64: the committed steps, rising."""
+
+    @abstractmethod
+    def values(self, record_type: type[Any], item: Field[Any]) -> Iterator[Any]:
+        """Yield a field, as `find_field` returns it, of every step."""
+
+    def column(self, topic: str, name: str = "") -> Array:
+        """Return one field over all steps: (k, width) of an array field, (k,) of a value.
+
+        Raises:
+            FieldError: there is no such field, or its length changes from step to step; then use `ragged`.
+            LogError: the recording changed since it was opened.
+        """
+        record_type, item = find_field(topic, name)
+        dtype = DTYPES[item.metadata["wire"]]
+        table = np.empty((0, 0) if "per" in item.metadata else 0, dtype)
+        for row, value in enumerate(self.values(record_type, item)):
+            if row == 0:
+                table = np.empty((len(self), *np.shape(value)), dtype)
+            if np.shape(value) != table.shape[1:]:
+                raise FieldError(f"{record_type.topic}: {item.name}: its length changes from step to step; use ragged")
+            table[row] = value
+        return table
+
+    def ragged(self, topic: str, name: str = "") -> list[Array]:
+        """Return one array field over all steps as a list of k arrays; errors as for `column`."""
+        record_type, item = find_field(topic, name)
+        return [np.asarray(value, DTYPES[item.metadata["wire"]]) for value in self.values(record_type, item)]
+
+    def position(self, number: int) -> int:
+        """Return the position of a step in `steps`.
+
+        Raises:
+            LogError: there is no such step.
+        """
+        steps = self.steps
+        found = np.flatnonzero(steps == number)
+        if not len(found):
+            held = f"one of the steps {steps[0]} to {steps[-1]}" if len(steps) else "a recording with steps"
+            raise LogError(expected("step", "", held, number))
+        return int(found[0])
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+    def __repr__(self) -> str:
+        header = self.header
+        return f"<{type(self).__name__}: {header.scenario}, {header.policy}, seed {header.seed}, {len(self)} steps>"
+
+
+class MemoryRecording(RecordingBase):
+    """A recording held in memory, a `StoredRun`: the steps of a run that was not written to a file."""
+
+    state: Final = "complete"
+    damage: Final = None
 
     def __init__(self, header: RunHeader, city: CityRecord, records: Sequence[StepRecord], *, digest: str = "") -> None:
         self.header = header
@@ -436,11 +563,14 @@ class MemoryRecording:
     def __iter__(self) -> Iterator[StepRecord]:
         return iter(self._records)
 
-    def column(self, topic: str, name: str) -> Array:
-        """Return one field over all steps: (k, width) of an array field, (k,) of a value."""
-        values = [getattr(getattr(record, topic.lstrip("/")), name) for record in self._records]
-        return np.array(values)
+    def values(self, record_type: type[Any], item: Field[Any]) -> Iterator[Any]:
+        """Yield a field of every step."""
+        return (getattr(getattr(record, record_type.topic[1:]), item.name) for record in self._records)
 
-    def ragged(self, topic: str, name: str) -> Sequence[Array]:
-        """Return one array field over all steps as a list of k arrays."""
-        return [getattr(getattr(record, topic.lstrip("/")), name) for record in self._records]
+    def step(self, number: int) -> StepRecord:
+        """Return one step.
+
+        Raises:
+            LogError: there is no such step.
+        """
+        return self._records[self.position(number)]

@@ -14,7 +14,7 @@ from fireworld.cli.difference_text import show, show_header
 from fireworld.cli.installed import check_matplotlib
 
 if TYPE_CHECKING:
-    from fireworld_recorder.diff import Difference, Steps
+    from fireworld_recorder.diff import Difference, StepRange
     from fireworld_recorder.reader import Log
     from fireworld_recorder.spread import SpreadRow
 
@@ -256,13 +256,13 @@ def _compare(order: Order, logs: tuple[Log, Log]) -> Difference:
     return difference
 
 
-def _steps(order: Order, logs: tuple[Log, Log]) -> Steps:
+def _steps(order: Order, logs: tuple[Log, Log]) -> StepRange:
     """Return the steps to compare: those asked for, and none beyond the good part of a cut-off recording."""
-    from fireworld_recorder.diff import Steps
+    from fireworld_recorder.diff import StepRange
 
     ends = [order.last_step] if order.last_step is not None else []
     ends += [int(log.steps.max(initial=-1)) for log in logs if log.damage is not None]
-    return Steps(first=order.first_step, last=min(ends, default=None))
+    return StepRange(first=order.first_step, last=min(ends, default=None))
 
 
 def _write_junit(path: Path, order: Order, difference: Difference) -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from fireworld.records import Recording
+    from fireworld.records import Recording, Steps
 
 
-def check_replay(recorded: Recording, replayed: Recording, *, source: str, hint: str = "") -> None:
+def check_replay(recorded: Recording, replayed: Steps, *, source: str, hint: str = "") -> None:
     """Hold steps that were computed again against those recorded.
 
     Args:

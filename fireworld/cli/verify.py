@@ -20,15 +20,15 @@ def command(context: click.Context, *, log: Path, as_json: bool) -> None:
     """
     import json
 
+    from fireworld_recorder.diff import compare
     from fireworld_recorder.reader import open_log
-    from fireworld_recorder.verify import verify
 
     from fireworld.cli.diff import show, write_json
     from fireworld.recording.replay import Replay
 
     recording = open_log(log)
-    difference = verify(recording, Replay(recording))
-    if difference is not None:
+    difference = compare(recording, Replay(recording))
+    if not difference.same:
         if as_json:
             write_json(difference, digests=[recording.digest])
         else:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from fireworld.errors import LogError, expected
-from fireworld.records import CityRecord, Recording, Snapshot, StepRecord
+from fireworld.records import CityRecord, Snapshot, StepRecord, Steps, StoredRun
 from fireworld_recorder.comparable import header_differences
 from fireworld_recorder.match import Rules
 from fireworld_recorder.places import (
@@ -24,7 +24,7 @@ from fireworld_recorder.schema import Commit
 from fireworld_recorder.spread import Spread, SpreadRow, SpreadTally
 from fireworld_recorder.totals import Totals, totals_at, totals_of
 
-__all__ = ["Difference", "FirstDifference", "Steps", "compare"]
+__all__ = ["Difference", "FirstDifference", "StepRange", "compare"]
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ class Difference:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Steps:
-    """Which steps are compared, both ends included; None is as far as it goes."""
+class StepRange:
+    """Which steps are compared, both ends included; None is as far as there are any."""
 
     first: int | None = None
     last: int | None = None
@@ -63,12 +63,12 @@ class Steps:
 
 
 def compare(
-    a: Recording,
-    b: Recording,
+    a: Steps,
+    b: Steps,
     *,
     tolerances: Mapping[str, float] | None = None,
     ignore: Collection[str] = (),
-    steps: Steps | None = None,
+    steps: StepRange | None = None,
     watch: Callable[[SpreadRow], None] | None = None,
 ) -> Difference:
     """Compare two runs on the steps that both have, in the order in which things happen within a step.
@@ -77,8 +77,8 @@ def compare(
     compared array by array, unless something is let pass by a tolerance or ignored.
 
     Args:
-        a: the run that is right, or came first.
-        b: the run to hold against it.
+        a: the run that is right, or came first; each run is iterated over once.
+        b: the run to compare with it.
         tolerances: by `topic.field` or `field`: the largest difference that counts as none.
         ignore: topics, `topic.field`s or `field`s to leave out.
         steps: the steps to compare; all if left out.
@@ -90,11 +90,10 @@ def compare(
             log cannot be read.
     """
     rules = Rules(tolerances or {}, ignore)
-    steps = steps or Steps()
+    steps = steps or StepRange()
     _check_steps(a, b, steps)
     header = header_differences(a.header, b.header)
-    digest = getattr(a, "digest", None)
-    if digest and digest == getattr(b, "digest", None):
+    if isinstance(a, StoredRun) and isinstance(b, StoredRun) and a.digest and a.digest == b.digest:
         totals = _totals_within(a, steps)
         return Difference(None, (totals, totals), header, totals.n_steps, {})
     first = find_city_difference(a.city, b.city, rules)
@@ -179,13 +178,13 @@ class _Comparison:
             self.first = self.first or difference
 
 
-def _check_steps(a: Recording, b: Recording, steps: Steps) -> None:
+def _check_steps(a: Steps, b: Steps, steps: StepRange) -> None:
     """Refuse a range of steps that neither run has anything of.
 
     Raises:
         LogError: says which steps there are.
     """
-    if steps == Steps():
+    if steps == StepRange():
         return
     held = {int(step) for run in (a, b) for step in run.steps}
     if any(step in steps for step in held):
@@ -195,7 +194,7 @@ def _check_steps(a: Recording, b: Recording, steps: Steps) -> None:
     raise LogError(expected("--from and --to", "", wanted, f"steps {low} to {high}"))
 
 
-def _within(run: Recording, steps: Steps) -> Iterator[StepRecord]:
+def _within(run: Steps, steps: StepRange) -> Iterator[StepRecord]:
     """Yield the steps that are to be compared, and read no further than the last of them."""
     for record in run:
         if steps.last is not None and record.step > steps.last:
@@ -204,9 +203,9 @@ def _within(run: Recording, steps: Steps) -> Iterator[StepRecord]:
             yield record
 
 
-def _totals_within(run: Recording, steps: Steps) -> Totals:
+def _totals_within(run: Steps, steps: StepRange) -> Totals:
     """Read the outcome at the last step that is to be compared."""
-    if steps == Steps():
+    if steps == StepRange():
         return totals_of(run)
     tally = _Tally()
     for record in _within(run, steps):

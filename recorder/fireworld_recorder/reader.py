@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import dataclasses
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from fireworld.errors import LogError
-from fireworld.records import DTYPES, STEP_TOPICS, Array, CityRecord, RunHeader, Snapshot, StepRecord
+from fireworld.records import STEP_TOPICS, Array, CityRecord, RecordingBase, RunHeader, Snapshot, StepRecord
 from fireworld_recorder.codec import decode, decode_field, decode_snapshot
 from fireworld_recorder.scan import Scan, State, TopicSize, messages, scan
-from fireworld_recorder.schema import Commit, Field, message_of
+from fireworld_recorder.schema import Commit
 
 RawStep = list[tuple[str, memoryview]]
 """Topic and payload of every message of a step, /commit last."""
@@ -38,8 +39,8 @@ def open_log(path: Path | str, *, partial: bool = False) -> Log:
     return log
 
 
-class Log:
-    """A recorded run; implements `fireworld.records.Recording`. Made by `open_log`.
+class Log(RecordingBase):
+    """A recorded run, a `fireworld.records.StoredRun`. Made by `open_log`.
 
     Only the places of the steps are held in memory; every access reads the file again.
     """
@@ -80,9 +81,6 @@ class Log:
         """Messages and their bytes before compression, by topic."""
         return self.found.topics
 
-    def __len__(self) -> int:
-        return len(self.found.steps)
-
     def __iter__(self) -> Iterator[StepRecord]:
         for raw in self.raw_steps():
             yield self._record(raw)
@@ -93,38 +91,16 @@ class Log:
         Raises:
             LogError: the log has no such step, or changed since it was opened.
         """
-        steps = self.found.steps
-        if number not in steps:
-            held = f"a step of the log, {steps[0]} to {steps[-1]}" if steps else "a log that holds steps"
-            raise LogError(f"{self.path}: expected {held}, got {number}")
-        return self._record(next(self.raw_steps(steps.index(number))))
+        try:
+            first = self.position(number)
+        except LogError as error:
+            raise LogError(f"{self.path}: {error}") from None
+        return self._record(next(self.raw_steps(first)))
 
-    def column(self, topic: str, name: str) -> Array:
-        """Return one field over all steps: (k, width) of an array field, (k,) of a value.
-
-        Raises:
-            ValueError: there is no such field, or its length changes from step to step; then use `ragged`.
-            LogError: the log changed since it was opened.
-        """
-        item = _field(topic, name)
-        table = np.empty(0)
-        for row, value in enumerate(self._values(topic, item)):
-            if row == 0:
-                table = np.empty((len(self), *np.shape(value)), DTYPES[item.wire])
-            if np.shape(value) != table.shape[1:]:
-                raise ValueError(f"{topic}: {name}: its length changes from step to step; use ragged")
-            table[row] = value
-        return table if len(self) else np.empty((0, 0) if item.repeated else 0, DTYPES[item.wire])
-
-    def ragged(self, topic: str, name: str) -> Sequence[Array]:
-        """Return one array field over all steps as a list of k arrays.
-
-        Raises:
-            ValueError: there is no such field.
-            LogError: the log changed since it was opened.
-        """
-        item = _field(topic, name)
-        return [np.asarray(value, DTYPES[item.wire]) for value in self._values(topic, item)]
+    def values(self, record_type: type[Any], item: dataclasses.Field[Any]) -> Iterator[Any]:
+        """Yield a field of every step, decoding nothing else."""
+        for raw in self.raw_steps():
+            yield decode_field(record_type, item.metadata["number"], dict(raw).get(record_type.topic, b""))
 
     def raw_steps(self, first: int = 0) -> Iterator[RawStep]:
         """Yield the committed steps as they lie in the file.
@@ -153,12 +129,6 @@ class Log:
         except LogError as error:
             raise LogError(f"{self.path}: {error}; it has changed since it was opened") from error
 
-    def _values(self, topic: str, item: Field) -> Iterator[Any]:
-        """Yield one field of every step, decoding nothing else."""
-        record_type = _TYPES["/" + topic.removeprefix("/")]
-        for raw in self.raw_steps():
-            yield decode_field(record_type, item.number, dict(raw).get(record_type.topic, b""))
-
     def _record(self, raw: RawStep) -> StepRecord:
         payloads = dict(raw)
         commit = decode(Commit, payloads[Commit.topic])
@@ -172,13 +142,3 @@ class Log:
         return StepRecord(
             step=commit.step, terminated=commit.terminated, truncated=commit.truncated, snapshot=snapshot, **topics
         )
-
-
-def _field(topic: str, name: str) -> Field:
-    record_type = _TYPES.get("/" + topic.removeprefix("/"))
-    if record_type is None:
-        raise ValueError(f"expected one of the topics {', '.join(_TYPES)}, got {topic!r}")
-    for item in message_of(record_type).fields:
-        if item.name == name:
-            return item
-    raise ValueError(f"{topic}: there is no field {name!r}")

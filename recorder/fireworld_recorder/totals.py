@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from fireworld.records import Recording, StepRecord
+from fireworld.records import StepRecord, Steps, StoredRun
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,10 @@ def totals_at(last: StepRecord | None, n_steps: int) -> Totals:
     )
 
 
-def totals_of(run: Recording) -> Totals:
+def totals_of(run: Steps) -> Totals:
     """Read the outcome of a run, from its last step alone where the run can jump there."""
     steps = run.steps
-    read_step = getattr(run, "step", None)
-    if len(steps) and read_step is not None:
-        return totals_at(read_step(int(steps[-1])), len(steps))
+    if len(steps) and isinstance(run, StoredRun):
+        return totals_at(run.step(int(steps[-1])), len(steps))
     last = deque(run, maxlen=1)
     return totals_at(last[0] if last else None, len(steps))

@@ -8,10 +8,10 @@ from fireworld_recorder.diff import compare
 from fireworld_recorder.match import find, unequal_entries
 from fireworld_recorder.reader import open_log
 from fireworld_recorder.schema import TOPICS, message_of
-from fireworld_recorder.verify import verify
+from fireworld_recorder.totals import totals_of
 
 from fireworld.errors import LogError
-from fireworld.records import ACTIONS, MemoryRecording, Snapshot
+from fireworld.records import ACTIONS, MemoryRecording, Recording, Snapshot, Steps
 from tests.recorder import synthetic
 from tests.recorder.conftest import write_log
 
@@ -290,11 +290,34 @@ def test_two_empty_runs(with_records):
 
 def test_verify_names_what_the_replay_does_otherwise(log_path, with_records, records):
     log = open_log(log_path)
-    assert verify(log, with_records(records)) is None
-    difference = verify(log, with_records(altered(records, 5, "buildings", energy=(11, 0.0))))
+    assert compare(log, with_records(records)).same
+    difference = compare(log, with_records(altered(records, 5, "buildings", energy=(11, 0.0))))
     assert difference.first.step == 5
     assert difference.first.b == 0.0
-    assert verify(log, with_records(records[:-1])).first.phase == "length"
+    assert compare(log, with_records(records[:-1])).first.phase == "length"
+
+
+class Walked:
+    """A run that can only be iterated over, and only once."""
+
+    def __init__(self, records, city):
+        self.header, self.city = synthetic.header(), city
+        self.steps = np.array([record.step for record in records])
+        self._left = iter(records)
+
+    def __iter__(self):
+        return self._left
+
+
+def test_a_run_that_is_only_iterated_over_is_compared(log_path, records, city):
+    assert isinstance(Walked(records, city), Steps)
+    assert not isinstance(Walked(records, city), Recording)
+    log = open_log(log_path)
+    assert compare(log, Walked(records, city)).same
+    assert compare(Walked(records, city), log).n_steps_compared == 31
+    other = Walked(altered(records, 5, "civilians", hp=(1, 0)), city)
+    assert compare(log, other).first.sentence.startswith("step 5, health: civilian 1: hp is 0")
+    assert totals_of(Walked(records, city)) == totals_of(log)
 
 
 def test_actions_have_four_q_values():

@@ -6,7 +6,7 @@ import tracemalloc
 import numpy as np
 import pytest
 from fireworld_recorder.comparable import check_same_scenario
-from fireworld_recorder.diff import Steps, compare
+from fireworld_recorder.diff import StepRange, compare
 from fireworld_recorder.reader import open_log
 from fireworld_recorder.spread import Pair
 
@@ -110,16 +110,16 @@ def test_how_a_run_ended_can_be_ignored(run, with_records, records):
 
 def test_a_range_of_steps(run, with_records, spreading, log_path):
     other = with_records(spreading)
-    before = compare(run, other, steps=Steps(last=3))
+    before = compare(run, other, steps=StepRange(last=3))
     assert before.same
     assert (before.n_steps_compared, before.totals[0].last_step) == (4, 3)
-    within = compare(run, other, steps=Steps(first=5, last=9))
+    within = compare(run, other, steps=StepRange(first=5, last=9))
     assert (within.first.step, within.n_steps_compared) == (5, 5)
     assert [row.step for row in within.spread.rows] == [5, 6, 7, 9]
     with pytest.raises(LogError, match="expected a range of the steps 0 to 30, got steps 31 to the last"):
-        compare(run, other, steps=Steps(first=31))
+        compare(run, other, steps=StepRange(first=31))
     log = open_log(log_path)
-    same = compare(log, log, steps=Steps(first=10, last=12))
+    same = compare(log, log, steps=StepRange(first=10, last=12))
     assert (same.n_steps_compared, same.totals[0].last_step) == (3, 12)
 
 

@@ -19,8 +19,8 @@ from fireworld_recorder.schema import message_of
 from fireworld_recorder.writer import LogWriter
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
-from fireworld.errors import LogError, OutputError
-from fireworld.records import STEP_TOPICS, MemoryRecording
+from fireworld.errors import FieldError, LogError, OutputError
+from fireworld.records import STEP_TOPICS, MemoryRecording, Recording, StoredRun
 from tests.recorder import synthetic
 from tests.recorder.conftest import write_log
 
@@ -58,14 +58,65 @@ def test_columns_are_those_of_the_records(log_path, records, city):
     assert log.column("/buildings", "temperature").dtype == np.float32
     ragged = log.ragged("/events", "entity")
     assert [values.tolist() for values in ragged] == [values.tolist() for values in memory.ragged("/events", "entity")]
-    with pytest.raises(ValueError, match="use ragged"):
-        log.column("/events", "entity")
-    with pytest.raises(ValueError, match="no field 'heat'"):
-        log.column("/buildings", "heat")
-    with pytest.raises(ValueError, match="/buildings"):
-        log.ragged("/nothing", "x")
     with pytest.raises(LogError, match="0 to 30, got 31"):
         log.step(31)
+
+
+@pytest.fixture(params=["log", "memory"])
+def recording(request, log_path, records, city):
+    """The same run as a log and in memory."""
+    return open_log(log_path) if request.param == "log" else MemoryRecording(synthetic.header(), city, records)
+
+
+def test_a_recording_is_what_it_says(recording, records):
+    assert isinstance(recording, Recording)
+    assert isinstance(recording, StoredRun)
+    assert (recording.state, recording.damage) == ("complete", None)
+    assert len(recording) == 31
+    assert_same_record(recording.step(17), records[17])
+    assert repr(recording).endswith(": synthetic, easiest, seed 7, 31 steps>")
+    with pytest.raises(LogError, match="step: expected one of the steps 0 to 30, got 31"):
+        recording.step(31)
+
+
+def test_a_field_has_one_name_in_all_spellings(recording):
+    wanted = recording.column("/buildings", "temperature")
+    for names in [("buildings", "temperature"), ("buildings.temperature",), ("/buildings.temperature",)]:
+        assert np.array_equal(recording.column(*names), wanted)
+        assert np.array_equal(recording.ragged(*names), wanted)
+    assert recording.column("draws.key").dtype == np.uint64
+    assert recording.column("score.n_burning").dtype == np.int32
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        (("/events", "entity"), "/events: entity: its length changes from step to step; use ragged"),
+        (
+            ("/buildings", "temprature"),
+            "buildings: expected one of temperature, energy, fuel_share, water_litres, fieryness, got 'temprature'; try",
+        ),
+        (("buildings.heat",), "field of buildings: expected one of temperature, .*, fieryness, got 'heat'$"),
+        (("buildings",), "field of buildings: expected one of temperature, .*, got ''"),
+        (
+            ("buildings.temperature", "x"),
+            "field of buildings: expected one of .*, got 'temperature.x'; try temperature",
+        ),
+        (("/nothing", "x"), "topic of a recording: expected one of draws, .*, buildings, .*, events, got 'nothing'"),
+        (("building", "energy"), "got 'building'; try buildings.energy"),
+        (("td_error",), "got 'td_error'; try decisions.td_error"),
+        (("hp",), "got 'hp'; try brigades.hp, civilians.hp"),
+        (("city", "floors"), "expected one of draws, .* got 'city'"),
+    ],
+)
+def test_names_of_no_field_are_answered_with_those_there_are(recording, names, message):
+    for read in (recording.column, recording.ragged):
+        if read == recording.ragged and "ragged" in message:
+            continue
+        with pytest.raises(FieldError, match=message) as caught:
+            read(*names)
+        assert isinstance(caught.value, LogError)
+        assert isinstance(caught.value, ValueError)
 
 
 def test_two_writings_are_identical_bytes(tmp_path, log_path, records):
