@@ -68,7 +68,7 @@ def shortened(key: str, value: str | int) -> str:
 def totals_rows(difference: Difference) -> Iterator[tuple[str, str, str]]:
     """Yield what both runs came to, line by line."""
     for key, label in TOTALS.items():
-        a, b = (_number(getattr(totals, key)) for totals in difference.totals)
+        a, b = (_number(totals.as_json()[key]) for totals in difference.totals)
         yield label, a, b
 
 

@@ -104,7 +104,7 @@ def compare(
     tally_a, tally_b = comparison.tallies
     return Difference(
         first=comparison.first,
-        totals=(totals_at(tally_a.last, tally_a.n_steps), totals_at(tally_b.last, tally_b.n_steps)),
+        totals=(totals_at(tally_a.last, tally_a.n_steps, a.city), totals_at(tally_b.last, tally_b.n_steps, b.city)),
         header=header,
         n_steps_compared=comparison.n_compared,
         n_steps_differing=dict(comparison.n_differing),
@@ -210,7 +210,7 @@ def _totals_within(run: Steps, steps: StepRange) -> Totals:
     tally = _Tally()
     for record in _within(run, steps):
         tally.add(record)
-    return totals_at(tally.last, tally.n_steps)
+    return totals_at(tally.last, tally.n_steps, run.city)
 
 
 def _aligned(a: Iterator[StepRecord], b: Iterator[StepRecord]) -> Iterator[tuple[StepRecord | None, StepRecord | None]]:

@@ -7,9 +7,13 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from fireworld_recorder.totals import Totals
+
 
 def plain(value: Any) -> Any:
     """Turn dataclasses and mappings into dicts, sequences into lists, and NaN, which JSON lacks, into text."""
+    if isinstance(value, Totals):
+        return plain(value.as_json())
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {item.name: plain(getattr(value, item.name)) for item in dataclasses.fields(value)}
     if isinstance(value, Mapping):

@@ -1,50 +1,65 @@
-"""The outcome of a run at its last step, as diff and info tell it."""
+"""How a run had come out at the last step of it that was read, with the keys that JSON has for that."""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, Final
 
-from fireworld.records import StepRecord, Steps, StoredRun
+from fireworld.errors import LogError
+from fireworld.outcome import Outcome, outcome_of
+from fireworld.records import CityRecord, StepRecord, Steps, StoredRun
+
+JSON_KEYS: Final[Mapping[str, str]] = {
+    "last_step": "steps",
+    "time_to_complete": "time_to_complete",
+    "score": "score",
+    "score_max": "score_max",
+    "n_burnt_out": "n_burnt_out",
+    "n_civilians_alive": "n_civilians_alive",
+    "sum_of_rewards": "total_reward",
+    "water_used_litres": "water_used_litres",
+}
+"""What JSON calls the quantities of an outcome."""
 
 
 @dataclass(frozen=True)
 class Totals:
-    """What a run has come to; all but the first are None for a run without steps."""
+    """How many steps of a run were read, and how it stood after the last of them."""
 
     n_steps: int
-    last_step: int | None = None
-    time_to_complete: int | None = None
-    """The step at which nothing burned any more; None if something still burns."""
-    score: float | None = None
-    score_max: float | None = None
-    n_burnt_out: int | None = None
-    n_civilians_alive: int | None = None
-    sum_of_rewards: float | None = None
-    water_used_litres: float | None = None
+    outcome: Outcome | None = None
+    """None for a run without steps."""
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the totals as JSON has them; without an outcome all but the first are None."""
+        outcome = self.outcome
+        quantities = {key: None if outcome is None else getattr(outcome, name) for key, name in JSON_KEYS.items()}
+        return {"n_steps": self.n_steps, **quantities}
 
 
-def totals_at(last: StepRecord | None, n_steps: int) -> Totals:
-    """Read the outcome off the last of `n_steps` steps."""
-    if last is None:
-        return Totals(n_steps)
-    return Totals(
-        n_steps=n_steps,
-        last_step=last.step,
-        time_to_complete=last.step if last.terminated else None,
-        score=last.score.score,
-        score_max=last.score.score_max,
-        n_burnt_out=last.score.n_burnt_out,
-        n_civilians_alive=last.score.n_civilians_alive,
-        sum_of_rewards=last.rewards.sum_so_far,
-        water_used_litres=last.score.water_used_litres,
-    )
+def totals_at(last: StepRecord | None, n_steps: int, city: CityRecord) -> Totals:
+    """Return the totals of `n_steps` steps from the last of them, None if there is none."""
+    return Totals(n_steps, None if last is None else outcome_of(last, city))
 
 
 def totals_of(run: Steps) -> Totals:
-    """Read the outcome of a run, from its last step alone where the run can jump there."""
+    """Return the totals of a run, from its last step alone where the run can jump there."""
     steps = run.steps
     if len(steps) and isinstance(run, StoredRun):
-        return totals_at(run.step(int(steps[-1])), len(steps))
+        return totals_at(run.step(int(steps[-1])), len(steps), run.city)
     last = deque(run, maxlen=1)
-    return totals_at(last[0] if last else None, len(steps))
+    return totals_at(last[0] if last else None, len(steps), run.city)
+
+
+def final_outcome(run: Steps) -> Outcome:
+    """Return how a run came out.
+
+    Raises:
+        LogError: it has no steps.
+    """
+    outcome = totals_of(run).outcome
+    if outcome is None:
+        raise LogError("a run without steps has no outcome")
+    return outcome

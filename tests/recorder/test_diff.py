@@ -8,7 +8,7 @@ from fireworld_recorder.diff import compare
 from fireworld_recorder.match import find, unequal_entries
 from fireworld_recorder.reader import open_log
 from fireworld_recorder.schema import TOPICS, message_of
-from fireworld_recorder.totals import totals_of
+from fireworld_recorder.totals import final_outcome, totals_of
 
 from fireworld.errors import LogError
 from fireworld.records import ACTIONS, MemoryRecording, Recording, Snapshot, Steps
@@ -58,7 +58,7 @@ def test_equal_digests_are_the_same_without_reading(log_path, monkeypatch):
     difference = compare(a, b)
     assert difference.same
     assert difference.n_steps_compared == 31
-    assert difference.totals[0].n_burnt_out == 3
+    assert difference.totals[0].outcome.n_burnt_out == 3
 
 
 def test_another_choice_is_explained_by_its_q_value(run, with_records, records):
@@ -167,7 +167,7 @@ def test_how_a_run_ended_is_compared(run, with_records, records):
     other = [*records[:-1], dataclasses.replace(records[-1], terminated=True)]
     first = compare(run, with_records(other)).first
     assert first.sentence == "step 30, end: terminated is True, was False"
-    assert compare(run, with_records(other)).totals[1].time_to_complete == 30
+    assert compare(run, with_records(other)).totals[1].outcome.time_to_complete == 30
 
 
 def test_snapshots_are_compared_where_both_have_them(run, with_records, records):
@@ -285,7 +285,13 @@ def test_logs_are_compared_like_the_runs_they_hold(tmp_path, log_path, run, with
 def test_two_empty_runs(with_records):
     difference = compare(with_records([]), with_records([]))
     assert difference.same
-    assert difference.totals[0].score is None
+    assert difference.totals[0].outcome is None
+    assert difference.totals[0].as_json() == {
+        "n_steps": 0, "last_step": None, "time_to_complete": None, "score": None, "score_max": None, "n_burnt_out": None,
+        "n_civilians_alive": None, "sum_of_rewards": None, "water_used_litres": None,
+    }  # fmt: skip
+    with pytest.raises(LogError, match="a run without steps has no outcome"):
+        final_outcome(with_records([]))
 
 
 def test_verify_names_what_the_replay_does_otherwise(log_path, with_records, records):

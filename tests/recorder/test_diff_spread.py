@@ -112,7 +112,7 @@ def test_a_range_of_steps(run, with_records, spreading, log_path):
     other = with_records(spreading)
     before = compare(run, other, steps=StepRange(last=3))
     assert before.same
-    assert (before.n_steps_compared, before.totals[0].last_step) == (4, 3)
+    assert (before.n_steps_compared, before.totals[0].outcome.steps) == (4, 3)
     within = compare(run, other, steps=StepRange(first=5, last=9))
     assert (within.first.step, within.n_steps_compared) == (5, 5)
     assert [row.step for row in within.spread.rows] == [5, 6, 7, 9]
@@ -120,7 +120,7 @@ def test_a_range_of_steps(run, with_records, spreading, log_path):
         compare(run, other, steps=StepRange(first=31))
     log = open_log(log_path)
     same = compare(log, log, steps=StepRange(first=10, last=12))
-    assert (same.n_steps_compared, same.totals[0].last_step) == (3, 12)
+    assert (same.n_steps_compared, same.totals[0].outcome.steps) == (3, 12)
 
 
 def test_watching_sees_every_step_of_either_run(run, with_records, records):

@@ -94,7 +94,7 @@ def test_a_field_has_one_name_in_all_spellings(recording):
         (("/events", "entity"), "/events: entity: its length changes from step to step; use ragged"),
         (
             ("/buildings", "temprature"),
-            "buildings: expected one of temperature, energy, fuel_share, water_litres, fieryness, got 'temprature'; try",
+            "expected one of temperature, energy, fuel_share, water_litres, fieryness, got 'temprature'; try temper",
         ),
         (("buildings.heat",), "field of buildings: expected one of temperature, .*, fieryness, got 'heat'$"),
         (("buildings",), "field of buildings: expected one of temperature, .*, got ''"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Collection
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -204,7 +203,7 @@ def make_golden_folder(folder: Path) -> None:
 def changes(difference: Difference) -> list[str]:
     """Say line by line what else is different: in what was asked for, and in the totals."""
     lines = [f"{_words(key)}: {_value(b)}, was {_value(a)}" for key, (a, b) in difference.header.items()]
-    before, now = (dataclasses.asdict(totals) for totals in difference.totals)
+    before, now = (totals.as_json() for totals in difference.totals)
     lines += [f"{_words(key)}: {_value(now[key])}, was {_value(before[key])}" for key in now if now[key] != before[key]]
     return lines
 

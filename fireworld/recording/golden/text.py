@@ -42,12 +42,12 @@ def _hash(log: Log) -> str:
 
 def _facts(log: Log, order: Order) -> list[str]:
     """Say what was run and what came of it."""
-    from fireworld_recorder.totals import totals_of
+    from fireworld_recorder.totals import final_outcome
 
     from fireworld.recording.golden.order import kind_of, recorded_scenario
 
-    totals, city = totals_of(log), log.city
-    ended = "still burning" if totals.time_to_complete is None else "the fire is out"
+    outcome, city = final_outcome(log), log.city
+    ended = "still burning" if outcome.time_to_complete is None else "the fire is out"
     settings = "".join(f", {key}={text}" for key, text in order.settings.items())
     exceptions = [f"{field} to {tolerance:g}" for field, tolerance in order.tolerances.items()]
     exceptions += [f"not {name}" for name in order.ignore]
@@ -56,12 +56,12 @@ def _facts(log: Log, order: Order) -> list[str]:
         "kind": kind_of(recorded_scenario(log.header)),
         "policy": log.header.policy,
         "seed": str(log.header.seed),
-        "steps": f"{totals.last_step} of at most {log.header.n_steps_max}, {ended}",
-        "score": f"{totals.score:.6g} of {totals.score_max:g}",
-        "burnt out": f"{totals.n_burnt_out} of {len(city.building_id)} buildings",
-        "alive": f"{totals.n_civilians_alive} of {len(city.civilian_hp)} civilians",
-        "return": f"{totals.sum_of_rewards:.6g}",
-        "water": f"{totals.water_used_litres:g} litres",
+        "steps": f"{outcome.steps} of at most {log.header.n_steps_max}, {ended}",
+        "score": f"{outcome.score:.6g} of {outcome.score_max:g}",
+        "burnt out": f"{outcome.n_burnt_out} of {len(city.building_id)} buildings",
+        "alive": f"{outcome.n_civilians_alive} of {len(city.civilian_hp)} civilians",
+        "return": f"{outcome.total_reward:.6g}",
+        "water": f"{outcome.water_used_litres:g} litres",
         "compared": "exactly" + "".join(f", {exception}" for exception in exceptions),
     }
     return [f"{label:<10} {text}" for label, text in facts.items()]

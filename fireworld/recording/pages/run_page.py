@@ -8,7 +8,7 @@ from html import escape
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from fireworld_recorder.totals import totals_of
+from fireworld_recorder.totals import final_outcome
 from fireworld_viewer.story.counts import Counts, count_choices
 from fireworld_viewer.story.narration import event_lines
 
@@ -86,9 +86,9 @@ def _outcome(logs: Sequence[Log], names: Sequence[str]) -> str:
 
 
 def _outcome_of(log: Log) -> dict[str, str]:
-    totals, last = totals_of(log), log.step(int(log.steps[-1]))
+    last = log.step(int(log.steps[-1]))
     n_buildings, n_civilians = len(log.city.building_id), len(log.city.civilian_hp)
-    complete = totals.time_to_complete
+    complete = final_outcome(log).time_to_complete
     ended = (
         "nothing burned any more" if last.terminated else "the scenario's last step" if last.truncated else "stopped"
     )
