@@ -11,7 +11,7 @@ from fireworld.cli.tables import print_table
 
 if TYPE_CHECKING:
     from fireworld_recorder.diff import Difference
-    from fireworld_recorder.spread import Pair, SpreadRow
+    from fireworld_recorder.spread import SpreadRow, ValuePair
 
 DIGEST_SHOWN: Final = 12
 TOTALS: Final = {
@@ -89,7 +89,7 @@ def reached(difference: Difference) -> Iterator[str]:
             yield f"{kind}s: none of {total} differed"
 
 
-def _change(pair: Pair) -> str:
+def _change(pair: ValuePair) -> str:
     if pair.a is None or pair.b is None:
         return "-"
     difference = pair.b - pair.a

@@ -43,7 +43,7 @@ class Record(NamedTuple):
     body: bytes
 
 
-class Channel(NamedTuple):
+class ChannelRecord(NamedTuple):
     """A channel record."""
 
     id: int
@@ -51,7 +51,7 @@ class Channel(NamedTuple):
     topic: str
 
 
-class Schema(NamedTuple):
+class SchemaRecord(NamedTuple):
     """A schema record."""
 
     id: int
@@ -235,18 +235,18 @@ def payload_of(message: memoryview) -> memoryview:
     return message[_MESSAGE.size :]
 
 
-def read_channel(body: memoryview) -> Channel:
+def read_channel(body: memoryview) -> ChannelRecord:
     """Read a channel record."""
     fields = Fields(body)
     channel_id, schema_id = fields.numbers("<HH")
-    return Channel(channel_id, schema_id, fields.text())
+    return ChannelRecord(channel_id, schema_id, fields.text())
 
 
-def read_schema(body: memoryview) -> Schema:
+def read_schema(body: memoryview) -> SchemaRecord:
     """Read a schema record."""
     fields = Fields(body)
     (schema_id,) = fields.numbers("<H")
-    return Schema(schema_id, fields.text(), fields.text(), bytes(fields.bytes()))
+    return SchemaRecord(schema_id, fields.text(), fields.text(), bytes(fields.bytes()))
 
 
 def read_attachment(body: bytes) -> tuple[str, bytes]:

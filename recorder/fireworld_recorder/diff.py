@@ -12,16 +12,16 @@ from fireworld.errors import LogError, expected
 from fireworld.records import CityRecord, Snapshot, StepRecord, Steps, StoredRun
 from fireworld_recorder.comparable import header_differences
 from fireworld_recorder.match import Rules
-from fireworld_recorder.places import (
+from fireworld_recorder.schema import Commit
+from fireworld_recorder.spread import Spread, SpreadRow, SpreadTally
+from fireworld_recorder.step_difference import (
     FirstDifference,
     describe,
     find_city_difference,
+    find_differences,
     find_ending_difference,
-    find_places,
     find_snapshot_difference,
 )
-from fireworld_recorder.schema import Commit
-from fireworld_recorder.spread import Spread, SpreadRow, SpreadTally
 from fireworld_recorder.totals import Totals, totals_at, totals_of
 
 __all__ = ["Difference", "FirstDifference", "StepRange", "compare"]
@@ -156,11 +156,11 @@ class _Comparison:
 
     def _take_step(self, a: StepRecord, b: StepRecord) -> None:
         self.n_compared += 1
-        found = find_places(a, b, self._rules)
-        tell = partial(describe, a=a, b=b, city=self._city)
-        for places in found:
-            topic = places[0].topic
-            self._note(topic, tell(places[0]) if topic not in self.first_by_topic else None)
+        found = find_differences(a, b, self._rules)
+        in_words = partial(describe, a=a, b=b, city=self._city)
+        for fields in found:
+            topic = fields[0].topic
+            self._note(topic, in_words(fields[0]) if topic not in self.first_by_topic else None)
         if self._rules.snapshots and a.snapshot is not None and b.snapshot is not None:
             difference = find_snapshot_difference(a.step, a.snapshot, b.snapshot)
             if difference is not None:
@@ -168,7 +168,7 @@ class _Comparison:
         ending = find_ending_difference(a, b, self._rules, self._city)
         if ending is not None:
             self._note(Commit.topic, ending)
-        self.spread.take_both(a, b, found, tell, differs=self.first is not None)
+        self.spread.take_both(a, b, found, in_words, differs=self.first is not None)
 
     def _note(self, topic: str, difference: FirstDifference | None) -> None:
         """Count a step in which a topic differs; the words are wanted the first time only."""

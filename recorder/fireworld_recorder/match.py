@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from fireworld.errors import LogError, expected
+from fireworld.errors import LogError, expected, nearest
 from fireworld.records import STEP_TOPICS, Array, CityRecord, Snapshot
 from fireworld_recorder.schema import Commit, Field, message_of
 
@@ -18,14 +18,21 @@ _ENDINGS: Final = tuple(item for item in message_of(Commit).fields if item.wire 
 """How a run ended: the fields of /commit that are no number of a step and no hash."""
 
 
-class Spot(NamedTuple):
-    """Where two values of one field differ."""
+class FieldDifference(NamedTuple):
+    """Where two values of one field differ: the first entry that does."""
 
+    topic: str
+    item: Field
     position: int | None  # in the array; None for a single value, and for arrays of different lengths
     a: Any
     b: Any
     lengths: bool = False  # a and b are the lengths of two arrays
     unequal: Array | None = None  # (length,) where the arrays differ; None for a single value, and for other lengths
+
+    @property
+    def entity_index(self) -> int | None:
+        """Of the entity that the entry belongs to."""
+        return None if self.position is None else self.position // self.item.width
 
 
 class Rules:
@@ -33,21 +40,18 @@ class Rules:
 
     Args:
         tolerances: by `topic.field` or `field`: the largest difference that counts as none.
-        ignore: topics, `topic.field`s or `field`s to leave out. A topic may begin with a slash.
+        ignore: topics, `topic.field`s or `field`s to leave out.
 
     Raises:
         LogError: a name is not a field, or a tolerance is not a number >= 0.
     """
 
     def __init__(self, tolerances: Mapping[str, float], ignore: Collection[str]) -> None:
-        tolerances = {name.removeprefix("/"): tolerance for name, tolerance in tolerances.items()}
-        ignore = {name.removeprefix("/") for name in ignore}
+        tolerances = {check_field_name("tolerance", name): tolerance for name, tolerance in tolerances.items()}
+        ignore = {check_field_name("ignore", name, topics=True) for name in sorted(ignore)}
         for name, tolerance in tolerances.items():
-            check_field_name("tolerance", name)
             if not (math.isfinite(tolerance) and tolerance >= 0):
                 raise LogError(expected("tolerance", name, "a number >= 0", tolerance))
-        for name in sorted(ignore):
-            check_field_name("ignore", name, topics=True)
         # Snapshots hold what the topics hold, and more: what is let pass there would have to pass here too.
         self.snapshots = not tolerances and not ignore
         self.endings = [
@@ -62,36 +66,35 @@ class Rules:
             ]
 
 
-def check_field_name(where: str, name: str, *, topics: bool = False) -> None:
-    """Refuse a name that is not a field (or, with `topics`, a topic).
+def check_field_name(where: str, name: str, *, topics: bool = False) -> str:
+    """Return the name of a field, or with `topics` of a topic, without the slash that a topic may begin with.
 
     Raises:
-        LogError: with the nearest names.
+        LogError: there is no such field; with the nearest names.
     """
+    name = name.removeprefix("/")
     fields = {**_FIELDS, Commit.topic: _ENDINGS} if topics else _FIELDS
     known = {_full(topic, item) for topic, items in fields.items() for item in items}
     known |= {item.name for items in fields.values() for item in items}
     if topics:
         known |= {topic[1:] for topic in (*fields, Snapshot.topic)}
-    if name.removeprefix("/") not in known:
-        import difflib
-
-        near = difflib.get_close_matches(name, sorted(known), n=3)
-        hint = f"try {', '.join(near)}" if near else "`fireworld info LOG --schema` lists them"
+    if name not in known:
+        hint = nearest(name, known, n=3, otherwise="`fireworld info LOG --schema` lists them")
         raise LogError(expected(where, "", "a field of the log", name, hint))
+    return name
 
 
-def find(item: Field, a: Any, b: Any, tolerance: float = 0.0) -> Spot | None:
-    """Find the first place where two values of a field differ; None if they are the same."""
+def find(topic: str, item: Field, a: Any, b: Any, tolerance: float = 0.0) -> FieldDifference | None:
+    """Find the first entry in which two values of a field differ; None if they are the same."""
     if not item.repeated:
-        return None if _values_equal(a, b, tolerance) else Spot(None, a, b)
+        return None if _values_equal(a, b, tolerance) else FieldDifference(topic, item, None, a, b)
     if len(a) != len(b):
-        return Spot(None, len(a), len(b), lengths=True)
+        return FieldDifference(topic, item, None, len(a), len(b), lengths=True)
     unequal = unequal_entries(a, b, tolerance)
     if unequal is None:
         return None
-    index = int(np.argmax(unequal))
-    return Spot(index, a[index].item(), b[index].item(), unequal=unequal)
+    position = int(np.argmax(unequal))
+    return FieldDifference(topic, item, position, a[position].item(), b[position].item(), unequal=unequal)
 
 
 def unequal_entries(a: Array, b: Array, tolerance: float = 0.0) -> Array | None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fireworld.errors import LogError
-from fireworld_recorder.container import Schema
+from fireworld_recorder.container import SchemaRecord
 from fireworld_recorder.reader import Log, open_log
 from fireworld_recorder.writer import Channel, StepFile
 
@@ -56,6 +56,6 @@ def recover(path: Path | str, output: Path | str, *, force: bool = False) -> Rec
 
 def channels_of(log: Log) -> list[Channel]:
     """List the topics of a log with their schemas as it carries them, those of a later version too."""
-    none = Schema(0, "", "", b"")
+    none = SchemaRecord(0, "", "", b"")
     pairs = [(item, log.found.schemas.get(item.schema_id, none)) for _, item in sorted(log.found.channels.items())]
     return [Channel(item.topic, schema.name, schema.data) for item, schema in pairs]

@@ -16,7 +16,7 @@ from fireworld.records import STEP_SECONDS, CityRecord, RunHeader, Snapshot
 from fireworld_recorder import container
 from fireworld_recorder.chain import SCENE_PREFIX, Chain
 from fireworld_recorder.codec import decode
-from fireworld_recorder.container import Channel, Fields, Record, Schema, TruncatedError
+from fireworld_recorder.container import ChannelRecord, Fields, Record, SchemaRecord, TruncatedError
 from fireworld_recorder.header import METADATA_NAME, PROFILE, ForeignError, check_format, from_metadata
 from fireworld_recorder.schema import Commit
 
@@ -53,8 +53,8 @@ class Scan:
     metadata: Mapping[str, str]
     header: RunHeader
     city: bytes
-    schemas: Mapping[int, Schema]
-    channels: Mapping[int, Channel]
+    schemas: Mapping[int, SchemaRecord]
+    channels: Mapping[int, ChannelRecord]
     hash: bytes
     state: State = "complete"
     fault: str | None = None
@@ -171,7 +171,7 @@ def _follow(found: Scan, chain: Chain, stream_of_messages: Iterator[tuple[str, m
 
 
 def messages(
-    file: IO[bytes], n_bytes: int, start: Start, channels: Mapping[int, Channel]
+    file: IO[bytes], n_bytes: int, start: Start, channels: Mapping[int, ChannelRecord]
 ) -> Iterator[tuple[str, memoryview]]:
     """Yield topic and payload of every message from a step's start on.
 
@@ -194,7 +194,7 @@ def _block(record: Record, decompressor: zstandard.ZstdDecompressor) -> bytes:
     return record.head + record.body if record.opcode in _BARE else b""
 
 
-def _channel_of(message: memoryview, channels: Mapping[int, Channel]) -> Channel:
+def _channel_of(message: memoryview, channels: Mapping[int, ChannelRecord]) -> ChannelRecord:
     channel = channels.get(container.channel_id_of(message))
     if channel is None:
         raise LogError("a message belongs to no channel")
@@ -208,8 +208,8 @@ class _Stream:
         self.n_bytes = n_bytes
         self.metadata: dict[str, str] = {}
         self.attachments: dict[str, bytes] = {}
-        self.schemas: dict[int, Schema] = {}
-        self.channels: dict[int, Channel] = {}
+        self.schemas: dict[int, SchemaRecord] = {}
+        self.channels: dict[int, ChannelRecord] = {}
         self._file = file
         self._decompressor = zstandard.ZstdDecompressor()
 

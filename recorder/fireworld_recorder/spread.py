@@ -10,8 +10,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from fireworld.records import Array, Buildings, CityRecord, StepRecord
-from fireworld_recorder.match import Rules
-from fireworld_recorder.places import FirstDifference, Place, find_places
+from fireworld_recorder.match import FieldDifference, Rules
+from fireworld_recorder.step_difference import FirstDifference, find_differences
 
 KINDS: Final = ("building", "brigade", "civilian")
 """The entities that are counted: those that are the same ones in both runs all the time."""
@@ -19,8 +19,11 @@ KINDS: Final = ("building", "brigade", "civilian")
 Counts = tuple[int | None, int | None, int | None, int | None]
 """Of a row: buildings, states, brigades, civilians."""
 
+Differences = list[list[FieldDifference]]
+"""Of a step, as `find_differences` returns them."""
 
-class Pair(NamedTuple):
+
+class ValuePair(NamedTuple):
     """One number in both runs; None where only the other run has the step."""
 
     a: float | None
@@ -35,12 +38,12 @@ class SpreadRow:
     n_buildings: int | None
     """That differ in any field; None, as the next three, where only one run has the step."""
     n_states: int | None
-    """Buildings that burn, or were damaged, otherwise: their fieryness differs."""
+    """Buildings whose fieryness differs."""
     n_brigades: int | None
     n_civilians: int | None
-    score: Pair
-    n_burning: Pair
-    n_burnt_out: Pair
+    score: ValuePair
+    n_burning: ValuePair
+    n_burnt_out: ValuePair
 
 
 @dataclass(frozen=True)
@@ -79,8 +82,8 @@ class SpreadTally:
         self,
         a: StepRecord,
         b: StepRecord,
-        found: list[list[Place]],
-        describe: Callable[[Place], FirstDifference],
+        found: Differences,
+        describe: Callable[[FieldDifference], FirstDifference],
         *,
         differs: bool,
     ) -> None:
@@ -89,7 +92,7 @@ class SpreadTally:
         Args:
             a: the step of the first run.
             b: that of the second.
-            found: its differences, from `find_places`.
+            found: its differences, from `find_differences`.
             describe: puts one of them into words.
             differs: whether the runs differ in this step, be it in something else.
         """
@@ -98,7 +101,7 @@ class SpreadTally:
             counts[kind] = int(np.count_nonzero(differing))
             self._reached[kind] |= differing
             if counts[kind] and self._first[kind] is None:
-                self._first[kind] = describe(next(place for place in chain(*found) if _is_of(kind, place)))
+                self._first[kind] = describe(next(one for one in chain(*found) if _is_of(kind, one)))
         row = self._row(a.step, (counts["building"], _n_states(found), counts["brigade"], counts["civilian"]), a, b)
         if self._next_step is None and differs:
             self._next_step = row.step
@@ -130,7 +133,7 @@ class SpreadTally:
 
     def _row(self, step: int, counts: Counts, a: StepRecord | None, b: StepRecord | None) -> SpreadRow:
         score, burning, burnt_out = (
-            Pair(*(None if record is None else getattr(record.score, name) for record in (a, b)))
+            ValuePair(*(None if record is None else getattr(record.score, name) for record in (a, b)))
             for name in ("score", "n_burning", "n_burnt_out")
         )
         row = SpreadRow(step, *counts, score, burning, burnt_out)
@@ -156,30 +159,30 @@ def entity_counts(city: CityRecord) -> dict[str, int]:
 
 def differing_entities(a: StepRecord, b: StepRecord, rules: Rules, city: CityRecord) -> dict[str, Array]:
     """Find out which entities differ in a step, in any field that the rules compare: by kind, (n,) bool."""
-    return _differing(find_places(a, b, rules), entity_counts(city))
+    return _differing(find_differences(a, b, rules), entity_counts(city))
 
 
-def _differing(found: list[list[Place]], n_entities: Mapping[str, int]) -> dict[str, Array]:
+def _differing(found: Differences, n_entities: Mapping[str, int]) -> dict[str, Array]:
     """Gather what differs by kind of entity, (n,) bool.
 
     A field that only one of the runs recorded (Q-values, say) says nothing of single entities, and is left out.
     """
     differing = {kind: np.zeros(n, dtype=bool) for kind, n in n_entities.items()}
-    for place in chain(*found):
-        kind, unequal = place.item.per, place.spot.unequal
+    for one in chain(*found):
+        kind, unequal = one.item.per, one.unequal
         if kind in differing and unequal is not None and n_entities[kind] and len(unequal) % n_entities[kind] == 0:
             differing[kind] |= unequal.reshape(n_entities[kind], -1).any(axis=1)
     return differing
 
 
-def _n_states(found: list[list[Place]]) -> int:
+def _n_states(found: Differences) -> int:
     """Count the buildings whose fieryness differs."""
-    for place in chain(*found):
-        if (place.topic, place.item.name) == (Buildings.topic, "fieryness") and place.spot.unequal is not None:
-            return int(np.count_nonzero(place.spot.unequal))
+    for one in chain(*found):
+        if (one.topic, one.item.name) == (Buildings.topic, "fieryness") and one.unequal is not None:
+            return int(np.count_nonzero(one.unequal))
     return 0
 
 
-def _is_of(kind: str, place: Place) -> bool:
-    """Whether a difference is one of single entities of a kind."""
-    return place.spot.unequal is not None and place.item.per == kind
+def _is_of(kind: str, found: FieldDifference) -> bool:
+    """Return whether a difference is one of single entities of a kind."""
+    return found.unequal is not None and found.item.per == kind

@@ -227,7 +227,7 @@ def test_unsigned_numbers_are_compared_without_wrapping():
     assert unequal_entries(a, b, 1.0).tolist() == [True]
     assert unequal_entries(a, b, 2.0) is None
     (key,) = (item for item in message_of(TOPICS[1]).fields if item.name == "key")
-    assert find(key, 2**64 - 1, 2**64 - 2) is not None
+    assert find("/draws", key, 2**64 - 1, 2**64 - 2) is not None
 
 
 def test_runs_of_other_lengths(run, with_records, records):
@@ -287,8 +287,8 @@ def test_two_empty_runs(with_records):
     assert difference.same
     assert difference.totals[0].outcome is None
     assert difference.totals[0].as_json() == {
-        "n_steps": 0, "last_step": None, "time_to_complete": None, "score": None, "score_max": None, "n_burnt_out": None,
-        "n_civilians_alive": None, "sum_of_rewards": None, "water_used_litres": None,
+        "n_steps": 0, "last_step": None, "time_to_complete": None, "score": None, "score_max": None,
+        "n_burnt_out": None, "n_civilians_alive": None, "sum_of_rewards": None, "water_used_litres": None,
     }  # fmt: skip
     with pytest.raises(LogError, match="a run without steps has no outcome"):
         final_outcome(with_records([]))

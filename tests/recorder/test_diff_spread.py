@@ -8,7 +8,7 @@ import pytest
 from fireworld_recorder.comparable import check_same_scenario
 from fireworld_recorder.diff import StepRange, compare
 from fireworld_recorder.reader import open_log
-from fireworld_recorder.spread import Pair
+from fireworld_recorder.spread import ValuePair
 
 from fireworld.errors import LogError
 from fireworld.records import MemoryRecording
@@ -52,8 +52,8 @@ def test_the_rows_are_those_1_2_5_10_20_steps_after_the_first_difference_and_the
         (24, 12, 1, 0, 0),
         (30, 12, 1, 0, 1),
     ]
-    assert spread.rows[2].score == Pair(4.5, 4.25)
-    assert spread.rows[-1].n_burnt_out == Pair(30 // 9, 30 // 9 + 1)
+    assert spread.rows[2].score == ValuePair(4.5, 4.25)
+    assert spread.rows[-1].n_burnt_out == ValuePair(30 // 9, 30 // 9 + 1)
     assert spread.n_entities == {"building": 12, "brigade": 3, "civilian": 4}
     assert spread.n_reached == {"building": 12, "brigade": 1, "civilian": 1}
     first = {kind: (found.step, found.topic, found.index) for kind, found in spread.first_by_entity.items()}
@@ -129,7 +129,7 @@ def test_watching_sees_every_step_of_either_run(run, with_records, records):
     assert [row.step for row in rows] == list(range(31))
     assert rows[28].n_buildings == 0
     assert rows[29].n_buildings is None
-    assert rows[29].score == Pair(4.5, None)
+    assert rows[29].score == ValuePair(4.5, None)
     assert difference.spread.rows == ()
     assert difference.first.phase == "length"
 

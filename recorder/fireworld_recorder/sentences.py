@@ -1,4 +1,4 @@
-"""Say in words where two runs differ: the entity, the field and both values."""
+"""Write in words where two runs differ: the entity, the field and both values."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from fireworld.records import ACTIONS, EVENT_KINDS, Array, CityRecord, Decisions, Draws, Events, StepRecord
-from fireworld_recorder.match import Spot
+from fireworld_recorder.match import FieldDifference
 from fireworld_recorder.schema import Field
 
 
@@ -35,28 +35,30 @@ def apart(a: Any, b: Any) -> str:
     return f"{abs(a - b):.3g}"
 
 
-def sentence(topic: str, item: Field, entity: str | None, spot: Spot) -> str:
-    """Say what a value is in the second run (b) and was in the first (a)."""
-    shown_a, shown_b = show(topic, item, spot.a), show(topic, item, spot.b)
+def sentence(found: FieldDifference, entity: str | None) -> str:
+    """Write what a value is in the second run (b) and was in the first (a)."""
+    topic, item = found.topic, found.item
+    if found.lengths:
+        return f"{_words(item)} is there for {found.b // item.width} {item.per}s, was for {found.a // item.width}"
+    shown_a, shown_b = show(topic, item, found.a), show(topic, item, found.b)
     if topic == Decisions.topic and item.name == "action":
         return f"{entity} chose {shown_b}, was {shown_a}"
     if topic == Draws.topic and item.name == "key":
         return "the runs had other luck: another seed, or another way to draw"
-    field = item.name.replace("_", " ")
-    if topic == Decisions.topic and item.name == "q_values" and spot.position is not None:
-        field = f"Q of {ACTIONS[spot.position % item.width]}"
-    distance = "" if item.names else apart(spot.a, spot.b)
+    field = _words(item)
+    if topic == Decisions.topic and item.name == "q_values" and found.position is not None:
+        field = f"Q of {ACTIONS[found.position % item.width]}"
+    distance = "" if item.names else apart(found.a, found.b)
     subject = f"{entity}: {field}" if entity else field
     return f"{subject} is {shown_b}, was {shown_a}" + (f" (differs by {distance})" if distance else "")
 
 
-def length_sentence(item: Field, n_a: int, n_b: int) -> str:
-    """Say that an array has another length."""
-    return f"{item.name.replace('_', ' ')} is there for {n_b} {item.per}s, was for {n_a}"
+def _words(item: Field) -> str:
+    return item.name.replace("_", " ")
 
 
 def reason(a: StepRecord, b: StepRecord, brigade: int) -> str:
-    """Say why a brigade chose another action: another Q-value, or an exploring draw; empty if neither tells."""
+    """Return why a brigade chose another action: another Q-value, or an exploring draw; empty if it is neither."""
     n = len(ACTIONS)
     q_a, q_b = (step.decisions.q_values[brigade * n : (brigade + 1) * n] for step in (a, b))
     if len(q_a) == len(q_b) == n:

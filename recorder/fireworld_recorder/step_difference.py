@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import sys
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from fireworld.records import (
     PHASES,
@@ -17,9 +17,9 @@ from fireworld.records import (
     Snapshot,
     StepRecord,
 )
-from fireworld_recorder import words
-from fireworld_recorder.match import Rules, Spot, find, unequal_entries
-from fireworld_recorder.schema import Commit, Field
+from fireworld_recorder import sentences
+from fireworld_recorder.match import FieldDifference, Rules, find, unequal_entries
+from fireworld_recorder.schema import Commit
 
 _IN_TURN: Final = (Observations.topic, Decisions.topic)
 
@@ -43,24 +43,16 @@ class FirstDifference:
     sentence: str
 
 
-class Place(NamedTuple):
-    """A field that differs in a step, and its first entry that does."""
-
-    topic: str
-    item: Field
-    spot: Spot
-
-
-def find_places(a: StepRecord, b: StepRecord, rules: Rules) -> list[list[Place]]:
+def find_differences(a: StepRecord, b: StepRecord, rules: Rules) -> list[list[FieldDifference]]:
     """Find all fields that differ in a step.
 
     Returns:
         A list for each topic that differs, in the order in which things happened: a brigade sees what those before it
-        chose. The first place of each list is where the difference in that topic begins: at the first field; of what
-        brigades see and choose, one after another, at the first brigade.
+        chose. Each list begins with the field in which the topic came to differ: the first one; of what brigades see
+        and choose, one after another, that of the first brigade.
     """
-    found = [places for topic in STEP_TOPICS if (places := _places_in(topic.topic, a, b, rules))]
-    topics = [places[0].topic for places in found]
+    found = [fields for topic in STEP_TOPICS if (fields := _differences_in(topic.topic, a, b, rules))]
+    topics = [fields[0].topic for fields in found]
     if {*_IN_TURN} <= {*topics}:
         seen = topics.index(Observations.topic)
         if _turn(found[seen + 1][0]) < _turn(found[seen][0]):
@@ -68,44 +60,42 @@ def find_places(a: StepRecord, b: StepRecord, rules: Rules) -> list[list[Place]]
     return found
 
 
-def _places_in(topic: str, a: StepRecord, b: StepRecord, rules: Rules) -> list[Place]:
+def _differences_in(topic: str, a: StepRecord, b: StepRecord, rules: Rules) -> list[FieldDifference]:
     """Find the fields of one topic that differ, the one where the difference begins first."""
     x, y = getattr(a, topic[1:]), getattr(b, topic[1:])
-    places = [
-        Place(topic, item, spot)
+    found = [
+        difference
         for item, tolerance in rules.fields[topic]
-        if (spot := find(item, getattr(x, item.name), getattr(y, item.name), tolerance)) is not None
+        if (difference := find(topic, item, getattr(x, item.name), getattr(y, item.name), tolerance)) is not None
     ]
-    return sorted(places, key=_turn) if topic in _IN_TURN else places
+    return sorted(found, key=_turn) if topic in _IN_TURN else found
 
 
-def _turn(place: Place) -> int:
+def _turn(found: FieldDifference) -> int:
     """Return the brigade whose turn a difference in observations or decisions belongs to.
 
     -1 for what is there before anyone's turn; the errors of learning, and lengths, come after everyone's.
     """
-    if place.item.name == "td_error" or place.spot.lengths:
+    if found.item.name == "td_error" or found.lengths:
         return sys.maxsize
-    if place.spot.position is None or place.item.per != "brigade":
-        return -1
-    return place.spot.position // place.item.width
+    return -1 if found.entity_index is None or found.item.per != "brigade" else found.entity_index
 
 
 def find_city_difference(a: CityRecord, b: CityRecord, rules: Rules) -> FirstDifference | None:
     """Find the first difference between two cities."""
     for item, tolerance in rules.fields[CityRecord.topic]:
-        spot = find(item, getattr(a, item.name), getattr(b, item.name), tolerance)
-        if spot is not None:
-            return _describe(None, Place(CityRecord.topic, item, spot), a)
+        found = find(CityRecord.topic, item, getattr(a, item.name), getattr(b, item.name), tolerance)
+        if found is not None:
+            return _describe(None, found, a)
     return None
 
 
 def find_ending_difference(a: StepRecord, b: StepRecord, rules: Rules, city: CityRecord) -> FirstDifference | None:
     """Find out whether a step was the last one of one run only."""
     for item in rules.endings:
-        spot = find(item, getattr(a, item.name), getattr(b, item.name))
-        if spot is not None:
-            return _describe(a, Place(Commit.topic, item, spot), city)
+        found = find(Commit.topic, item, getattr(a, item.name), getattr(b, item.name))
+        if found is not None:
+            return _describe(a, found, city)
     return None
 
 
@@ -127,38 +117,33 @@ def find_snapshot_difference(step: int, a: Snapshot, b: Snapshot) -> FirstDiffer
     return None
 
 
-def describe(place: Place, a: StepRecord, b: StepRecord, city: CityRecord) -> FirstDifference:
-    """Put a difference in a step into words; `b` is told against `a`."""
-    difference = _describe(a, place, city)
-    if place.topic == Events.topic:
-        return _with_sentence(difference, words.events_sentence(a.events, b.events))
-    if place.topic == Decisions.topic and place.item.name == "action" and place.spot.position is not None:
-        why = words.reason(a, b, place.spot.position)
+def describe(found: FieldDifference, a: StepRecord, b: StepRecord, city: CityRecord) -> FirstDifference:
+    """Put a difference in a step into words: what `b` has, and what `a` had."""
+    difference = _describe(a, found, city)
+    if found.topic == Events.topic:
+        return _with_sentence(difference, sentences.events_sentence(a.events, b.events))
+    if found.topic == Decisions.topic and found.item.name == "action" and found.entity_index is not None:
+        why = sentences.reason(a, b, found.entity_index)
         return _with_sentence(difference, f"{difference.sentence}; {why}" if why else difference.sentence)
     return difference
 
 
-def _describe(step: StepRecord | None, found: Place, city: CityRecord) -> FirstDifference:
+def _describe(step: StepRecord | None, found: FieldDifference, city: CityRecord) -> FirstDifference:
     """Put a difference into words; `step` is the first run's, None for the city."""
-    topic, item, spot = found
-    phase = PHASES.get(topic, "end")
-    index = None if spot.position is None else spot.position // item.width
-    if spot.lengths:
-        text = words.length_sentence(item, spot.a // item.width, spot.b // item.width)
-    else:
-        entity = None if index is None else words.entity_words(item.per, index, city=city, step=step)
-        text = words.sentence(topic, item, entity, spot)
+    item, index = found.item, found.entity_index
+    phase = PHASES.get(found.topic, "end")
+    entity = None if index is None else sentences.entity_words(item.per, index, city=city, step=step)
     place = phase if step is None else f"step {step.step}, {phase}"
     return FirstDifference(
         step=None if step is None else step.step,
         phase=phase,
-        topic=topic,
+        topic=found.topic,
         field=item.name,
         entity=item.per or None,
         index=index,
-        a=spot.a,
-        b=spot.b,
-        sentence=f"{place}: {text}",
+        a=found.a,
+        b=found.b,
+        sentence=f"{place}: {sentences.sentence(found, entity)}",
     )
 
 
