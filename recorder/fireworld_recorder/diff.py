@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from fireworld.errors import LogError, expected
-from fireworld.records import CityRecord, Snapshot, StepRecord, Steps, StoredRun
+from fireworld.records import CityRecord, Recording, Snapshot, StepRecord, Steps, StoredRun
 from fireworld_recorder.comparable import header_differences
 from fireworld_recorder.match import Rules
 from fireworld_recorder.schema import Commit
@@ -22,7 +22,7 @@ from fireworld_recorder.step_difference import (
     find_ending_difference,
     find_snapshot_difference,
 )
-from fireworld_recorder.totals import Totals, totals_at, totals_of
+from fireworld_recorder.totals import Totals, totals_at, totals_of, totals_over
 
 __all__ = ["Difference", "FirstDifference", "StepRange", "compare"]
 
@@ -94,7 +94,7 @@ def compare(
     _check_steps(a, b, steps)
     header = header_differences(a.header, b.header)
     if isinstance(a, StoredRun) and isinstance(b, StoredRun) and a.digest and a.digest == b.digest:
-        totals = _totals_within(a, steps)
+        totals = totals_of(a) if steps == StepRange() else totals_over(_within(a, steps), a.city)
         return Difference(None, (totals, totals), header, totals.n_steps, {})
     first = find_city_difference(a.city, b.city, rules)
     if first is not None:
@@ -179,12 +179,12 @@ class _Comparison:
 
 
 def _check_steps(a: Steps, b: Steps, steps: StepRange) -> None:
-    """Refuse a range of steps that neither run has anything of.
+    """Check that one of the runs has something of a range of steps, if both know which they have.
 
     Raises:
-        LogError: says which steps there are.
+        LogError: with the steps that there are.
     """
-    if steps == StepRange():
+    if steps == StepRange() or not (isinstance(a, Recording) and isinstance(b, Recording)):
         return
     held = {int(step) for run in (a, b) for step in run.steps}
     if any(step in steps for step in held):
@@ -201,16 +201,6 @@ def _within(run: Steps, steps: StepRange) -> Iterator[StepRecord]:
             return
         if record.step in steps:
             yield record
-
-
-def _totals_within(run: Steps, steps: StepRange) -> Totals:
-    """Read the outcome at the last step that is to be compared."""
-    if steps == StepRange():
-        return totals_of(run)
-    tally = _Tally()
-    for record in _within(run, steps):
-        tally.add(record)
-    return totals_at(tally.last, tally.n_steps, run.city)
 
 
 def _aligned(a: Iterator[StepRecord], b: Iterator[StepRecord]) -> Iterator[tuple[StepRecord | None, StepRecord | None]]:

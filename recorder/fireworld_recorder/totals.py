@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -46,11 +45,17 @@ def totals_at(last: StepRecord | None, n_steps: int, city: CityRecord) -> Totals
 
 def totals_of(run: Steps) -> Totals:
     """Return the totals of a run, from its last step alone where the run can jump there."""
-    steps = run.steps
-    if len(steps) and isinstance(run, StoredRun):
-        return totals_at(run.step(int(steps[-1])), len(steps), run.city)
-    last = deque(run, maxlen=1)
-    return totals_at(last[0] if last else None, len(steps), run.city)
+    if isinstance(run, StoredRun) and len(run):
+        return totals_at(run.step(int(run.steps[-1])), len(run), run.city)
+    return totals_over(run, run.city)
+
+
+def totals_over(records: Iterable[StepRecord], city: CityRecord) -> Totals:
+    """Return the totals of some steps; all are iterated over."""
+    n_steps, last = 0, None
+    for record in records:
+        n_steps, last = n_steps + 1, record
+    return totals_at(last, n_steps, city)
 
 
 def final_outcome(run: Steps) -> Outcome:

@@ -4,14 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
-from fireworld_recorder.diff import compare
+from fireworld_recorder.diff import StepRange, compare
 from fireworld_recorder.match import find, unequal_entries
 from fireworld_recorder.reader import open_log
 from fireworld_recorder.schema import TOPICS, message_of
 from fireworld_recorder.totals import final_outcome, totals_of
 
 from fireworld.errors import LogError
-from fireworld.records import ACTIONS, MemoryRecording, Recording, Snapshot, Steps
+from fireworld.records import ACTIONS, MemoryRecording, Recording, Snapshot
 from tests.recorder import synthetic
 from tests.recorder.conftest import write_log
 
@@ -308,7 +308,6 @@ class Walked:
 
     def __init__(self, records, city):
         self.header, self.city = synthetic.header(), city
-        self.steps = np.array([record.step for record in records])
         self._left = iter(records)
 
     def __iter__(self):
@@ -316,13 +315,14 @@ class Walked:
 
 
 def test_a_run_that_is_only_iterated_over_is_compared(log_path, records, city):
-    assert isinstance(Walked(records, city), Steps)
     assert not isinstance(Walked(records, city), Recording)
     log = open_log(log_path)
     assert compare(log, Walked(records, city)).same
     assert compare(Walked(records, city), log).n_steps_compared == 31
     other = Walked(altered(records, 5, "civilians", hp=(1, 0)), city)
     assert compare(log, other).first.sentence.startswith("step 5, health: civilian 1: hp is 0")
+    within = compare(log, Walked(records, city), steps=StepRange(first=3, last=9))
+    assert (within.same, within.n_steps_compared) == (True, 7)
     assert totals_of(Walked(records, city)) == totals_of(log)
 
 
