@@ -1,7 +1,8 @@
-"""Files that a command or function is asked to write: may they be written, and nothing half-written bears a name."""
+"""Files and folders that a command or function is asked to write: checks, and nothing half-written bears a name."""
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,8 +23,7 @@ def check_output(path: Path, *, force: bool = False, endings: Collection[str] = 
     """
     if endings and path.suffix.lower() not in endings:
         raise OutputError(expected(str(path), "", f"a file ending in {', '.join(endings)}", path.suffix or "no ending"))
-    if not path.parent.is_dir():
-        raise OutputError(expected(str(path), "", f"an existing folder {path.parent}", "none", "make it first"))
+    _check_parent(path)
     if path.is_dir():
         raise OutputError(expected(str(path), "", "the name of a file", "a folder"))
     if path.is_symlink() or (path.exists() and not path.is_file()):
@@ -53,6 +53,48 @@ def check_outputs(paths: Sequence[Path], *, force: bool = False, inputs: Sequenc
         check_output(path, force=force)
 
 
+def check_folder(folder: Path, *, own: Collection[str], force: bool = False) -> None:
+    """Check that a folder of files could be written, before the work is done that makes it.
+
+    Args:
+        folder: the folder.
+        own: names of the files that it can hold.
+        force: an existing folder is replaced, if it holds no other files.
+
+    Raises:
+        OutputError: it exists, it is no folder, it holds something else, or there is no folder for it.
+    """
+    _check_parent(folder)
+    if not folder.exists() and not folder.is_symlink():
+        return
+    is_folder = folder.is_dir() and not folder.is_symlink()
+    with _output_errors(folder):
+        found = sorted(path.name for path in folder.iterdir()) if is_folder else [folder.name]
+    foreign = [name for name in found if name not in own or not is_folder]
+    if foreign:
+        got = f"{foreign[0]} in it" if is_folder else "a file or a link"
+        raise OutputError(expected(str(folder), "", "a name that is free, or a folder written before", got))
+    if found and not force:
+        hint = "use --force to replace it"
+        raise OutputError(
+            expected(str(folder), "", "a name that is free or an empty folder", f"{found[0]} in it", hint)
+        )
+
+
+def _check_parent(path: Path) -> None:
+    if not path.parent.is_dir():
+        raise OutputError(expected(str(path), "", f"an existing folder {path.parent}", "none", "make it first"))
+
+
+@contextmanager
+def _output_errors(path: Path) -> Iterator[None]:
+    """Turn faults of an output into one-line errors."""
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
 @contextmanager
 def written_beside(path: Path) -> Iterator[Path]:
     """Yield where to write what gets the name `path` once it is whole.
@@ -63,15 +105,42 @@ def written_beside(path: Path) -> Iterator[Path]:
         OutputError: it cannot be written.
     """
     partial = path.with_name(path.name + ".partial")
-    try:
-        yield partial
-        partial.replace(path)
-    except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from None
-    except BaseException:
-        partial.unlink(missing_ok=True)
-        raise
+    with _output_errors(path):
+        try:
+            yield partial
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
+
+
+@contextmanager
+def new_folder(folder: Path, *, own: Collection[str], force: bool = False) -> Iterator[Path]:
+    """Yield a folder to write files in that takes the place of `folder` once all are in it.
+
+    Nothing is left of it after an error or an interrupt, and an earlier folder stays. Arguments as for `check_folder`.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    partial, replaced = (folder.with_name(folder.name + suffix) for suffix in (".partial", ".replaced"))
+    with _output_errors(folder):
+        check_folder(folder, own=own, force=force)
+        for leftover in (partial, replaced):
+            check_folder(leftover, own=own, force=True)
+            shutil.rmtree(leftover, ignore_errors=True)
+        partial.mkdir()
+        try:
+            yield partial
+            if folder.exists():
+                folder.rename(replaced)
+            partial.rename(folder)
+            shutil.rmtree(replaced, ignore_errors=True)
+        except BaseException:
+            if replaced.exists() and not folder.exists():
+                replaced.rename(folder)
+            raise
+        finally:
+            shutil.rmtree(partial, ignore_errors=True)
 
 
 def write_file(path: Path, data: bytes) -> None:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-import shutil
-from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Collection, Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Final, Self
 
@@ -13,7 +12,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from fireworld.errors import LogError, OutputError, expected
+from fireworld.errors import LogError
+from fireworld.files import new_folder
 from fireworld.records import Array, StepRecord
 from fireworld_recorder.header import to_metadata
 from fireworld_recorder.reader import Log
@@ -51,7 +51,8 @@ def export(
         OutputError: the folder exists, or cannot be written.
     """
     metadata = _metadata(log)
-    with _new_folder(folder, force=force) as scratch, ExitStack() as stack:
+    own = {f"{name}{SUFFIX}" for name in TABLES}
+    with new_folder(folder, own=own, force=force) as scratch, ExitStack() as stack:
         writers = {
             name: stack.enter_context(_TableWriter(TABLES[name], scratch, metadata, rows_per_group))
             for name in TABLES
@@ -153,63 +154,3 @@ def _arrow(column: Column, parts: list[Array | None], lengths: list[int]) -> Any
     return pa.DictionaryArray.from_arrays(
         pa.array(np.where(nameless, 0, values).astype(np.int8), mask=nameless), pa.array(column.names)
     )
-
-
-@contextmanager
-def _new_folder(folder: Path, *, force: bool) -> Iterator[Path]:
-    """Make a folder beside its place, and move it there when all is in it; nothing is left of it if that fails.
-
-    Raises:
-        OutputError: something is in its place, or it cannot be made.
-    """
-    scratch, replaced = (folder.with_name(folder.name + suffix) for suffix in (".partial", ".replaced"))
-    with _output_errors(folder):
-        for path in (folder, scratch, replaced):
-            _refuse_foreign(path, force=force or path != folder)
-        for path in (scratch, replaced):
-            shutil.rmtree(path, ignore_errors=True)
-        scratch.mkdir()
-    try:
-        with _output_errors(folder):
-            yield scratch
-            _swap(scratch, folder, replaced)
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
-
-
-def _swap(scratch: Path, folder: Path, replaced: Path) -> None:
-    """Put a new folder into its place; the old one stays if that fails."""
-    try:
-        if folder.exists():
-            folder.rename(replaced)
-        scratch.rename(folder)
-    except BaseException:
-        if replaced.exists() and not folder.exists():
-            replaced.rename(folder)
-        raise
-    shutil.rmtree(replaced, ignore_errors=True)
-
-
-@contextmanager
-def _output_errors(folder: Path) -> Iterator[None]:
-    """Turn faults of the output into one-line errors."""
-    try:
-        yield
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be written: {error.strerror or error}") from None
-
-
-def _refuse_foreign(folder: Path, *, force: bool) -> None:
-    """Refuse a place that holds something, or, with `force`, anything but an earlier export."""
-    if not folder.exists():
-        return
-    products = {f"{name}{SUFFIX}" for name in TABLES}
-    found = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else [folder.name]
-    foreign = [name for name in found if name not in products]
-    if foreign:
-        got = f"{foreign[0]} in it" if folder.is_dir() else "a file"
-        raise OutputError(expected(str(folder), "", "a free name, or a folder of an earlier export", got))
-    if found and not force:
-        raise OutputError(
-            expected(str(folder), "", "a free name or an empty folder", "an earlier export", "--force replaces it")
-        )

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fireworld.errors import LogError
+from fireworld.files import check_output
 from fireworld_recorder.container import SchemaRecord
 from fireworld_recorder.reader import Log, open_log
 from fireworld_recorder.writer import Channel, StepFile
@@ -36,6 +37,7 @@ def recover(path: Path | str, output: Path | str, *, force: bool = False) -> Rec
         LogError: the log holds no good step, or cannot be read at all.
         OutputError: the output exists, its folder does not, or it cannot be written.
     """
+    check_output(Path(output), force=force)
     log = open_log(path, partial=True)
     if not len(log):
         raise LogError(f"{path}: {log.damage or 'it holds no steps'}; there is nothing to recover")

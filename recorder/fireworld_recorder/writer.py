@@ -11,6 +11,7 @@ from types import TracebackType
 from typing import Final, NamedTuple, Protocol, Self
 
 from fireworld.errors import OutputError, expected
+from fireworld.files import check_output
 from fireworld.records import FORMAT, STEP_SECONDS, CityRecord, RunHeader, Snapshot, StepRecord
 from fireworld_recorder.chain import Chain, step_messages
 from fireworld_recorder.codec import encode, encode_snapshot
@@ -84,9 +85,9 @@ class StepFile:
         self._keep_partial = not scratch_suffix
         self._open = False
         replace_partial = force or not self._keep_partial
-        _check_output(path, force=force)
+        check_output(path, force=force)
         if not replace_partial:
-            _refuse_leftover(self.partial)
+            _check_leftover(self.partial)
         with self._guard():
             self._file = self.partial.open("wb" if replace_partial else "xb")
             self._open = True
@@ -125,8 +126,7 @@ class StepFile:
             self._writer.finish()
             os.fsync(self._file.fileno())
             self._file.close()
-            if not self._force:
-                _refuse_existing(self.path)
+            check_output(self.path, force=self._force)
             self.partial.replace(self.path)
             self._open = False
 
@@ -258,30 +258,9 @@ class LogWriter:
         self._file.__exit__(kind, error, traceback)
 
 
-def _refuse_existing(path: Path) -> None:
-    if path.exists():
-        raise OutputError(
-            expected(str(path), "", "a name that is free", "an existing file", "use --force to replace it")
-        )
-
-
-def _refuse_leftover(partial: Path) -> None:
+def _check_leftover(partial: Path) -> None:
     if partial.exists():
         raise OutputError(
             f"{partial}: a run that did not end left this, or one is under way;"
             " try `fireworld recover` to keep its steps, or --force to replace it"
         )
-
-
-def _check_output(path: Path, *, force: bool) -> None:
-    """Refuse an output that would overwrite something or that cannot be made.
-
-    Raises:
-        OutputError: with what to try.
-    """
-    if not path.parent.is_dir():
-        raise OutputError(expected(str(path), "", f"an existing folder {path.parent}", "none", "make it first"))
-    if path.is_dir():
-        raise OutputError(expected(str(path), "", "the name of a file", "a folder"))
-    if not force:
-        _refuse_existing(path)

@@ -234,6 +234,10 @@ def test_missing_folder_and_folder_as_output_are_refused(tmp_path, records):
         write_log(tmp_path / "no" / "a.mcap", records[:1])
     with pytest.raises(OutputError, match="the name of a file"):
         write_log(tmp_path, records[:1])
+    (tmp_path / "link.mcap").symlink_to(tmp_path / "elsewhere.mcap")
+    with pytest.raises(OutputError, match="the name of a regular file, got a link"):
+        write_log(tmp_path / "link.mcap", records[:1], force=True)
+    assert [path.name for path in tmp_path.iterdir()] == ["link.mcap"]
 
 
 def test_exception_keeps_committed_steps_as_partial(tmp_path, records, city):

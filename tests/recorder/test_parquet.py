@@ -197,7 +197,7 @@ def test_export_replaces_only_an_export_and_only_with_force(run_cli, log_path, t
     assert run_cli("export", log_path, "--parquet", out, "--tables", "city")[0] == 0
     code, _, err = run_cli("export", log_path, "--parquet", out)
     assert code == 2
-    assert "--force replaces it" in err
+    assert "got city.parquet in it; use --force to replace it" in " ".join(err.split())
     assert run_cli("export", log_path, "--parquet", out, "--tables", "steps", "--force")[0] == 0
     assert [path.name for path in out.iterdir()] == ["steps.parquet"]
     (out / "notes.txt").write_text("mine")
@@ -207,7 +207,11 @@ def test_export_replaces_only_an_export_and_only_with_force(run_cli, log_path, t
     code, _, err = run_cli("export", log_path, "--parquet", log_path, "--force")
     assert code == 2
     assert "a file" in err
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["out"]
+    (tmp_path / "link").symlink_to(out)
+    code, _, err = run_cli("export", log_path, "--parquet", tmp_path / "link", "--force")
+    assert code == 2
+    assert "a link" in err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["link", "out"]
 
 
 @pytest.mark.parametrize(
@@ -215,7 +219,7 @@ def test_export_replaces_only_an_export_and_only_with_force(run_cli, log_path, t
     [
         (("--tables", "streets"), "expected some of city, buildings, brigades"),
         (("missing",), "No such file"),
-        (("no/such/folder",), "cannot be written"),
+        (("no/such/folder",), "expected an existing folder"),
     ],
 )
 def test_mistakes_are_refused_and_leave_nothing(run_cli, log_path, tmp_path, words, message):
