@@ -17,7 +17,7 @@ from fireworld.files import new_folder
 from fireworld.records import Array, StepRecord
 from fireworld_recorder.header import to_metadata
 from fireworld_recorder.reader import Log
-from fireworld_recorder.tables import TABLES, Column, Table
+from fireworld_recorder.tables import TABLES, ExportColumn, ExportTable, find_table, joined, n_rows_of
 
 SUFFIX: Final = ".parquet"
 ROWS_PER_GROUP: Final = 1 << 17
@@ -28,7 +28,7 @@ def export(
     log: Log,
     folder: Path,
     *,
-    tables: Collection[str] = tuple(TABLES),
+    tables: Collection[str] | None = None,
     force: bool = False,
     rows_per_group: int = ROWS_PER_GROUP,
     on_step: Callable[[StepRecord], object] = lambda _: None,
@@ -38,7 +38,7 @@ def export(
     Args:
         log: the recording, complete or not; every file says which, as `fireworld.state`.
         folder: the folder to make.
-        tables: names of the tables to write.
+        tables: names of the tables to write; None: all.
         force: replace an earlier export.
         rows_per_group: rows of a table that are held in memory before they are written.
         on_step: called after each step.
@@ -47,16 +47,17 @@ def export(
         Rows by table.
 
     Raises:
-        LogError: the log changed since it was opened, or a step in it makes no sense.
+        LogError: there is no such table, the log changed since it was opened, or a step in it makes no sense.
         OutputError: the folder exists, or cannot be written.
     """
     metadata = _metadata(log)
+    chosen = [find_table(name) for name in (TABLES if tables is None else tables)]
     own = {f"{name}{SUFFIX}" for name in TABLES}
     with new_folder(folder, own=own, force=force) as scratch, ExitStack() as stack:
         writers = {
-            name: stack.enter_context(_TableWriter(TABLES[name], scratch, metadata, rows_per_group))
-            for name in TABLES
-            if name in tables
+            name: stack.enter_context(_TableWriter(table, scratch, metadata, rows_per_group))
+            for name, table in TABLES.items()
+            if table in chosen
         }
         try:
             if "city" in writers:
@@ -84,7 +85,7 @@ def _metadata(log: Log) -> dict[str, str]:
 class _TableWriter:
     """Writes one table, a group of rows after the other."""
 
-    def __init__(self, table: Table, folder: Path, metadata: Mapping[str, str], rows_per_group: int) -> None:
+    def __init__(self, table: ExportTable, folder: Path, metadata: Mapping[str, str], rows_per_group: int) -> None:
         self.n_rows = 0
         self._table = table
         self._rows_per_group = rows_per_group
@@ -96,7 +97,7 @@ class _TableWriter:
     def add(self, record: Any) -> None:
         """Take in the rows of a step, or of the city."""
         values = self._table.read(record)
-        n_rows = next(len(value) for value in values if value is not None)
+        n_rows = n_rows_of(values)
         if n_rows:
             self._held.append(values)
             self._n_held += n_rows
@@ -107,9 +108,9 @@ class _TableWriter:
         """Write the rows that are held."""
         if not self._n_held:
             return
-        lengths = [next(len(value) for value in values if value is not None) for values in self._held]
+        lengths = [n_rows_of(values) for values in self._held]
         arrays = [
-            _arrow(column, [values[k] for values in self._held], lengths)
+            _arrow(column, joined(column, [values[k] for values in self._held], lengths))
             for k, column in enumerate(self._table.columns)
         ]
         self._writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema), row_group_size=self._n_held)
@@ -123,7 +124,7 @@ class _TableWriter:
         self._writer.close()
 
 
-def schema_of(table: Table, metadata: Mapping[str, str]) -> Any:
+def schema_of(table: ExportTable, metadata: Mapping[str, str]) -> Any:
     """Return the Arrow schema of a table: units and meanings as field metadata, the run as the file's.
 
     Units are given once more for the whole file, since few readers show the metadata of a field.
@@ -137,20 +138,13 @@ def schema_of(table: Table, metadata: Mapping[str, str]) -> Any:
     return pa.schema(fields, metadata={**metadata, **facts})
 
 
-def _arrow_type(column: Column) -> Any:
+def _arrow_type(column: ExportColumn) -> Any:
     return pa.dictionary(pa.int8(), pa.string()) if column.names else pa.from_numpy_dtype(np.dtype(column.dtype))
 
 
-def _arrow(column: Column, parts: list[Array | None], lengths: list[int]) -> Any:
-    """Join the values of several steps; where there are none stand nulls."""
-    values = np.concatenate(
-        [np.zeros(n, column.dtype if not column.names else "<i4") if part is None else part
-         for part, n in zip(parts, lengths, strict=True)]
-    )  # fmt: skip
-    missing = np.repeat([part is None for part in parts], lengths)
+def _arrow(column: ExportColumn, values: np.ma.MaskedArray[Any, Any]) -> Any:
+    """Make an Arrow array; where values are masked stand nulls."""
     if not column.names:
-        return pa.array(values, _arrow_type(column), mask=missing if missing.any() else None)
-    nameless = missing | (values < 0) | (values >= len(column.names))
-    return pa.DictionaryArray.from_arrays(
-        pa.array(np.where(nameless, 0, values).astype(np.int8), mask=nameless), pa.array(column.names)
-    )
+        return pa.array(values.data, _arrow_type(column), mask=values.mask if values.mask.any() else None)
+    codes = pa.array(values.filled(0).astype(np.int8), mask=values.mask)
+    return pa.DictionaryArray.from_arrays(codes, pa.array(column.names))

@@ -1,19 +1,18 @@
 """A run as tidy tables: which there are, what their columns are, and the rows that each step adds to them.
 
-Columns, units and meanings come from the field metadata of fireworld.records; what is written here is only which
-fields make which table.
+Which fields make which table follows from what they are declared to have entries for; see fireworld.records.
 """
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any, Final
 
 import numpy as np
 
-from fireworld.errors import LogError, expected
+from fireworld.errors import LogError, expected, nearest
 from fireworld.records import (
     ACTIONS,
     DTYPES,
@@ -29,15 +28,16 @@ from fireworld.records import (
     Observations,
     Rewards,
     Score,
-    StepRecord,
+    Steps,
 )
 from fireworld_recorder.schema import Commit, Field, message_of
 
 _NUMPY_TYPES: Final[Mapping[str, str]] = {**DTYPES, "bool": "|b1"}
+_CODES: Final = "<i4"
 
 
 @dataclass(frozen=True)
-class Column:
+class ExportColumn:
     """One column of a table."""
 
     name: str
@@ -47,159 +47,178 @@ class Column:
     unit: str = ""
     names: tuple[str, ...] = ()
     """Texts that the numbers stand for; the column holds the texts, and nothing for a number that has none."""
+    path: str = ""
+    """Where a record of a step, or the city, has the values; empty for the numbers of the entities."""
+    entry: int = 0
+    width: int = 1
+    """Which it is of the entries that each entity has there, and how many these are."""
 
 
 @dataclass(frozen=True)
-class Table:
-    """One table.
-
-    Attributes:
-        name: also the name of its file.
-        doc: what a row is.
-        columns: in their order.
-        read: the values of a step (of the city, for the table `city`), one array per column, all of one length;
-            None for a column that has nothing to say there.
-    """
+class ExportTable:
+    """One table."""
 
     name: str
+    """Also the name of its file."""
     doc: str
-    columns: tuple[Column, ...]
-    read: Callable[[Any], list[Array | None]]
+    """What a row is."""
+    per: str
+    """What there is a row for in each step; empty for the step itself."""
+    columns: tuple[ExportColumn, ...]
+
+    def read(self, record: Any) -> list[Array | None]:
+        """Return the rows that a step adds (or the city, to the table `city`).
+
+        Returns:
+            An array for each column, all of one length; None for a field that is empty there.
+
+        Raises:
+            LogError: the fields have different lengths.
+        """
+        values = [attrgetter(column.path)(record) if column.path else None for column in self.columns]
+        if not self.per:
+            return [np.array([value], column.dtype) for value, column in zip(values, self.columns, strict=True)]
+        pairs = list(zip(self.columns, values, strict=True))
+        n_rows = max(len(value) // column.width for column, value in pairs if isinstance(value, np.ndarray))
+        return [self._rows(column, value, n_rows, record) for column, value in pairs]
+
+    def _rows(self, column: ExportColumn, value: Any, n_rows: int, record: Any) -> Array | None:
+        """Return one column of the rows of a step."""
+        if value is None:
+            return np.arange(n_rows, dtype=column.dtype)
+        if not isinstance(value, np.ndarray):
+            return np.full(n_rows, value, column.dtype)
+        if len(value) not in {0, n_rows * column.width}:
+            where, field = f"step {record.step}" if self.name != "city" else "city", column.path.rpartition(".")[2]
+            raise LogError(expected(where, f"{self.name}: {field}", f"{n_rows * column.width} values", len(value)))
+        return value[column.entry :: column.width] if len(value) or not n_rows else None
 
 
-def _columns_of(topic: type[Any], per: str, prefix: str = "") -> dict[Field, list[Column]]:
-    """List the columns of a topic's fields per entity: a coded field has a second one for its names."""
-    found = {}
-    for item in message_of(topic).fields:
-        if item.per == per and item.width == 1:
-            column = Column(prefix + item.name, _NUMPY_TYPES[item.wire], item.doc, item.unit)
-            named = Column(f"{column.name}_name", "U", f"name of {column.name}", names=item.names)
-            found[item] = [column, named] if item.names else [column]
-    return found
+def n_rows_of(values: Sequence[Array | None]) -> int:
+    """Return how many rows `ExportTable.read` has returned."""
+    return next(len(value) for value in values if value is not None)
 
 
-def _column(topic: type[Any], name: str) -> Column:
-    """Return the column of one field."""
-    (item,) = (item for item in message_of(topic).fields if item.name == name)
-    return Column(name, _NUMPY_TYPES[item.wire], item.doc, item.unit)
-
-
-_STEP: Final = dataclasses.replace(_column(Commit, "step"), doc="step, a simulated minute; 0 is the state before")
-
-
-def _entities(name: str, doc: str, index: Column | None, per: Entity, *topics: type[Any]) -> Table:
-    """Make the table with a row for each step and entity, of all fields with an entry for each entity.
+def joined(column: ExportColumn, parts: Sequence[Array | None], lengths: Sequence[int]) -> np.ma.MaskedArray[Any, Any]:
+    """Join the values of several steps; masked where there are none.
 
     Args:
-        name: of the table.
-        doc: what a row is.
-        index: numbers the entities; None if one of the fields identifies them.
-        per: what these fields have an entry for.
-        topics: whose fields they are.
+        column: of names, the numbers that they stand for are joined; those without a name are masked, too.
+        parts: of each step.
+        lengths: rows of each step.
     """
-    fields = {topic: _columns_of(topic, per) for topic in topics}
-    columns = [_STEP, *([index] if index else [])]
-    columns += [column for topic in topics for columns_of in fields[topic].values() for column in columns_of]
-
-    def read(record: StepRecord) -> list[Array | None]:
-        values: list[Array | None] = []
-        for topic, items in fields.items():
-            part = getattr(record, topic.topic[1:])
-            for item, columns_of in items.items():
-                values += [getattr(part, item.name)] * len(columns_of)
-        return _step_rows(name, record.step, values, numbered=index is not None)
-
-    return Table(name, doc, tuple(columns), read)
+    dtype = _CODES if column.names else column.dtype
+    filled = [np.zeros(n, dtype) if part is None else part for part, n in zip(parts, lengths, strict=True)]
+    values = np.concatenate([np.empty(0, dtype), *filled]).astype(dtype, copy=False)
+    missing = np.repeat([part is None for part in parts], lengths).astype(bool)
+    if column.names:
+        missing |= (values < 0) | (values >= len(column.names))
+    return np.ma.MaskedArray(values, missing)
 
 
-def _step_rows(table: str, step: int, values: list[Array | None], *, numbered: bool) -> list[Array | None]:
-    """Put step and number before the values of a step's entities; a field that is empty has nothing to say."""
-    n_rows = max(len(value) for value in values if value is not None)
-    for value in values:
-        if value is not None and len(value) not in {0, n_rows}:
-            raise LogError(expected(f"step {step}", table, f"{n_rows} values in every field", len(value)))
-    head: list[Array | None] = [np.full(n_rows, step, np.int32)]
-    if numbered:
-        head.append(np.arange(n_rows, dtype=np.int32))
-    return head + [value if value is not None and len(value) == n_rows else None for value in values]
+def table_arrays(run: Steps, name: str) -> dict[str, Array]:
+    """Return a table over all steps, in memory: an array for each column, as in the files of an export.
+
+    A column of names is an array of texts, None where a number has no name; `find_table(name).columns` lists all names
+    that a column can have, in their order. A column that is empty in some steps is a masked array, as pandas takes it.
+
+    Args:
+        run: the run; it is iterated over once.
+        name: of the table.
+
+    Raises:
+        LogError: there is no such table, or a step makes no sense.
+    """
+    table = find_table(name)
+    read = [table.read(record) for record in ([run.city] if name == "city" else run)]
+    lengths = [n_rows_of(values) for values in read]
+    arrays: dict[str, Array] = {}
+    for k, column in enumerate(table.columns):
+        values = joined(column, [values[k] for values in read], lengths)
+        if column.names:
+            arrays[column.name] = np.array([*column.names, None], object)[values.filled(len(column.names))]
+        else:
+            arrays[column.name] = values if values.mask.any() else values.data
+    return arrays
 
 
-def _decisions() -> Table:
+def find_table(name: str) -> ExportTable:
+    """Return a table by its name.
+
+    Raises:
+        LogError: there is none of that name.
+    """
+    if name not in TABLES:
+        raise LogError(expected("table", "", f"one of {', '.join(TABLES)}", name, nearest(name, TABLES)))
+    return TABLES[name]
+
+
+def _columns_of(topic: type[Any], per: str, prefix: str = "") -> Iterator[ExportColumn]:
+    """Yield the columns of a topic's fields per entity: a coded field has a second one for its names."""
+    path = "" if topic in {CityRecord, Commit} else f"{topic.topic[1:]}."
+    for item in message_of(topic).fields:
+        if item.per == per and item.width == 1:
+            column = _column(item, prefix + item.name, item.doc, path=path + item.name)
+            yield column
+            if item.names:
+                doc = f"name of {column.name}"
+                yield ExportColumn(f"{column.name}_name", "U", doc, names=item.names, path=column.path)
+
+
+def _column(item: Field, name: str, doc: str, *, path: str, entry: int = 0) -> ExportColumn:
+    return ExportColumn(name, _NUMPY_TYPES[item.wire], doc, item.unit, path=path, entry=entry, width=item.width)
+
+
+_COMMIT: Final = {item.name: item for item in message_of(Commit).fields}
+_STEP: Final = _column(_COMMIT["step"], "step", "step, a simulated minute; 0 is the state before", path="step")
+_INDICES: Final = {
+    "building": "index of the building, the same in every table",
+    "brigade": "index of the brigade",
+    "civilian": "index of the civilian",
+    "event": "number of the event in its step",
+}
+"""Columns that number entities; fire sites have numbers of their own."""
+
+
+def _table(name: str, doc: str, per: Entity, *topics: type[Any]) -> ExportTable:
+    """Make the table with a row for each step and entity, of all fields of some topics per entity."""
+    index = [ExportColumn(per, "<i4", _INDICES[per])] if per in _INDICES else []
+    columns = [column for topic in topics for column in _columns_of(topic, per)]
+    return ExportTable(name, doc, per, (*([] if name == "city" else [_STEP]), *index, *columns))
+
+
+def _decisions() -> ExportTable:
     """Make the table of what the brigades saw and chose, with a column for the Q-value of each action."""
-    plain = _entities("decisions", "", _BRIGADE, "brigade", Observations, Decisions)
-    (q_values,) = (item for item in message_of(Decisions).fields if item.width > 1)
-    columns = [
-        Column(f"q_{action.replace('-', '_')}", DTYPES[q_values.wire], f"value of the action `{action}`")
-        for action in ACTIONS
-    ]
-
-    def read(record: StepRecord) -> list[Array | None]:
-        values = plain.read(record)
-        n_brigades, flat = len(values[0]) if values[0] is not None else 0, record.decisions.q_values
-        if len(flat) not in {0, n_brigades * len(ACTIONS)}:
-            wanted = f"{n_brigades * len(ACTIONS)} values"
-            raise LogError(expected(f"step {record.step}", "decisions: q_values", wanted, len(flat)))
-        by_action = flat.reshape(-1, len(ACTIONS))
-        return values + [by_action[:, k] if len(flat) else None for k in range(len(ACTIONS))]
-
     doc = "what each brigade saw, chose and why; from step 1 on"
-    return dataclasses.replace(plain, doc=doc, columns=(*plain.columns, *columns), read=read)
+    table = _table("decisions", doc, "brigade", Observations, Decisions)
+    (item,) = (item for item in message_of(Decisions).fields if item.width > 1)
+    path = f"decisions.{item.name}"
+    q_values = (
+        _column(item, f"q_{action.replace('-', '_')}", f"value of the action `{action}`", path=path, entry=k)
+        for k, action in enumerate(ACTIONS)
+    )
+    return ExportTable(table.name, doc, table.per, (*table.columns, *q_values))
 
 
-def _steps() -> Table:
+def _steps() -> ExportTable:
     """Make the table with a row for each step, of all fields with a single value; those of some get a prefix."""
     prefixes: dict[type[Any], str] = {Draws: "draw_", Decisions: "", Rewards: "reward_", Score: ""}
-    fields = {topic: _columns_of(topic, "", prefix) for topic, prefix in prefixes.items()}
-    endings = [_column(Commit, name) for name in ("terminated", "truncated")]
-    columns = [column for items in fields.values() for columns_of in items.values() for column in columns_of]
-
-    def read(record: StepRecord) -> list[Array | None]:
-        values = [
-            getattr(getattr(record, topic.topic[1:]), item.name) for topic, items in fields.items() for item in items
-        ]
-        row = [record.step, *values, record.terminated, record.truncated]
-        return [np.array([value], column.dtype) for value, column in zip(row, (_STEP, *columns, *endings), strict=True)]
-
-    return Table("steps", "luck, reward and score of a step, and how the run ended", (_STEP, *columns, *endings), read)
+    columns = [column for topic, prefix in prefixes.items() for column in _columns_of(topic, "", prefix)]
+    endings = [_column(_COMMIT[name], name, _COMMIT[name].doc, path=name) for name in ("terminated", "truncated")]
+    doc = "luck, reward and score of a step, and how the run ended"
+    return ExportTable("steps", doc, "", (_STEP, *columns, *endings))
 
 
-def _city() -> Table:
-    """Make the table with a row for each building, of what never changes."""
-    fields = _columns_of(CityRecord, "building")
-    columns = [column for columns_of in fields.values() for column in columns_of]
-
-    def read(city: CityRecord) -> list[Array | None]:
-        values = [getattr(city, item.name) for item, columns_of in fields.items() for _ in columns_of]
-        return _step_rows("city", 0, values, numbered=True)[1:]
-
-    return Table("city", "a building: what never changes", (_BUILDING, *columns), read)
-
-
-_BUILDING: Final = Column("building", "<i4", "index of the building, the same in every table")
-_BRIGADE: Final = Column("brigade", "<i4", "index of the brigade")
-
-TABLES: Final[Mapping[str, Table]] = {
+TABLES: Final[Mapping[str, ExportTable]] = {
     table.name: table
     for table in (
-        _city(),
-        _entities("buildings", "a building after a step", _BUILDING, "building", Buildings),
-        _entities("brigades", "a brigade after a step", _BRIGADE, "brigade", Brigades),
+        _table("city", "a building: what never changes", "building", CityRecord),
+        _table("buildings", "a building after a step", "building", Buildings),
+        _table("brigades", "a brigade after a step", "brigade", Brigades),
         _decisions(),
-        _entities(
-            "civilians",
-            "a civilian after a step",
-            Column("civilian", "<i4", "index of the civilian"),
-            "civilian",
-            Civilians,
-        ),
-        _entities("sites", "a fire site before the brigades chose", None, "site", Observations),
-        _entities(
-            "events",
-            "something that happened in a step",
-            Column("event", "<i4", "number of the event in its step"),
-            "event",
-            Events,
-        ),
+        _table("civilians", "a civilian after a step", "civilian", Civilians),
+        _table("sites", "a fire site before the brigades chose", "site", Observations),
+        _table("events", "something that happened in a step", "event", Events),
         _steps(),
     )
 }

@@ -2,6 +2,8 @@
 
 import dataclasses
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +11,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from fireworld_recorder.reader import open_log
-from fireworld_recorder.tables import TABLES
+from fireworld_recorder.tables import TABLES, table_arrays
 
 from fireworld import records
 from fireworld.errors import LogError, OutputError
-from fireworld.records import ACTIONS, EVENT_KINDS, FIERYNESS
+from fireworld.records import ACTIONS, EVENT_KINDS, FIERYNESS, MemoryRecording
+from tests.recorder import synthetic
 from tests.recorder.conftest import write_log
 
 parquet = pytest.importorskip("fireworld_recorder.parquet")
@@ -159,6 +162,53 @@ def test_an_empty_field_is_null_and_an_unnamed_number_too(tmp_path, records, cit
     assert [row["td_error"] is None for row in rows] == [True] * 3 + [False] * 3
 
 
+def assert_arrays_are_those_of_the_file(run, folder, name):
+    arrays, table = table_arrays(run, name), pq.read_table(folder / f"{name}.parquet")
+    assert list(arrays) == table.column_names
+    for column in TABLES[name].columns:
+        held, filed = arrays[column.name], table.column(column.name)
+        assert held.tolist() == filed.to_pylist(), column.name
+        assert held.dtype == (np.dtype(object) if column.names else np.dtype(column.dtype))
+        assert isinstance(held, np.ma.MaskedArray) == (not column.names and filed.null_count > 0)
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_tables_in_memory_are_those_in_the_files(exported, log_path, records, city, tmp_path, name):
+    assert_arrays_are_those_of_the_file(open_log(log_path), exported, name)
+    assert_arrays_are_those_of_the_file(MemoryRecording(synthetic.header(), city, records), exported, name)
+    silent = dataclasses.replace(
+        records[1].decisions, q_values=np.empty(0), td_error=np.empty(0), action=np.array([-1, 0, 9], np.int32)
+    )
+    steps = [records[0], dataclasses.replace(records[1], decisions=silent), records[2]]
+    log = open_log(write_log(tmp_path / "silent.mcap", steps, city=city))
+    parquet.export(log, tmp_path / "silent", tables=[name])
+    assert_arrays_are_those_of_the_file(log, tmp_path / "silent", name)
+    empty = open_log(write_log(tmp_path / "empty.mcap", [], city=city))
+    parquet.export(empty, tmp_path / "empty", tables=[name])
+    assert_arrays_are_those_of_the_file(empty, tmp_path / "empty", name)
+
+
+def test_a_table_in_memory_needs_no_pyarrow(log_path):
+    code = """
+import sys
+sys.modules["pyarrow"] = None
+from fireworld_recorder.reader import open_log
+from fireworld_recorder.tables import table_arrays
+print(table_arrays(open_log(sys.argv[1]), "decisions")["action_name"][:4].tolist())
+"""
+    done = subprocess.run([sys.executable, "-c", code, str(log_path)], capture_output=True, text=True, check=True)
+    assert done.stdout == f"{[ACTIONS[k] for k in (0, 1, 2, 0)]}\n"
+
+
+def test_unknown_tables_are_answered_with_those_there_are(log_path, tmp_path):
+    message = "table: expected one of city, buildings, .*, steps, got 'building'; try buildings"
+    with pytest.raises(LogError, match=message):
+        table_arrays(open_log(log_path), "building")
+    with pytest.raises(LogError, match=message):
+        parquet.export(open_log(log_path), tmp_path / "x", tables=["steps", "building"])
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_log_without_steps_has_tables_without_rows(tmp_path, city):
     rows = parquet.export(open_log(write_log(tmp_path / "a.mcap", [], city=city)), tmp_path / "a")
     assert rows.pop("city") == 12
@@ -170,7 +220,7 @@ def test_fields_of_different_lengths_are_refused_and_nothing_is_left(tmp_path, r
     wrong = dataclasses.replace(records[2].brigades, hp=np.array([1, 2], np.int32))
     steps = [*records[:2], dataclasses.replace(records[2], brigades=wrong)]
     log = open_log(write_log(tmp_path / "a.mcap", steps, city=city))
-    with pytest.raises(LogError, match=r"a\.mcap: step 2: brigades: expected 3 values in every field, got 2"):
+    with pytest.raises(LogError, match=r"a\.mcap: step 2: brigades: hp: expected 3 values, got 2"):
         parquet.export(log, tmp_path / "out")
     assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]
 
