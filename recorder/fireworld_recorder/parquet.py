@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 
 from fireworld.errors import LogError
 from fireworld.files import new_folder
-from fireworld.records import Array, StepRecord
+from fireworld.records import Array, StepRecord, StoredRun
 from fireworld_recorder.header import to_metadata
 from fireworld_recorder.reader import Log
 from fireworld_recorder.tables import TABLES, ExportColumn, ExportTable, find_table, joined, n_rows_of
@@ -25,7 +25,7 @@ ROWS_PER_GROUP: Final = 1 << 17
 
 
 def export(
-    log: Log,
+    log: StoredRun,
     folder: Path,
     *,
     tables: Collection[str] | None = None,
@@ -33,10 +33,10 @@ def export(
     rows_per_group: int = ROWS_PER_GROUP,
     on_step: Callable[[StepRecord], object] = lambda _: None,
 ) -> dict[str, int]:
-    """Write the committed steps of a log as a folder of Parquet files, which is there only once it is complete.
+    """Write the steps of a run as a folder of Parquet files, which is there only once it is complete.
 
     Args:
-        log: the recording, complete or not; every file says which, as `fireworld.state`.
+        log: the run, complete or not; every file has that in its metadata, as `fireworld.state`.
         folder: the folder to make.
         tables: names of the tables to write; None: all.
         force: replace an earlier export.
@@ -68,15 +68,16 @@ def export(
                     writer.add(record)
                 on_step(record)
         except LogError as error:
-            name = str(log.path)
-            raise error if str(error).startswith(name) else LogError(f"{name}: {error}") from None
+            if not isinstance(log, Log) or str(error).startswith(str(log.path)):
+                raise
+            raise LogError(f"{log.path}: {error}") from None
         for writer in writers.values():
             writer.flush()
     return {name: writer.n_rows for name, writer in writers.items()}
 
 
-def _metadata(log: Log) -> dict[str, str]:
-    """Collect what every file says of its run: the header, how far the log is good, the digest."""
+def _metadata(log: StoredRun) -> dict[str, str]:
+    """Return the metadata of every file: the header, how far the run is good, the digest."""
     header = {key: text for key, text in to_metadata(log.header).items() if ":" not in key and key != "checksum"}
     facts = {"digest": log.digest, "state": log.state, "damage": log.damage or "", "n_steps": str(len(log))}
     return {f"fireworld.{key}": text for key, text in sorted({**header, **facts}.items())}

@@ -172,6 +172,17 @@ def assert_arrays_are_those_of_the_file(run, folder, name):
         assert isinstance(held, np.ma.MaskedArray) == (not column.names and filed.null_count > 0)
 
 
+def test_a_run_in_memory_is_exported_like_its_log(exported, log_path, records, city, tmp_path):
+    run = MemoryRecording(synthetic.header(), city, records, digest=open_log(log_path).digest)
+    parquet.export(run, tmp_path / "run", rows_per_group=100)
+    for name in TABLES:
+        assert (tmp_path / "run" / f"{name}.parquet").read_bytes() == (exported / f"{name}.parquet").read_bytes()
+    wrong = dataclasses.replace(records[2].brigades, hp=np.array([1, 2], np.int32))
+    run = MemoryRecording(synthetic.header(), city, [dataclasses.replace(records[2], brigades=wrong)])
+    with pytest.raises(LogError, match=r"^step 2: brigades: hp: expected 3 values, got 2"):
+        parquet.export(run, tmp_path / "wrong")
+
+
 @pytest.mark.parametrize("name", TABLES)
 def test_tables_in_memory_are_those_in_the_files(exported, log_path, records, city, tmp_path, name):
     assert_arrays_are_those_of_the_file(open_log(log_path), exported, name)
