@@ -11,7 +11,7 @@ from fireworld.errors import OutputError, expected
 
 
 def check_output(path: Path, *, force: bool = False, endings: Collection[str] = ()) -> None:
-    """Refuse a file that could not be written, before the work is done that makes it.
+    """Check that a file could be written, before the work is done that makes it.
 
     Args:
         path: the file.
@@ -35,7 +35,7 @@ def check_output(path: Path, *, force: bool = False, endings: Collection[str] = 
 
 
 def check_outputs(paths: Sequence[Path], *, force: bool = False, inputs: Sequence[Path] = ()) -> None:
-    """Refuse files that could not all be written; as `check_output`, and no file may stand for two.
+    """Check that files could be written, as `check_output` does, and that no name is given twice.
 
     Args:
         paths: the files.

@@ -23,8 +23,8 @@ Entity = Literal[
     "building", "brigade", "civilian", "site", "event", "link", "corner", "node", "street", "refuge", "hydrant",
     "offset", "axis",
 ]  # fmt: skip
-"""What an array can have an entry for. An offset says where the entries of a building begin in another array, and the
-last one where they end."""
+"""What an array can have an entry for. An offset is where the entries of a building begin in another array; the last
+one is where they end."""
 
 FORMAT: Final = "fireworld-log/1"
 STEP_SECONDS: Final = 60
@@ -99,7 +99,7 @@ def column(
         wire: how its numbers travel.
         doc: what they mean; nothing but text is made of it.
         per: what the array has entries for; with the topic it decides in which exported table they are.
-        width: entries for each of these, which stand together.
+        width: entries for each of these, one after another.
         names: what the numbers 0, 1, 2, ... stand for.
         unit: where the field's name does not end in it.
         added: the field came later: it is empty in recordings made before, and so by default.
@@ -185,10 +185,10 @@ class CityRecord:
 
 @dataclass(frozen=True)
 class Draws:
-    """The luck of a step: two runs with other draws differ for that reason."""
+    """The random draws of a step, summed up: where these differ, runs differ for that reason."""
 
     topic: ClassVar[str] = "/draws"
-    key: int = value(1, "fixed64", "hash of seed and step: equal keys, equal luck")
+    key: int = value(1, "fixed64", "hash of seed and step: equal keys, the same random draws")
     burn_rate_sum: float = value(2, "double", "sum of the burn rates drawn for the burning buildings")
     health_sum: float = value(3, "double", "sum of the damage draws of the people exposed or hurt")
 
@@ -303,7 +303,7 @@ class Rewards:
 
 @dataclass(frozen=True)
 class Score:
-    """The outcome as it stands after the step."""
+    """The outcome after the step."""
 
     topic: ClassVar[str] = "/score"
     score: float = value(1, "double", "official score of the paper's time")
@@ -327,7 +327,7 @@ class Events:
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Everything that replay needs to go on from after this step, as named arrays."""
+    """Everything that is needed to resume after this step, as named arrays."""
 
     topic: ClassVar[str] = "/snapshot"
     arrays: Mapping[str, Array]
@@ -382,7 +382,7 @@ PHASES: Final[Mapping[str, str]] = {
     "/events": "events",
     "/snapshot": "state",
 }
-"""The phase of a step that each topic tells of."""
+"""The phase of a step that each topic belongs to."""
 
 
 _STEP_TOPICS: Final = {topic.topic.removeprefix("/"): topic for topic in STEP_TOPICS}

@@ -18,7 +18,7 @@ _PARTS: Final = [(topic.topic, topic.topic[1:]) for topic in STEP_TOPICS]
 
 
 class Chain:
-    """Hashes of a run as its messages come by.
+    """The chain of hashes of a run, message by message.
 
     h_0 = sha256(format name, /city); h_t = sha256(h_(t-1), then topic, zero byte, length as 8 little-endian bytes
     and bytes of every message of step t but /snapshot and /scene/..., and at last of its /commit without the hash).
@@ -29,12 +29,12 @@ class Chain:
         self._parts: list[Buffer] = []  # of the step under way: one long call of the hash beats many short ones
 
     def add(self, topic: str, data: Buffer) -> None:
-        """Take in a message of the step under way; those of UNCHAINED topics and of the scene are left out."""
+        """Add a message of the step under way; those of UNCHAINED topics and of the scene are left out."""
         if topic not in UNCHAINED and not topic.startswith(SCENE_PREFIX):
             self._update(topic, data)
 
     def commit(self, *, step: int, terminated: bool, truncated: bool) -> Commit:
-        """Seal the step under way and return its commit."""
+        """End the step under way and return its commit."""
         open_commit = Commit(step=step, terminated=terminated, truncated=truncated, hash=b"")
         self._update(Commit.topic, encode(open_commit))
         self.hash = hashlib.sha256(b"".join((self.hash, *self._parts))).digest()
@@ -58,7 +58,7 @@ class Digest:
         self._chain = Chain(encode(city))
 
     def write(self, record: StepRecord) -> None:
-        """Take in the next step."""
+        """Add the next step."""
         for topic, data in step_messages(record):
             self._chain.add(topic, data)
         self._chain.commit(step=record.step, terminated=record.terminated, truncated=record.truncated)

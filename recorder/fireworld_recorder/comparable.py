@@ -1,4 +1,4 @@
-"""What two runs were asked to do: what of it differs, and whether they can be compared at all."""
+"""Compare the headers of two runs: what they were asked to do, and whether the runs can be compared at all."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def header_differences(a: RunHeader, b: RunHeader) -> dict[str, tuple[str | int,
 
 
 def check_same_scenario(a: RunHeader, b: RunHeader, *, names: tuple[str, str]) -> None:
-    """Refuse to compare runs of two scenarios.
+    """Check that two runs are of one scenario.
 
     Args:
         a: header of the first run.
@@ -25,7 +25,7 @@ def check_same_scenario(a: RunHeader, b: RunHeader, *, names: tuple[str, str]) -
         names: what to call the two.
 
     Raises:
-        LogError: names both scenarios.
+        LogError: they are not; with both scenarios.
     """
     if a.scenario_digest == b.scenario_digest:
         return

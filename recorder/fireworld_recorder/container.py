@@ -39,7 +39,7 @@ class Record(NamedTuple):
 
     offset: int
     opcode: int
-    head: bytes  # opcode and length as they stand in the file
+    head: bytes  # opcode and length, as in the file
     body: bytes
 
 
@@ -114,7 +114,7 @@ def records(file: IO[bytes], size: int) -> Iterator[Record]:
 
     Raises:
         TruncatedError: the file ends inside the data section.
-        LogError: what stands here is not a record.
+        LogError: the bytes are not a record.
     """
     offset = file.tell()
     while True:
@@ -136,7 +136,7 @@ def records(file: IO[bytes], size: int) -> Iterator[Record]:
 
 
 def _raise_overrun(file: IO[bytes], size: int, offset: int) -> None:
-    """A record that leads beyond the file: cut off, or, if the closing bytes are there, a damaged length."""
+    """Raise for a record beyond the end: the file is cut off, or, if it has its closing bytes, a length is damaged."""
     file.seek(max(0, size - len(MAGIC)))
     if file.read(len(MAGIC)) == MAGIC:
         raise LogError(f"the record at byte {offset} has a length beyond the end of the file")
@@ -216,7 +216,7 @@ def split(block: bytes, position: int = 0) -> Iterator[tuple[int, int, memoryvie
         start = position + _RECORD.size
         if length > end - start:
             raise LogError("a chunk ends inside a record")
-        if opcode not in _IN_CHUNK:  # else a few bytes could unpack to millions of records that say nothing
+        if opcode not in _IN_CHUNK:  # else a few bytes could unpack to millions of useless records
             raise LogError(f"a chunk holds a record of type {opcode}")
         yield position, opcode, view[start : start + length]
         position = start + length

@@ -22,9 +22,9 @@ from fireworld_recorder.container import MAGIC
 COMPRESSION_LEVEL: Final = 3
 LONG_FIELD_BYTES: Final = 6000
 """A field as long as this gets blocks of its own in the compressed chunk, and with them codes that suit its numbers:
-a log of a large fire is 4 % smaller. Below it, that is not worth its time."""
+a log of a large fire is 4 % smaller. For shorter ones that takes more time than it saves space."""
 DENSE_SHARE: Final = 0.4
-"""Nor is it where compression does well anyway: after a chunk of which less than this is left, none is divided."""
+"""After a chunk that was compressed to a smaller share than this, no field of the next one gets blocks of its own."""
 
 # Plain integers, because members of an enumeration are slow to pack.
 _MESSAGE_OPCODE, _MESSAGE_INDEX_OPCODE = int(Opcode.MESSAGE), int(Opcode.MESSAGE_INDEX)
@@ -45,12 +45,12 @@ _SUMMARY: Final = (
 
 
 class ContainerWriter:
-    """An MCAP file under way. It is the caller who closes the file, after `finish`.
+    """An MCAP file under way. The caller closes the file, after `finish`.
 
     Args:
         file: a new file.
-        profile: what the header says of the content.
-        library: what the header says of the writer.
+        profile: name of the content's kind, for the header.
+        library: name of the writer, for the header.
     """
 
     def __init__(self, file: IO[bytes], *, profile: str, library: str) -> None:
@@ -174,7 +174,7 @@ class ContainerWriter:
     def _index(
         self, entries: Mapping[int, list[int]], indexes: Sequence[bytes], *, time: int, n_bytes: int, n_packed: int
     ) -> None:
-        """Keep what the summary says of the chunk that is written next."""
+        """Add the chunk that is written next to the index of the summary."""
         chunk_bytes = _CHUNK.size + n_packed
         offset = self._n_bytes + chunk_bytes
         places: list[int] = []

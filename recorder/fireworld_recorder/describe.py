@@ -1,4 +1,4 @@
-"""Say what the messages of a log are: topics, fields, types, units and shapes, from the schemas it carries."""
+"""Describe the messages of a log: topics, fields, types, units and shapes, from the schemas it carries."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class FieldWords:
     name: str
     type: str
     shape: str = ""
-    """What an array has an entry for; "any" if that is not said, empty for a single value."""
+    """Length of an array in words, "any" if it has no name; empty for a single value."""
     unit: str = ""
     doc: str = ""
 

@@ -39,9 +39,9 @@ class Difference:
     """What the runs were asked to do differently; no difference by itself."""
     n_steps_compared: int
     n_steps_differing: Mapping[str, int]
-    """By topic, in the order in which they came to differ; of another city's steps nothing is compared."""
+    """By topic, in the order in which they began to differ; steps of different cities are not compared."""
     first_by_topic: Mapping[str, FirstDifference] = dataclasses.field(default_factory=dict)
-    """The same topics: where each came to differ."""
+    """By the same topics: the first difference of each."""
     spread: Spread = dataclasses.field(default_factory=Spread)
     """Empty for runs of one digest, which are not read, and of different cities."""
 
@@ -74,7 +74,7 @@ def compare(
     """Compare two runs on the steps that both have, in the order in which things happen within a step.
 
     NaN equals NaN. Steps that only one run has are a difference too, reported if there is no other. Snapshots are
-    compared array by array, unless something is let pass by a tolerance or ignored.
+    compared array by array, unless there are tolerances or ignored names.
 
     Args:
         a: the run that is right, or came first; each run is iterated over once.
@@ -115,7 +115,7 @@ def compare(
 
 @dataclass
 class _Tally:
-    """What has come by of one run."""
+    """What was read of one run."""
 
     n_steps: int = 0
     last: StepRecord | None = None
@@ -127,7 +127,7 @@ class _Tally:
 
 
 class _Comparison:
-    """The comparison while the steps come by."""
+    """A comparison under way."""
 
     def __init__(self, rules: Rules, spread: SpreadTally, city: CityRecord) -> None:
         self.first: FirstDifference | None = None
@@ -171,7 +171,7 @@ class _Comparison:
         self.spread.take_both(a, b, found, in_words, differs=self.first is not None)
 
     def _note(self, topic: str, difference: FirstDifference | None) -> None:
-        """Count a step in which a topic differs; the words are wanted the first time only."""
+        """Count a step in which a topic differs; a difference is given the first time only."""
         self.n_differing[topic] += 1
         if difference is not None:
             self.first_by_topic.setdefault(topic, difference)

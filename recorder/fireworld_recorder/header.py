@@ -31,10 +31,10 @@ def to_metadata(header: RunHeader) -> dict[str, str]:
 
 
 def check_format(found: str) -> None:
-    """Refuse a log of another format.
+    """Check that a log is of the format that this version reads.
 
     Raises:
-        ForeignError: the format is not the one that this version reads.
+        ForeignError: it is not.
     """
     if found == FORMAT:
         return

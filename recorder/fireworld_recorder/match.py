@@ -1,4 +1,4 @@
-"""Decide whether two values are the same, and by which rules: tolerances and fields to ignore."""
+"""Compare two values of a field, by rules: tolerances and fields to ignore."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Rules:
         for name, tolerance in tolerances.items():
             if not (math.isfinite(tolerance) and tolerance >= 0):
                 raise LogError(expected("tolerance", name, "a number >= 0", tolerance))
-        # Snapshots hold what the topics hold, and more: what is let pass there would have to pass here too.
+        # Snapshots hold what the topics hold, and more, so the rules for fields would have to hold for them too.
         self.snapshots = not tolerances and not ignore
         self.endings = [
             item for item in _ENDINGS if {Commit.topic[1:], item.name, _full(Commit.topic, item)}.isdisjoint(ignore)

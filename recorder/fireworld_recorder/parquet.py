@@ -96,7 +96,7 @@ class _TableWriter:
         self._writer = pq.ParquetWriter(folder / f"{table.name}{SUFFIX}", self._schema, compression="zstd")
 
     def add(self, record: Any) -> None:
-        """Take in the rows of a step, or of the city."""
+        """Add the rows of a step, or of the city."""
         values = self._table.read(record)
         n_rows = n_rows_of(values)
         if n_rows:
@@ -144,7 +144,7 @@ def _arrow_type(column: ExportColumn) -> Any:
 
 
 def _arrow(column: ExportColumn, values: np.ma.MaskedArray[Any, Any]) -> Any:
-    """Make an Arrow array; where values are masked stand nulls."""
+    """Make an Arrow array; masked values become nulls."""
     if not column.names:
         return pa.array(values.data, _arrow_type(column), mask=values.mask if values.mask.any() else None)
     codes = pa.array(values.filled(0).astype(np.int8), mask=values.mask)

@@ -26,11 +26,11 @@ def open_log(path: Path | str, *, partial: bool = False) -> Log:
 
     Args:
         path: the log.
-        partial: accept a cut-off or damaged log too; it ends at its last good step and `damage` says what is wrong.
+        partial: accept a cut-off or damaged log too; it ends at its last good step, and has its `damage` in words.
 
     Raises:
         LogError: the file is not a log of this format, has lost its header or city, or (unless `partial`) is
-            cut off or damaged; says how far it is good.
+            cut off or damaged; with how far it is good.
     """
     path = Path(path)
     log = Log(path, scan(path))

@@ -1,4 +1,4 @@
-"""Rescue what a cut-off or damaged log holds: a proper log that ends at its last good step."""
+"""Recover a cut-off or damaged log: write a complete log that ends at its last good step."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fireworld_recorder.writer import Channel, StepFile
 
 @dataclass(frozen=True)
 class Recovery:
-    """What was rescued."""
+    """What was recovered."""
 
     n_steps: int
     last_step: int | None

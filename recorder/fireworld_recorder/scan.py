@@ -1,4 +1,4 @@
-"""One pass over a log that finds its committed steps: checks every checksum and the chain, and says what is wrong."""
+"""One pass over a log that checks every checksum and the chain, and finds its committed steps and its first fault."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Scan:
         return f"{self.state}: {self.fault}; {good}"
 
     def add(self, commit: Commit, start: Start, sizes: Mapping[str, TopicSize]) -> None:
-        """Take in a step whose hash fits."""
+        """Add a step whose hash fits."""
         if not 0 <= commit.step <= _STEP_MAX:
             raise LogError(f"a step has the number {commit.step}")
         if self.steps and commit.step <= self.steps[-1]:
@@ -142,7 +142,7 @@ def _read_city(stream_of_messages: Iterator[tuple[str, memoryview, Start]]) -> b
 
 
 def _follow(found: Scan, chain: Chain, stream_of_messages: Iterator[tuple[str, memoryview, Start]]) -> None:
-    """Take in step after step.
+    """Read step after step.
 
     Raises:
         LogError: the first fault; what was found before it is good.
@@ -202,7 +202,7 @@ def _channel_of(message: memoryview, channels: Mapping[int, ChannelRecord]) -> C
 
 
 class _Stream:
-    """The messages of a file in order; gathers what else the file holds as it comes by, and checks every checksum."""
+    """The messages of a file in order; collects what else is in the file on the way, and checks every checksum."""
 
     def __init__(self, file: IO[bytes], n_bytes: int) -> None:
         self.n_bytes = n_bytes

@@ -96,7 +96,7 @@ class Field:
 
     @property
     def proto_type(self) -> str:
-        """The protobuf type; "uint8" is a habit of ours: an unsigned number below 128, one byte as a varint."""
+        """The protobuf type; "uint8" is our name for an unsigned number below 128, one byte as a varint."""
         scalar = "uint32" if self.wire == "uint8" else self.wire
         return f"repeated {scalar}" if self.repeated else scalar
 

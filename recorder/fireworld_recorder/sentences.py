@@ -29,7 +29,7 @@ def show(topic: str, item: Field, value: Any) -> str:
 
 
 def apart(a: Any, b: Any) -> str:
-    """Write how far two numbers are apart; empty if that says nothing."""
+    """Write how far two numbers are apart; empty for values that have no distance."""
     if isinstance(a, str | bool) or isinstance(b, str | bool) or not (math.isfinite(a) and math.isfinite(b)):
         return ""
     return f"{abs(a - b):.3g}"
@@ -44,7 +44,7 @@ def sentence(found: FieldDifference, entity: str | None) -> str:
     if topic == Decisions.topic and item.name == "action":
         return f"{entity} chose {shown_b}, was {shown_a}"
     if topic == Draws.topic and item.name == "key":
-        return "the runs had other luck: another seed, or another way to draw"
+        return "the runs have different random draws: another seed, or another way to draw"
     field = _words(item)
     if topic == Decisions.topic and item.name == "q_values" and found.position is not None:
         field = f"Q of {ACTIONS[found.position % item.width]}"

@@ -62,7 +62,7 @@ class Spread:
 
 
 class SpreadTally:
-    """Counts while the steps come by; holds one bit for each entity, and the few rows that are kept.
+    """Counts, step by step; holds one bit for each entity, and the rows of a few steps.
 
     Args:
         city: of the first run.
@@ -87,14 +87,14 @@ class SpreadTally:
         *,
         differs: bool,
     ) -> None:
-        """Count a step that both runs have.
+        """Add a step that both runs have.
 
         Args:
             a: the step of the first run.
             b: that of the second.
             found: its differences, from `find_differences`.
             describe: puts one of them into words.
-            differs: whether the runs differ in this step, be it in something else.
+            differs: whether the runs differ in this step or did before, in anything.
         """
         counts = dict.fromkeys(KINDS, 0)
         for kind, differing in _differing(found, {kind: len(bits) for kind, bits in self._reached.items()}).items():
@@ -111,13 +111,13 @@ class SpreadTally:
                 self._keep(row)
 
     def take_one(self, a: StepRecord | None, b: StepRecord | None) -> None:
-        """Note a step that only one run has."""
+        """Add a step that only one run has."""
         present = a or b
         if present is not None:
             self._row(present.step, (None,) * 4, a, b)
 
     def spread(self) -> Spread:
-        """Say how it went so far."""
+        """Return the spread up to the last step added."""
         return Spread(
             rows=tuple(dict.fromkeys([*self._kept, self._last] if self._last else [])),
             n_entities={kind: len(bits) for kind, bits in self._reached.items()},
@@ -126,7 +126,7 @@ class SpreadTally:
         )
 
     def _keep(self, row: SpreadRow) -> None:
-        """Keep a row, and reckon which is the next to be kept."""
+        """Add a row to the spread, and compute the step of the next."""
         self._kept.append(row)
         first = self._kept[0].step
         self._next_step = next(first + distance for distance in self._distances if first + distance > row.step)
@@ -158,14 +158,14 @@ def entity_counts(city: CityRecord) -> dict[str, int]:
 
 
 def differing_entities(a: StepRecord, b: StepRecord, rules: Rules, city: CityRecord) -> dict[str, Array]:
-    """Find out which entities differ in a step, in any field that the rules compare: by kind, (n,) bool."""
+    """Return which entities differ in a step, in any field that the rules compare, by kind: (n,) bool."""
     return _differing(find_differences(a, b, rules), entity_counts(city))
 
 
 def _differing(found: Differences, n_entities: Mapping[str, int]) -> dict[str, Array]:
-    """Gather what differs by kind of entity, (n,) bool.
+    """Return which entities differ, by kind: (n,) bool.
 
-    A field that only one of the runs recorded (Q-values, say) says nothing of single entities, and is left out.
+    A field that only one of the runs recorded, such as Q-values, is left out.
     """
     differing = {kind: np.zeros(n, dtype=bool) for kind, n in n_entities.items()}
     for one in chain(*found):

@@ -48,8 +48,8 @@ def find_differences(a: StepRecord, b: StepRecord, rules: Rules) -> list[list[Fi
 
     Returns:
         A list for each topic that differs, in the order in which things happened: a brigade sees what those before it
-        chose. Each list begins with the field in which the topic came to differ: the first one; of what brigades see
-        and choose, one after another, that of the first brigade.
+        chose. Each list begins with the field in which the topic first differs: of what brigades see and choose, one
+        after another, that of the first brigade.
     """
     found = [fields for topic in STEP_TOPICS if (fields := _differences_in(topic.topic, a, b, rules))]
     topics = [fields[0].topic for fields in found]

@@ -205,7 +205,7 @@ def _steps() -> ExportTable:
     prefixes: dict[type[Any], str] = {Draws: "draw_", Decisions: "", Rewards: "reward_", Score: ""}
     columns = [column for topic, prefix in prefixes.items() for column in _columns_of(topic, "", prefix)]
     endings = [_column(_COMMIT[name], name, _COMMIT[name].doc, path=name) for name in ("terminated", "truncated")]
-    doc = "luck, reward and score of a step, and how the run ended"
+    doc = "random draws, reward and score of a step, and how the run ended"
     return ExportTable("steps", doc, "", (_STEP, *columns, *endings))
 
 

@@ -36,7 +36,7 @@ class Channel(NamedTuple):
 
 
 class Scene(Protocol):
-    """What a log holds besides, for tools that draw its steps: topics below /scene/, derived from the records."""
+    """What else a log holds, for tools that draw its steps: topics below /scene/, derived from the records."""
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -63,8 +63,8 @@ class StepFile:
         channels: topics that will be written; the first is /city.
         city: the encoded city.
         force: replace an existing log.
-        scratch_suffix: what the name ends in until the log is complete, for a copy that is worth nothing before:
-            a leftover of that name is replaced, and an error leaves none. Without it the partial log is kept.
+        scratch_suffix: what the name ends in until the log is complete, for a copy that nobody needs before: a
+            leftover of that name is replaced, and an error leaves none. Without it the partial log is kept.
     """
 
     def __init__(
@@ -153,14 +153,14 @@ class StepFile:
 
     @property
     def _holds_steps(self) -> bool:
-        """Whether the partial file is worth keeping."""
+        """Whether the partial file is kept."""
         return self._keep_partial and self.n_commits > 0
 
     def _write(self, step: int, messages: Iterable[tuple[str, bytes]]) -> None:
         """Write messages as a chunk."""
         chunk = [(self._channel_ids[topic], data) for topic, data in messages]
         n_bytes = sum([len(data) for _, data in chunk])
-        if n_bytes > CHUNK_PAYLOAD_MAX:  # a reader would refuse it
+        if n_bytes > CHUNK_PAYLOAD_MAX:  # a reader would not accept it
             wanted = f"at most {CHUNK_PAYLOAD_MAX} bytes in a step"
             raise OutputError(expected(str(self.path), f"step {step}", wanted, f"{n_bytes} bytes"))
         self._writer.write_chunk(chunk, time=step * _STEP_NANOSECONDS, sequence=step)
@@ -188,7 +188,7 @@ class LogWriter:
         header: what identifies the run.
         city: the city it runs in.
         force: replace an existing log.
-        scene: what to write besides, for other tools.
+        scene: what else to write, for other tools.
 
     Raises:
         OutputError: the log exists, its folder does not, or it cannot be written.

@@ -28,7 +28,7 @@ def steps_of(log):
 
 
 def check(path, n_safe, whole):
-    """Hold what a killed process left against the whole run; return how many steps were rescued, -1 for no log."""
+    """Compare what a killed process left with the whole run; return how many steps were rescued, -1 for no log."""
     partial = path.with_name(path.name + ".partial")
     if path.exists():
         assert not partial.exists()

@@ -142,7 +142,7 @@ def test_options(project):
     assert order.settings == {"brigades.n": "3", "choices": "simultaneous"}
     assert order.tolerances == {"energy": 1e-6}
     project.makepyfile(test_mine=test.format(seed=2, ignore=[]))
-    run(project, outcome={"failed": 1}).fnmatch_lines(["step 0, draw: the runs had other luck*"])
+    run(project, outcome={"failed": 1}).fnmatch_lines(["step 0, draw: the runs have different random draws*"])
     project.makepyfile(test_mine=test.format(seed=2, ignore=everything))
     run(project, outcome={"passed": 1})
 

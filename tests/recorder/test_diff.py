@@ -92,7 +92,11 @@ def test_a_choice_comes_before_what_later_brigades_see_of_it(run, with_records, 
 @pytest.mark.parametrize(
     ("topic", "changes", "sentence"),
     [
-        ("draws", {"key": 5}, "step 21, draw: the runs had other luck: another seed, or another way to draw"),
+        (
+            "draws",
+            {"key": 5},
+            "step 21, draw: the runs have different random draws: another seed, or another way to draw",
+        ),
         ("observations", {"volume": (2, 4)}, "step 21, observe: brigade 2: volume is very-high, was low"),
         ("observations", {"site_n_burning": (1, 4)}, "step 21, observe: site 6: site n burning is 4, was 3"),
         (
@@ -195,7 +199,7 @@ def test_tolerances_hold_for_their_fields_only(run, with_records, records):
     assert compare(run, with_records(more), tolerances={"total": 0.5}).same
 
 
-def test_unknown_names_are_refused_with_the_nearest(run):
+def test_unknown_names_are_answered_with_the_nearest(run):
     with pytest.raises(LogError, match=r"got 'buildings\.temprature'; try buildings\.temperature"):
         compare(run, run, tolerances={"buildings.temprature": 1.0})
     with pytest.raises(LogError, match="a number >= 0"):
@@ -268,7 +272,7 @@ def test_runs_in_other_cities_differ_in_the_city(run, records, city):
     )
 
 
-def test_headers_are_told_but_are_no_difference(records, city):
+def test_headers_are_compared_but_are_no_difference(records, city):
     a = MemoryRecording(synthetic.header(), city, records)
     b = MemoryRecording(synthetic.header(policy="random", seed=8), city, records)
     difference = compare(a, b)
@@ -294,7 +298,7 @@ def test_two_empty_runs(with_records):
         final_outcome(with_records([]))
 
 
-def test_verify_names_what_the_replay_does_otherwise(log_path, with_records, records):
+def test_a_replay_is_compared_with_its_log(log_path, with_records, records):
     log = open_log(log_path)
     assert compare(log, with_records(records)).same
     difference = compare(log, with_records(altered(records, 5, "buildings", energy=(11, 0.0))))

@@ -71,7 +71,7 @@ def test_sites_are_those_that_the_reader_gives(exported, log_path):
         assert values_of(found, name).tolist() == np.concatenate(log.ragged("/observations", name)).tolist()
 
 
-def test_a_step_is_a_row_with_luck_reward_score_and_ending(exported, log_path):
+def test_a_step_is_a_row_with_draws_reward_score_and_ending(exported, log_path):
     log, found = open_log(log_path), table_of(exported, "steps")
     assert found.num_rows == 31
     for column, topic, name in (
