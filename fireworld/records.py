@@ -10,6 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import Field, dataclass, field, fields
+from functools import cache
 from typing import Any, ClassVar, Final, Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -388,6 +389,7 @@ PHASES: Final[Mapping[str, str]] = {
 _STEP_TOPICS: Final = {topic.topic.removeprefix("/"): topic for topic in STEP_TOPICS}
 
 
+@cache
 def find_field(topic: str, name: str = "") -> tuple[type[Any], Field[Any]]:
     """Find a recorded field of a step; this is the one place that knows how one can be called.
 
