@@ -28,6 +28,15 @@ class CityMesh:
     roof_xyz_m: NDArray[np.float32]  # (n, 3) middle of each roof
 
 
+def city_box_m(city: CityRecord, margin_m: float = 0.0) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the south-west and the north-east corner of the city with a margin."""
+    x, y = np.asarray(city.outline_x_m), np.asarray(city.outline_y_m)
+    return (
+        (float(x.min()) - margin_m, float(y.min()) - margin_m),
+        (float(x.max()) + margin_m, float(y.max()) + margin_m),
+    )
+
+
 def build_mesh(city: CityRecord) -> CityMesh:
     """Extrude every building of a city.
 
