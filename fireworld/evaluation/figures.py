@@ -21,24 +21,19 @@ def draw_differences(pairings: Sequence[Pairing], *, title: str) -> Figure:
     Raises:
         ViewError: matplotlib is not installed.
     """
-    from fireworld_viewer.pictures.paired_differences import DifferenceLine, DifferencePanel, draw_paired_differences
+    from fireworld_viewer.pictures.paired_differences import DifferencePanel, draw_paired_differences
 
     panels = [
         DifferencePanel(
             label=metric.label,
             unit=metric.unit,
             higher_is_better=metric.higher_is_better,
-            lines=[
-                DifferenceLine(
-                    label=one.scenario or "over all",
-                    differences=one.differences,
-                    mean=one.difference.mean,
-                    low=one.difference.low,
-                    high=one.difference.high,
-                )
+            lines={
+                one.scenario or "over all": (one.differences, (found.mean, found.low, found.high))
                 for one in pairings
                 if one.metric == metric
-            ],
+                for found in [one.difference]
+            },
         )
         for metric in METRICS
     ]

@@ -18,7 +18,7 @@ def test_every_code_and_activity_has_a_color_of_its_own():
 
 
 def test_packed_is_red_green_blue_and_opaque():
-    assert colors.packed((1, 2, 3)) == 0x010203FF
+    assert colors.single((1, 2, 3)).tolist() == [0x010203FF]
     assert colors.packed_table(((1, 2, 3), (255, 0, 16))).tolist() == [0x010203FF, 0xFF0010FF]
 
 

@@ -61,16 +61,7 @@ def draw_map(
 
 
 def draw_record(city: CityRecord, record: StepRecord, *, title: str) -> Figure:
-    """Draw buildings, brigades and civilians after a step, without what the brigades do.
-
-    Args:
-        city: where it was.
-        record: the step.
-        title: heading of the map.
-
-    Raises:
-        ViewError: matplotlib is not installed.
-    """
+    """Draw buildings, brigades and civilians after a step, without what the brigades do; errors as in `draw_map`."""
     return draw_map(
         city,
         fieryness=record.buildings.fieryness,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -27,27 +27,15 @@ _DIRECTIONS: Final = {True: (1, " (more is better)"), False: (-1, " (less is bet
 
 
 @dataclass(frozen=True, kw_only=True)
-class DifferenceLine:
-    """The differences of one scenario."""
-
-    label: str
-    differences: Array
-    """(seeds,) B - A."""
-    mean: float
-    low: float
-    high: float
-    """Ends of the interval of the mean."""
-
-
-@dataclass(frozen=True, kw_only=True)
 class DifferencePanel:
-    """One quantity, a line for each scenario; the last line is over all, where there are several."""
+    """One quantity."""
 
     label: str
     unit: str
     higher_is_better: bool | None
     """None: neither is better."""
-    lines: Sequence[DifferenceLine]
+    lines: Mapping[str, tuple[Array, tuple[float, float, float]]]
+    """By scenario, the last over all if there are several: (seeds,) B - A; its mean, and the ends of its interval."""
 
 
 def draw_paired_differences(panels: Sequence[DifferencePanel], *, title: str) -> Figure:
@@ -80,16 +68,16 @@ def draw_paired_differences(panels: Sequence[DifferencePanel], *, title: str) ->
 def _draw_panel(axes: Axes, panel: DifferencePanel) -> None:
     sign, direction = _DIRECTIONS[panel.higher_is_better]
     axes.axvline(0.0, color=_INK, linewidth=0.8)
-    for place, line in enumerate(panel.lines):
-        _draw_points(axes, line.differences, sign * line.differences, height=place)
-        axes.plot([line.low, line.high], [place, place], color=_INK, linewidth=2.4, solid_capstyle="butt", zorder=4)
-        axes.plot([line.mean], [place], marker="o", color="white", markeredgecolor=_INK, markersize=7, zorder=5)
+    for place, (differences, (mean, low, high)) in enumerate(panel.lines.values()):
+        _draw_points(axes, differences, sign * differences, height=place)
+        axes.plot([low, high], [place, place], color=_INK, linewidth=2.4, solid_capstyle="butt", zorder=4)
+        axes.plot([mean], [place], marker="o", color="white", markeredgecolor=_INK, markersize=7, zorder=5)
     n = len(panel.lines)
     if n > 1:
         axes.axhline(n - 1.5, color="#cccccc", linewidth=0.8)
-    axes.set_yticks(range(n), [line.label for line in panel.lines], fontsize=9)
+    axes.set_yticks(range(n), list(panel.lines), fontsize=9)
     axes.set_ylim(n - 0.4, -0.6)
-    widest = max(float(np.abs(line.differences).max()) for line in panel.lines)
+    widest = max(float(np.abs(differences).max()) for differences, _ in panel.lines.values())
     axes.set_xlim(-1.08 * (widest or 1.0), 1.08 * (widest or 1.0))
     axes.set_title(f"{panel.label}{direction}", fontsize=10, loc="left")
     axes.set_xlabel(panel.unit, fontsize=8)

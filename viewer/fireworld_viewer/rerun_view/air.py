@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+import rerun
 from numpy.typing import NDArray
 
 from fireworld.records import AIR, CityRecord, Recording
@@ -27,8 +28,6 @@ _ALPHA: Final = (70, 215)
 
 def log_air(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
     """Send the air of every snapshot, above the highest roof; nothing for steps without a snapshot."""
-    import rerun
-
     city = recording.city
     held = {one.step: one.snapshot.arrays[AIR] for one in recording if one.snapshot and AIR in one.snapshot.arrays}
     if not held or city.air_nx * city.air_ny == 0:

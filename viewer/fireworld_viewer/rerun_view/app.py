@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Final
 from fireworld.errors import ViewError, expected
 from fireworld.files import check_output, write_file
 from fireworld.records import Recording
-from fireworld_viewer.rerun_view.outcome_page import OutcomePage, log_outcome
+from fireworld_viewer.rerun_view.outcome_page import OutcomePage
 
 if TYPE_CHECKING:
     import rerun
@@ -74,12 +74,12 @@ def serve(
     port: int = WEB_PORT,
     announce: Callable[[str], None],
 ) -> None:
-    """Serve Rerun with the recordings to browsers on this machine until interrupted.
+    """Serve Rerun with the recordings to browsers on this machine until interrupted; arguments as in `save`.
 
     Args:
         recordings: one, or two of the same city.
-        focus: as in `save`.
-        outcome: as in `save`.
+        focus: ids of buildings.
+        outcome: how the runs came out.
         port: of the page.
         announce: called with the address of the page.
 
@@ -96,15 +96,7 @@ def serve(
 
 
 def check_display(option: str, others: str) -> None:
-    """Check that a window can be opened.
-
-    Args:
-        option: that asks for a window.
-        others: what to try where there is no display.
-
-    Raises:
-        ViewError: there is no display.
-    """
+    """Raise ViewError where no window can be opened; the message names the option and what others to try."""
     if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise ViewError(f"{option}: no display here; try {others}")
 
@@ -158,9 +150,11 @@ def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome
     Rerun can write files too, in a thread of its own that reports no error when the disk is full.
     """
     rerun = _import_rerun()
-    from fireworld_viewer.rerun_view import blueprint, comparison, plots
-    from fireworld_viewer.rerun_view.legend_page import log_legend
-    from fireworld_viewer.rerun_view.run_layers import log_recording
+    from fireworld_viewer.rerun_view import blueprint
+    from fireworld_viewer.rerun_view.comparison import log_comparison
+    from fireworld_viewer.rerun_view.pages import log_legend, log_outcome
+    from fireworld_viewer.rerun_view.plots import first_burning
+    from fireworld_viewer.rerun_view.run_layers import RunLayers
     from fireworld_viewer.story.two_runs import check_same_city
 
     comparing = len(recordings) > 1
@@ -171,7 +165,7 @@ def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome
     with warnings.catch_warnings():
         # Rerun warns of data it cannot take and continues; a view that lacks something is worse than none.
         warnings.simplefilter("error", rerun.error_utils.RerunWarning)
-        plotted = focus or plots.first_burning(recordings[0])
+        plotted = focus or first_burning(recordings[0])
         lay_out = blueprint.pair if comparing else blueprint.single
         stream.send_blueprint(lay_out(*recordings, focus=bool(plotted), outcome=outcome))
         stream.send_recording_name(" | ".join(map(blueprint.title, recordings)))
@@ -179,9 +173,9 @@ def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome
         if outcome is not None:
             log_outcome(stream, outcome)
         if comparing:
-            comparison.log_comparison(stream, *recordings, focus=plotted, outcome=outcome)
+            log_comparison(stream, *recordings, focus=plotted, outcome=outcome)
         else:
-            log_recording(stream, *recordings, focus=plotted)
+            RunLayers(stream, recordings[0].city, focus=plotted).add(recordings[0])
     content: bytes = memory.drain_as_bytes()
     return content
 

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Final
 
+import rerun.blueprint as rrb
+from rerun.encodings import AbsoluteTimeRange
+
 from fireworld.records import SNAPSHOT_EVERY_STEPS, Recording
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import city_box_m
 from fireworld_viewer.rerun_view.camera import Camera, frame_fire, frame_from_above
 from fireworld_viewer.rerun_view.comparison import MARK_PATH
 from fireworld_viewer.rerun_view.layers import TIMELINE
-from fireworld_viewer.rerun_view.legend_page import HELP_PATH, LEGEND_PATH, bounds
-from fireworld_viewer.rerun_view.outcome_page import OUTCOME_PATH, OutcomePage
+from fireworld_viewer.rerun_view.outcome_page import OutcomePage
+from fireworld_viewer.rerun_view.pages import HELP_PATH, LEGEND_PATH, OUTCOME_PATH, bounds
 from fireworld_viewer.rerun_view.plots import has_choice_values
 
 STEPS_PER_SECOND: Final = 8.0
@@ -21,15 +24,7 @@ LAYERS: Final = ("city", "team", "civilians", "fire")
 
 
 def single(recording: Recording, *, focus: bool, outcome: OutcomePage | None = None) -> Any:
-    """Lay out one recording: map, timelines and log on the left; curves and the legend on the right.
-
-    Args:
-        recording: what is shown.
-        focus: whether temperatures are plotted.
-        outcome: its page; there is none if it is left out.
-    """
-    import rerun.blueprint as rrb
-
+    """Lay out one recording: map, timelines and log on the left; curves, with `focus` temperatures, on the right."""
     log = rrb.Tabs(text_view("Events and choices", ["+ /log/**"]), *pages(outcome), active_tab=0)
     left = rrb.Vertical(
         maps("Fire and brigades", "", [recording], aspect=1.8),
@@ -42,16 +37,7 @@ def single(recording: Recording, *, focus: bool, outcome: OutcomePage | None = N
 
 
 def pair(first: Recording, second: Recording, *, focus: bool, outcome: OutcomePage | None = None) -> Any:
-    """Lay out two recordings of one city: both maps and their difference side by side, curves of both below.
-
-    Args:
-        first: called A.
-        second: called B.
-        focus: whether temperatures are plotted.
-        outcome: its page, and where the first difference is marked; there is neither if it is left out.
-    """
-    import rerun.blueprint as rrb
-
+    """Lay out two recordings of one city, A and B: both maps and their difference side by side, curves below."""
     both = [first, second]
     row_of_maps = rrb.Horizontal(
         maps(f"A: {title(first)}", "/a", both, aspect=1.25),
@@ -89,8 +75,6 @@ def pair(first: Recording, second: Recording, *, focus: bool, outcome: OutcomePa
 
 def maps(name: str, prefix: str, recordings: Sequence[Recording], *, aspect: float) -> Any:
     """Lay out the map of one run in three ways: at an angle, from straight above, and with the heat of the air."""
-    import rerun.blueprint as rrb
-
     above = frame_from_above(*city_box_m(recordings[0].city), aspect=aspect)
     every_step = all(record.snapshot for recording in recordings for record in recording)
     n_steps = sum(len(recording.steps) for recording in recordings)
@@ -105,7 +89,6 @@ def maps(name: str, prefix: str, recordings: Sequence[Recording], *, aspect: flo
 
 def plot_tabs(suffix: str, prefixes: Sequence[str], *recordings: Recording, focus: bool) -> list[Any]:
     """Lay out curves of one or two runs in tabs: outcome and temperatures, then water and values of choices."""
-    import rerun.blueprint as rrb
 
     def curves(name: str, plot: str, corner: str) -> Any:
         return plot_view(f"{name}{suffix}", [f"{prefix}/plots/{plot}" for prefix in prefixes], corner=corner)
@@ -124,16 +107,12 @@ def plot_tabs(suffix: str, prefixes: Sequence[str], *recordings: Recording, focu
 
 def state_views(suffix: str, prefix: str) -> list[Any]:
     """Lay out what the brigades do and which actions they chose."""
-    import rerun.blueprint as rrb
-
     titles = {"activity": "What the brigades do", "action": "What they chose"}
     return [rrb.StateTimelineView(name=f"{name}{suffix}", origin=f"{prefix}/{path}") for path, name in titles.items()]
 
 
 def pages(outcome: OutcomePage | None) -> list[Any]:
     """Lay out the pages of text: the outcome, if there is one, and the help."""
-    import rerun.blueprint as rrb
-
     found = [] if outcome is None else [rrb.TextDocumentView(name="Outcome", origin=OUTCOME_PATH)]
     return [*found, rrb.TextDocumentView(name="How to read this", origin=HELP_PATH)]
 
@@ -149,45 +128,27 @@ def title(recording: Recording) -> str:
 
 
 def blueprint(root: Any, *, marked: tuple[int, int] | None = None) -> Any:
-    """Wrap a layout: only the time panel is open, and it plays the steps at a pace that can be followed.
-
-    Args:
-        root: the layout.
-        marked: first and last of the steps that are marked on the time panel.
-    """
-    import rerun.blueprint as rrb
-    from rerun.encodings import AbsoluteTimeRange
-
-    selection = None if marked is None else AbsoluteTimeRange(*marked)
-    time = rrb.TimePanel(
-        state="collapsed", timeline=TIMELINE, fps=STEPS_PER_SECOND, play_state="paused", time_selection=selection
-    )
-    return rrb.Blueprint(
-        root, time, rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"), auto_views=False
-    )
+    """Wrap a layout: only the time panel is open; steps from the first to the last of `marked` are marked on it."""
+    time = _time_panel("paused", time_selection=None if marked is None else AbsoluteTimeRange(*marked))
+    others = rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed")
+    return rrb.Blueprint(root, time, *others, auto_views=False)
 
 
 def following(layout: Any, *, listed: bool) -> Any:
-    """Keep the time cursor of a layout at the newest step; open the list where there are other recordings.
-
-    Args:
-        layout: is changed, and returned.
-        listed: whether there are other recordings.
-    """
-    import rerun.blueprint as rrb
-
-    layout.time_panel = rrb.TimePanel(
-        state="collapsed", timeline=TIMELINE, fps=STEPS_PER_SECOND, play_state="following"
-    )
+    """Keep the time cursor of a layout at the newest step; `listed` opens the list of recordings. Return the layout."""
+    layout.time_panel = _time_panel("following")
     if listed:
         layout.blueprint_panel = rrb.BlueprintPanel(state="expanded")
     return layout
 
 
+def _time_panel(play_state: str, **options: Any) -> Any:
+    """Return a panel that plays the steps at a pace that can be followed."""
+    return rrb.TimePanel(state="collapsed", timeline=TIMELINE, fps=STEPS_PER_SECOND, play_state=play_state, **options)
+
+
 def map_view(name: str, prefix: str, camera: Camera, *, layers: Sequence[str] = LAYERS) -> Any:
     """Return a 3D view of one recording's map. The meshes let clicks through to the handles on the roofs."""
-    import rerun.blueprint as rrb
-
     inert = rrb.EntityBehavior(interactive=False)
     eye = rrb.EyeControls3D(position=camera.eye_m, look_target=camera.target_m, eye_up=camera.up)
     return rrb.Spatial3DView(
@@ -203,24 +164,18 @@ def map_view(name: str, prefix: str, camera: Camera, *, layers: Sequence[str] = 
 
 def plot_view(name: str, paths: Sequence[str], *, corner: str = "LeftTop") -> Any:
     """Return a view of the curves at some paths, all on one scale; the legend is where curves seldom come."""
-    import rerun.blueprint as rrb
-
     legend = rrb.PlotLegend(rrb.Corner2D[corner])
     return rrb.TimeSeriesView(name=name, origin="/", contents=[f"+ {path}" for path in paths], plot_legend=legend)
 
 
 def text_view(name: str, contents: list[str]) -> Any:
     """Return a view of logs: the step and the text."""
-    import rerun.blueprint as rrb
-
     columns = rrb.TextLogColumns(timeline_columns=[TIMELINE], text_log_columns=["body"])
     return rrb.TextLogView(name=name, origin="/", contents=contents, columns=columns)
 
 
 def legend_view(*, comparing: bool = False) -> Any:
     """Return a view of the legend; it has a row more where two runs are compared."""
-    import rerun.blueprint as rrb
-
     x_range, y_range = bounds(comparing=comparing)
     return rrb.Spatial2DView(
         name="Legend",

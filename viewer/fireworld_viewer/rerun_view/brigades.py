@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
+import rerun
 from numpy.typing import NDArray
 
 from fireworld.records import ACTIONS, ACTIVITIES, Recording
@@ -27,8 +28,6 @@ _JET_POINTS: Final = 9
 
 def log_brigades(layers: Layers, recording: Recording) -> None:
     """Draw each brigade as a ball in the color of its activity, with a gauge of its tank and a label."""
-    import rerun
-
     position = positions_m(recording)
     k, n = position.shape[:2]
     if n == 0:

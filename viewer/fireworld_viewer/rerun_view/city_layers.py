@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+import rerun
 from numpy.typing import NDArray
 
 from fireworld.records import MATERIALS, CityRecord, Recording
@@ -21,13 +22,11 @@ _GROUND_MARGIN_M: Final = 15.0
 
 def log_city(layers: Layers, city: CityRecord) -> None:
     """Draw the ground, streets, refuges and hydrants; none of them changes."""
-    import rerun
-
     (west, south), (east, north) = city_box_m(city, margin_m=_GROUND_MARGIN_M)
     ground = rerun.Mesh3D(
         vertex_positions=[(x, y, _GROUND_M) for x, y in ((west, south), (east, south), (east, north), (west, north))],
         triangle_indices=[(0, 1, 2), (0, 2, 3)],
-        vertex_colors=np.full(4, colors.packed(colors.GROUND_RGB), dtype=np.uint32),
+        vertex_colors=colors.packed_table([colors.GROUND_RGB] * 4),
     )
     layers.static("city/ground", ground)
     if len(city.street_from):
@@ -62,8 +61,6 @@ def log_buildings(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
 
 def log_handles(layers: Layers, city: CityRecord, mesh: CityMesh) -> None:
     """Put a dot on every roof that can be clicked, with the facts of its building; one batch, never one by one."""
-    import rerun
-
     handles = mesh.roof_xyz_m + np.array([0, 0, 0.3], dtype=np.float32)
     points = rerun.Points3D(handles, colors=colors.single(colors.HANDLE_RGB), radii=[0.9])
     facts = rerun.DynamicArchetype(
@@ -82,14 +79,8 @@ def log_handles(layers: Layers, city: CityRecord, mesh: CityMesh) -> None:
 def log_mesh(layers: Layers, mesh: CityMesh, codes: NDArray[np.uint8], table: NDArray[np.uint32]) -> None:
     """Send the city's mesh once and its colors for every step in which a code changes.
 
-    Args:
-        layers: where to.
-        mesh: the city's geometry.
-        codes: (k, n) row of the table for each building.
-        table: (codes, len(SHADES_PERCENT)) packed colors.
+    codes: (k, n) row of the table for each building; table: (codes, len(SHADES_PERCENT)) packed colors.
     """
-    import rerun
-
     path = "city/buildings"
     layers.static(path, rerun.Mesh3D(vertex_positions=mesh.vertex_xyz_m, triangle_indices=mesh.triangle))
     changed = layers.changed(path, codes)
@@ -104,8 +95,6 @@ def log_mesh(layers: Layers, mesh: CityMesh, codes: NDArray[np.uint8], table: ND
 
 def log_civilians(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
     """Draw each civilian, above the roof of the building it is in, in the color of its health."""
-    import rerun
-
     city = recording.city
     n = len(city.civilian_x_m)
     if n == 0:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+import rerun
 from numpy.typing import NDArray
 
 from fireworld.records import Recording
@@ -15,14 +16,11 @@ from fireworld_viewer.rerun_view import city_layers
 from fireworld_viewer.rerun_view.layers import Layers
 from fireworld_viewer.rerun_view.outcome_page import OutcomePage
 from fireworld_viewer.rerun_view.plots import log_plot
-from fireworld_viewer.rerun_view.run_layers import log_recording
+from fireworld_viewer.rerun_view.run_layers import RunLayers
 from fireworld_viewer.rerun_view.state_timelines import log_state_timeline
 from fireworld_viewer.rerun_view.text_logs import log_lines
 from fireworld_viewer.story.narration import LogLine
 from fireworld_viewer.story.two_runs import check_same_city, common_steps, compare_damage
-
-if TYPE_CHECKING:
-    import rerun
 
 MARK_PATH: Final = "/diff/plots/first_difference"
 AGREEMENT: Final = ("the same", "buildings the same, something else not", "buildings differ")
@@ -40,22 +38,15 @@ def log_comparison(
     focus: Sequence[int] = (),
     outcome: OutcomePage | None = None,
 ) -> None:
-    """Send two runs and their difference to one Rerun stream, on one `step` timeline.
-
-    Args:
-        stream: where to.
-        first: shown below /a.
-        second: shown below /b.
-        focus: ids of buildings whose temperatures are plotted.
-        outcome: where the runs first differ; not marked if left out.
+    """Send two runs, below /a and /b, and their difference; where they first differ is marked if the outcome is given.
 
     Raises:
-        ViewError: the runs are of different cities, or have no steps in common.
+        ViewError: the runs are of different cities, one has no steps, or a building of the focus is unknown.
     """
     check_same_city(first.city, second.city)
     steps, rows_a, rows_b = common_steps(first.steps, second.steps)
-    log_recording(stream, first, prefix="/a", name="A", focus=focus)
-    log_recording(stream, second, prefix="/b", name="B", focus=focus)
+    RunLayers(stream, first.city, prefix="/a", name="A", focus=focus).add(first)
+    RunLayers(stream, second.city, prefix="/b", name="B", focus=focus).add(second)
 
     layers = Layers(stream, "/diff", steps)
     mesh = build_mesh(first.city)
@@ -76,8 +67,6 @@ def log_comparison(
 
 def _mark_first_difference(layers: Layers, outcome: OutcomePage, buildings_differ: NDArray[np.bool_]) -> None:
     """Send a timeline of whether the runs are the same, a mark in the plots and a line in the log."""
-    import rerun
-
     first = outcome.first_step
     states = np.zeros(len(layers.steps), dtype=np.int64)
     if first is not None:

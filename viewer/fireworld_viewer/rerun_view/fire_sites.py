@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import rerun
 from numpy.typing import NDArray
 
 from fireworld.records import Recording
@@ -14,8 +15,6 @@ _TOPIC = "/observations"
 
 def log_sites(layers: Layers, recording: Recording) -> None:
     """Draw a box around each fire site and thick lines along the sides over which its fire can spread."""
-    import rerun
-
     ids, sides = recording.ragged(_TOPIC, "site_id"), recording.ragged(_TOPIC, "site_free_sides")
     count = np.array([len(row) for row in ids])
     if not count.any() and not layers.has("fire/sites"):

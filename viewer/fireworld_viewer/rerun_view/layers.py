@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+import rerun
 from numpy.typing import NDArray
 
 from fireworld_viewer import colors
-
-if TYPE_CHECKING:
-    import rerun
 
 TIMELINE: Final = "step"
 CHUNK_BYTES: Final = 1 << 20
@@ -52,9 +50,7 @@ class Layers:
     def changed(self, path: str, numbers: NDArray[Any]) -> NDArray[np.int64]:
         """Return the rows of (k, w) numbers that differ from the row before, over all parts; the very first counts.
 
-        Args:
-            path: what the numbers are of; one call for each part.
-            numbers: of the steps of this part.
+        Call it once in each part for what is named by the path.
         """
         if len(numbers) == 0:
             return np.zeros(0, dtype=np.int64)
@@ -66,15 +62,7 @@ class Layers:
         return np.flatnonzero(differs)
 
     def rows(self, path: str, *columns: Any, steps: Sequence[int] | NDArray[np.int64] | None = None) -> None:
-        """Send columns with one row for each step of this part, or for each of the steps given.
-
-        Args:
-            path: entity path below the prefix.
-            columns: column lists of archetypes, already partitioned into rows.
-            steps: (rows,) step of each row; steps may repeat.
-        """
-        import rerun
-
+        """Send column lists of archetypes: a row for each step of this part, or for each of the steps given."""
         index = rerun.TimeColumn(TIMELINE, sequence=self.steps if steps is None else steps)
         every = [one for many in columns for one in many]
         self.stream.send_columns(f"{self.prefix}/{path}", indexes=[index], columns=every)
@@ -87,13 +75,7 @@ class Layers:
             yield every[start : start + size]
 
     def numbers(self, path: str, archetype: str, columns: Mapping[str, NDArray[Any]]) -> None:
-        """Send plain numbers in blocks, shown when an instance is selected.
-
-        Args:
-            path: entity path below the prefix.
-            archetype: heading that the numbers are shown under.
-            columns: name to (k, width) numbers.
-        """
+        """Send (k, width) numbers by name, in blocks, shown under a heading when an instance is selected."""
         bytes_per_step = sum(column.shape[1] * column.itemsize for column in columns.values())
         for block in self.blocks(bytes_per_step):
             part = {name: column[block] for name, column in columns.items()}
@@ -103,8 +85,6 @@ class Layers:
         self, path: str, strips: NDArray[np.float32], per_step: NDArray[Any], *, radius_m: float, rgb: colors.Rgb
     ) -> None:
         """Send line strips, (strips, points, 3), `per_step` of them for each step; nothing if there never were any."""
-        import rerun
-
         if len(strips) == 0 and not self.has(path):
             return
         self.static(path, rerun.LineStrips3D.from_fields(radii=[radius_m], colors=colors.single(rgb)))
@@ -112,14 +92,7 @@ class Layers:
 
 
 def number_columns(archetype: str, columns: Mapping[str, NDArray[Any]]) -> Any:
-    """Return columns of plain numbers under names of our own; NaN becomes nothing.
-
-    Args:
-        archetype: heading that the numbers are shown under.
-        columns: name to (rows, width) numbers.
-    """
-    import rerun
-
+    """Return columns of (rows, width) numbers under names and a heading of our own; NaN becomes nothing."""
     rows, width = next(iter(columns.values())).shape
     flat = {name: _arrow(np.ascontiguousarray(numbers).reshape(-1)) for name, numbers in columns.items()}
     return rerun.DynamicArchetype.columns(archetype, components=flat).partition(np.full(rows, width))

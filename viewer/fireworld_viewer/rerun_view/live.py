@@ -77,12 +77,9 @@ def running_viewer(url: str) -> Screen:
 
 
 class RunEncoder:
-    """Encodes the steps of one run as bytes that Rerun reads, in the order in which they come.
+    """Encodes the steps of one run, as they come, as bytes that Rerun reads.
 
-    Args:
-        header: of the run.
-        city: it takes place in.
-        title: what the viewer calls it; scenario, policy and seed if left out.
+    The viewer calls the run by the title; by scenario, policy and seed if it is left out.
     """
 
     def __init__(self, header: RunHeader, city: CityRecord, *, title: str = "") -> None:
@@ -94,7 +91,7 @@ class RunEncoder:
     def encode(self, records: Sequence[StepRecord]) -> bytes:
         """Return the bytes of the next steps."""
         from fireworld_viewer.rerun_view import blueprint
-        from fireworld_viewer.rerun_view.legend_page import log_legend
+        from fireworld_viewer.rerun_view.pages import log_legend
         from fireworld_viewer.rerun_view.run_layers import RunLayers
 
         recording = MemoryRecording(self._header, self._city, records)
@@ -111,11 +108,7 @@ class RunEncoder:
 class RunView(BackgroundSender[StepRecord]):
     """A live view of a run: add every record, and close it at the end; neither waits for a viewer at work.
 
-    Args:
-        screen: where to show it.
-        header: of the run.
-        city: it takes place in.
-        warn: called with one line if the view has to end before the run.
+    `warn` is called with one line if the view has to end before the run.
 
     Raises:
         ViewError: the viewer cannot be started.
@@ -140,10 +133,7 @@ PlayRun = Callable[[], tuple[str, RunHeader, CityRecord, Sequence[StepRecord]]]
 class TrainingView(BackgroundSender[TrainingPoint]):
     """A live view of a training: curves of all that it reports, and now and then a run played for the viewer.
 
-    Args:
-        screen: where to show it.
-        layout: of the plots.
-        warn: called with one line if the view has to end before the training.
+    `warn` is called with one line if the view has to end before the training.
 
     Raises:
         ViewError: the viewer cannot be started.

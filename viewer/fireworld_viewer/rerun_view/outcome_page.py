@@ -4,12 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
-
-if TYPE_CHECKING:
-    import rerun
-
-OUTCOME_PATH: Final = "/outcome"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,13 +29,6 @@ class OutcomePage:
             heads = [f"{letter}: {head}" for letter, head in zip("AB", heads, strict=True)]
         lines += [_row(("", *heads)), _row(["---"] * (len(heads) + 1)), *map(_row, self.rows)]
         return "\n".join(lines) + "\n"
-
-
-def log_outcome(stream: rerun.RecordingStream, page: OutcomePage) -> None:
-    """Send the page."""
-    import rerun
-
-    stream.log(OUTCOME_PATH, rerun.TextDocument(page.markdown, media_type=rerun.MediaType.MARKDOWN), static=True)
 
 
 def _row(cells: Sequence[str]) -> str:

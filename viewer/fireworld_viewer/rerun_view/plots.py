@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+import rerun
 from numpy.typing import NDArray
 
 from fireworld.records import Recording
@@ -32,13 +33,7 @@ _SCORE_RGB: Final = {
 
 
 def log_plots(layers: Layers, recording: Recording, focus_index: Sequence[int]) -> None:
-    """Send every curve; each plot is one entity with a value per curve.
-
-    Args:
-        layers: where to.
-        recording: what to plot.
-        focus_index: indices of buildings whose temperatures are plotted.
-    """
+    """Send every curve; each plot is one entity with a value per curve. Temperatures are those of the focus."""
     reward_rgb = _of_run(layers, _REWARD_RGB)
     for path, fields, rgb in (
         ("plots/score", SCORES, _SCORE_RGB[layers.name]),
@@ -94,8 +89,6 @@ def log_plot(
 
     Beside another run the curves bear the run's name, and those of B are thinner.
     """
-    import rerun
-
     rows, width = numbers.shape
     if width == 0:
         return
@@ -110,8 +103,6 @@ def log_curve(
     layers: Layers, path: str, numbers: NDArray[np.float64], name: str, rgb: colors.Rgb, *, width: float
 ) -> None:
     """Send one curve, (k,), with a gap where it is not a number; nothing if there never was one."""
-    import rerun
-
     known = ~np.isnan(numbers)
     if not known.any() and not layers.has(path):
         return

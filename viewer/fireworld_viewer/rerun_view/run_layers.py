@@ -1,11 +1,11 @@
-"""A recording in Rerun: every layer of a run on the `step` timeline. `log_recording` is the way in."""
+"""A recording in Rerun: every layer of a run on the `step` timeline."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import rerun
 
 from fireworld.errors import ViewError, expected
 from fireworld.records import CityRecord, Recording
@@ -17,9 +17,6 @@ from fireworld_viewer.rerun_view.layers import Layers
 from fireworld_viewer.rerun_view.plots import log_plots
 from fireworld_viewer.rerun_view.state_timelines import log_brigade_states
 from fireworld_viewer.rerun_view.text_logs import log_text
-
-if TYPE_CHECKING:
-    import rerun
 
 
 class RunLayers:
@@ -45,8 +42,6 @@ class RunLayers:
         name: str = "",
         focus: Sequence[int] = (),
     ) -> None:
-        import rerun
-
         self._focus_index = building_indices(city, focus)
         self._layers = Layers(stream, prefix, np.zeros(0, dtype=np.int64), name=name)
         self._mesh = build_mesh(city)
@@ -55,11 +50,7 @@ class RunLayers:
         city_layers.log_handles(self._layers, city, self._mesh)
 
     def add(self, recording: Recording) -> None:
-        """Send the steps of a recording of this city: the first ones of the run, or those after the ones sent before.
-
-        Args:
-            recording: as many steps as there are to send; a MemoryRecording of one record will do.
-        """
+        """Send the next steps of the run, which are in a recording of this city: one, all, or any number of them."""
         layers, mesh = self._layers, self._mesh
         layers.steps = recording.steps
         city_layers.log_buildings(layers, recording, mesh)
@@ -71,17 +62,6 @@ class RunLayers:
         log_plots(layers, recording, self._focus_index)
         log_brigade_states(layers, recording)
         log_text(layers, recording)
-
-
-def log_recording(
-    stream: rerun.RecordingStream, recording: Recording, *, prefix: str = "", name: str = "", focus: Sequence[int] = ()
-) -> None:
-    """Send everything that a recording holds to a Rerun stream; the arguments are those of `RunLayers`.
-
-    Raises:
-        ViewError: a building of the focus is not in the city.
-    """
-    RunLayers(stream, recording.city, prefix=prefix, name=name, focus=focus).add(recording)
 
 
 def building_indices(city: CityRecord, ids: Sequence[int]) -> list[int]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+import rerun
 from numpy.typing import NDArray
 
 from fireworld.records import ACTION_NAMES, ACTIVITIES, Recording
@@ -33,15 +34,8 @@ def log_state_timeline(
 ) -> None:
     """Send one timeline: a row wherever the code changes.
 
-    Args:
-        layers: where to.
-        path: entity path below the prefix.
-        codes: (k,) index into the names at each step; -1 is the last of them.
-        names: of the states.
-        rgb: their colors.
+    codes: (k,) index into the names of the states, and into their colors, at each step; -1 is the last of them.
     """
-    import rerun
-
     layers.static(path, rerun.StateConfiguration(values=list(names), colors=colors.packed_table(rgb)))
     changed = layers.changed(path, codes[:, np.newaxis])
     if len(changed):

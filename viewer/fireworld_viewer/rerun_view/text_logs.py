@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+import rerun
 
 from fireworld.records import Recording
 from fireworld_viewer import colors
@@ -27,8 +28,6 @@ def log_text(layers: Layers, recording: Recording) -> None:
 
 def log_lines(layers: Layers, path: str, lines: Iterable[LogLine]) -> None:
     """Send lines of text, each at its step; nothing if there is none."""
-    import rerun
-
     table = list(lines)
     if not table:
         return

@@ -121,32 +121,25 @@ def _blueprint(layout: TrainingLayout) -> Any:
     """Lay out the plots in a grid, the tabs below them, the log beside."""
     import rerun.blueprint as rrb
 
-    plots = _grid(layout.plots, n_columns=_COLUMNS)
+    def grid(plots: Mapping[str, str], n_columns: int) -> Any:
+        legend = rrb.PlotLegend(rrb.Corner2D.LeftTop)
+        views = [rrb.TimeSeriesView(name=title, origin=f"/{name}", plot_legend=legend) for name, title in plots.items()]
+        return rrb.Grid(*views, grid_columns=n_columns)
+
+    root = grid(layout.plots, _COLUMNS)
     if layout.tabs:
-        tabs = [_tab(title, tab) for title, tab in layout.tabs.items()]
-        plots = rrb.Vertical(plots, tabs[0] if len(tabs) == 1 else rrb.Tabs(*tabs))
+        tabs = []
+        for title, tab in layout.tabs.items():
+            page = rrb.TextDocumentView(name=title, origin=f"/{tab.page}")
+            tabs.append(rrb.Horizontal(grid(tab.plots, _COLUMNS_OF_TAB), page, column_shares=[3, 1], name=title))
+        root = rrb.Vertical(root, tabs[0] if len(tabs) == 1 else rrb.Tabs(*tabs))
     if layout.log:
         columns = rrb.TextLogColumns(timeline_columns=[layout.timeline], text_log_columns=["body"])
         log = rrb.TextLogView(name=layout.log, origin=f"/{LOG_PATH}", columns=columns)
-        plots = rrb.Horizontal(plots, log, column_shares=[3, 1])
+        root = rrb.Horizontal(root, log, column_shares=[3, 1])
     return rrb.Blueprint(
-        plots,
+        root,
         rrb.TimePanel(state="collapsed", timeline=layout.timeline, play_state="following"),
         rrb.BlueprintPanel(state="expanded"),
         rrb.SelectionPanel(state="collapsed"),
     )
-
-
-def _tab(title: str, tab: LayoutTab) -> Any:
-    import rerun.blueprint as rrb
-
-    page = rrb.TextDocumentView(name=title, origin=f"/{tab.page}")
-    return rrb.Horizontal(_grid(tab.plots, n_columns=_COLUMNS_OF_TAB), page, column_shares=[3, 1], name=title)
-
-
-def _grid(plots: Mapping[str, str], *, n_columns: int) -> Any:
-    import rerun.blueprint as rrb
-
-    legend = rrb.PlotLegend(rrb.Corner2D.LeftTop)
-    views = [rrb.TimeSeriesView(name=title, origin=f"/{name}", plot_legend=legend) for name, title in plots.items()]
-    return rrb.Grid(*views, grid_columns=n_columns)

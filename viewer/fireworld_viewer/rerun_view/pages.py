@@ -1,17 +1,18 @@
-"""The legend: every color of the map with its name, and a page on how to read the view."""
+"""The legend, every color of the map with its name, and pages of text: how to read the view, and the outcome."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
+
+import rerun
 
 from fireworld.records import ACTIVITIES, FIERYNESS
 from fireworld_viewer import colors
-
-if TYPE_CHECKING:
-    import rerun
+from fireworld_viewer.rerun_view.outcome_page import OutcomePage
 
 LEGEND_PATH: Final = "/legend"
 HELP_PATH: Final = "/help"
+OUTCOME_PATH: Final = "/outcome"
 
 _COLUMN_WIDTH: Final = 3.9
 """In rows: a name is so wide, and a row as high as a dot with its name."""
@@ -77,8 +78,6 @@ def bounds(*, comparing: bool) -> tuple[tuple[float, float], tuple[float, float]
 
 def log_legend(stream: rerun.RecordingStream, *, comparing: bool) -> None:
     """Send the legend, as dots in rows with their names below them, and the page of help."""
-    import rerun
-
     rows = entries(comparing=comparing)
     place = [(_COLUMN_WIDTH * x, float(y)) for y, row in enumerate(rows) for x in range(len(row))]
     named = [entry for row in rows for entry in row]
@@ -95,4 +94,13 @@ def log_legend(stream: rerun.RecordingStream, *, comparing: bool) -> None:
     )
     stream.log(f"{LEGEND_PATH}/dots", dots, static=True)
     stream.log(f"{LEGEND_PATH}/names", names, static=True)
-    stream.log(HELP_PATH, rerun.TextDocument(HELP, media_type=rerun.MediaType.MARKDOWN), static=True)
+    _log_page(stream, HELP_PATH, HELP)
+
+
+def log_outcome(stream: rerun.RecordingStream, page: OutcomePage) -> None:
+    """Send the page of the outcome."""
+    _log_page(stream, OUTCOME_PATH, page.markdown)
+
+
+def _log_page(stream: rerun.RecordingStream, path: str, text: str) -> None:
+    stream.log(path, rerun.TextDocument(text, media_type=rerun.MediaType.MARKDOWN), static=True)
