@@ -45,7 +45,7 @@ class BrigadeMarks:
     tank_share: NDArray[np.float64] | None = None
     """(n,) share of the tank that is full, 0..1; unknown if left out."""
     target: NDArray[Any] | None = None
-    """(n,) index of the building each goes for, -1 none; unknown if left out."""
+    """(n,) index of the building that each has as its target, -1 none; unknown if left out."""
 
     def with_target(self, activity: int) -> NDArray[np.intp]:
         """Return the indices of the brigades that do this and have a target: (k,)."""

@@ -1,4 +1,4 @@
-"""Films of recordings, GIF or MP4: the city is drawn once, and on it what changes, frame by frame."""
+"""Films of recordings, GIF or MP4: the city is drawn once, and what changes is drawn on it frame by frame."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _PAIR_INCHES: Final = 4.6
 _HOLD_SECONDS: Final = 2.0
 """How long the last frame stays."""
 _TRANSPARENT: Final = 255
-"""Number of the color that lets the frame before be seen; it comes after all others."""
+"""Number of the color that shows the frame before; it comes after all others."""
 _NEAR: Final = 6
 Frame = NDArray[np.uint8]
 """(height, width, 3) sRGB; both even."""
@@ -90,7 +90,7 @@ class FilmFrames:
         labels = [label for label in LABELS if label in there]
         first = cells_of(recordings, steps[0])
         self._grid = MapGrid(first, columns=len(recordings), map_inches=inches, labels=labels, dpi=_DPI)
-        self._canvas = cast("Any", self._grid.figure.canvas)  # matplotlib does not say its types
+        self._canvas = cast("Any", self._grid.figure.canvas)  # matplotlib has no type for it
         for _, item in self._grid.changing:
             item.set_animated(True)
         for row in self._grid.legend_rows:  # not drawn, but given their places
@@ -118,7 +118,7 @@ class FilmFrames:
         return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
 
     def _draw_legend(self) -> None:
-        """Draw the rows of the legend, those that were drawn before as they were: letters take most of the time."""
+        """Draw the rows of the legend; copy those that were drawn before: letters take most of the time."""
         for index, row in enumerate(self._grid.legend_rows):
             key = index, row.get_text()
             if key in self._rows:
@@ -157,10 +157,10 @@ def _write_gif(frames: FilmFrames, path: Path, fps: float, on_frame: Callable[[]
 
 
 def _differences(frames: FilmFrames, palette: Image, on_frame: Callable[[], object]) -> Iterator[Image]:
-    """Yield the frames in the colors of a palette; what is as it was in the frame before is transparent."""
+    """Yield the frames in the colors of a palette; what is the same as in the frame before is transparent."""
     from PIL import Image
 
-    table = np.zeros((256, 3), dtype=np.uint8)  # all of it, so that the last number is one of the file's too
+    table = np.zeros((256, 3), dtype=np.uint8)  # all of it, so that the last number is in the file, too
     own = np.array(palette.getpalette(), dtype=np.uint8).reshape(-1, 3)
     table[: len(own)] = own
     before: NDArray[np.uint8] | None = None
@@ -210,4 +210,4 @@ FILMS: Final[Mapping[str, Callable[[FilmFrames, Path, float, Callable[[], object
     ".gif": _write_gif,
     ".mp4": _write_mp4,
 }
-"""Endings of films, and who writes them."""
+"""Endings of films, and the functions that write them."""

@@ -76,9 +76,8 @@ class MapGrid:
         self._maps: list[CityMap] = []
         self._facts: list[Any] = []
         if heading:
-            self._write(
-                _GAP_INCHES, above - 0.5 * _LINE_INCHES, heading, points=13.0, inches=self._width - 2 * _GAP_INCHES
-            )
+            room = self._width - 2 * _GAP_INCHES
+            self._write(_GAP_INCHES, above - 0.5 * _LINE_INCHES, heading, points=13.0, inches=room)
         for index, cell in enumerate(cells):
             row, column = divmod(index, columns)
             left = _GAP_INCHES + column * (map_inches + _GAP_INCHES)

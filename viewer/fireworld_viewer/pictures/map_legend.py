@@ -31,10 +31,8 @@ _BRIGADE: Final = "brigade"
 _DOING: Final = tuple(f"brigade {activity.removeprefix('driving-').replace('-', ' ')}" for activity in ACTIVITIES)
 _CIVILIAN: Final = tuple(f"civilian {health}" for health in HEALTH)
 _CODES: Final = tuple(name.replace("-", " ") for name in FIERYNESS)
-LABELS: Final = (
-    *_CODES, "refuge", "hydrant", *_CIVILIAN, _BRIGADE, *_DOING, _TANK, _JET, _WAY,
-)  # fmt: skip
-"""All that can be on a map, in the order of the legend."""
+LABELS: Final = (*_CODES, "refuge", "hydrant", *_CIVILIAN, _BRIGADE, *_DOING, _TANK, _JET, _WAY)
+"""Everything that can be on a map, in the order of the legend."""
 _UNCOUNTED: Final = frozenset({_TANK, _JET, _WAY})
 
 
@@ -59,13 +57,7 @@ def count_marks(city: CityRecord, state: MapState) -> dict[str, int]:
 
 
 def draw_legend(axes: Axes, labels: Sequence[str], *, n_maps: int) -> Legend:
-    """Draw a legend to the right of a map.
-
-    Args:
-        axes: of the map.
-        labels: those of LABELS that are named.
-        n_maps: number of maps whose marks are counted; 0 for no counts.
-    """
+    """Draw a legend, of some of LABELS, to the right of a map; it will have counts of `n_maps` maps, 0 for none."""
     handles = [_handle(label) for label in labels]
     title = "how many: (A | B)" if n_maps > 1 else None
     return axes.legend(

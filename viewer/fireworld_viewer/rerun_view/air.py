@@ -1,7 +1,7 @@
 """The heat of the air over the city, as a translucent layer: known at the steps of snapshots only.
 
-A recording holds the air in a snapshot at every fiftieth step; in between the layer of the last one stays, under a
-label that says of which step it is. A replay may put one at every step.
+A recording has a snapshot at every fiftieth step; in between, the layer of the last one stays, with a label that names
+its step. A replay can have a snapshot at every step.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The city in Rerun: ground, streets, and what is colored anew from step to step: buildings and civilians."""
+"""The city in Rerun: ground, streets, and what changes its color: buildings and civilians."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ class ViewerProcess:
     Args:
         command: the program and its arguments.
         environment: of the process.
-        stays: it continues when the input ends, as a window does that somebody still looks at.
+        stays: whether it stays when the input ends, as a window does that somebody still looks at.
 
     Raises:
         ViewError: it cannot be started.
@@ -60,7 +60,7 @@ class ViewerProcess:
         """End the input; a relay is given the time to send the rest. Return whether it has.
 
         Args:
-            finished: all was written; otherwise what is under way is abandoned.
+            finished: whether all was written; if not, the rest is abandoned.
         """
         if finished:
             self._input.close()
@@ -72,7 +72,7 @@ class ViewerProcess:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        self._input.close()  # once more where all was written; otherwise nobody writes to a dead process for long
+        self._input.close()  # again where all was written; else the process is dead, and the writing thread fails
         return finished and self._process.returncode == 0
 
 
@@ -83,7 +83,7 @@ class BackgroundSender(Generic[Item]):
         encode: makes the bytes of a batch, in the sender's thread.
         process: where they go.
         n_waiting_max: items that may wait, which bounds the memory.
-        warn: called at most once, with a line that says what the viewer lacks and why.
+        warn: called at most once, with a line on what the viewer does not show and why.
     """
 
     def __init__(
