@@ -50,7 +50,7 @@ def measure_film(log: Log, shown: Sequence[ShownStep], path: Path, *, size: str,
     """Measure the writing of a film from a log that is read."""
 
     def write(_: None) -> None:
-        save_film([log], shown, path, force=True)
+        save_film([log], shown, path)
 
     write(None)
     label = f"{size}, {path.stat().st_size / 1e6:.1f} MB"

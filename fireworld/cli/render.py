@@ -71,7 +71,7 @@ def command(
     if output.suffix.lower() in FILMS:
         if step is not None or steps is not None:
             raise click.UsageError(f"--step and --steps go with pictures, not with films ({output.suffix}).")
-        _render_film(logs, output, first=first, last=last, every=every or 1, fps=fps, force=force)
+        _render_film(logs, output, first=first, last=last, every=every or 1, fps=fps)
         return
     if not (first is last is every is fps is None):
         raise click.UsageError(f"--from, --to, --every and --fps go with films, not with pictures ({output.suffix}).")
@@ -96,30 +96,26 @@ def _step_numbers(option: str, text: str) -> list[int]:
 
 
 def _render_still(paths: Sequence[Path], output: Path, steps: Sequence[int], *, force: bool) -> None:
-    from fireworld_viewer.pictures.maps import save_steps
+    from fireworld_viewer.pictures.figure_files import plain_style, save_figure
+    from fireworld_viewer.pictures.maps import draw_steps
 
     recordings = [open_committed(path, doing="drawing") for path in paths]
-    save_steps(recordings, steps, output, force=force)
+    with plain_style():
+        save_figure(draw_steps(recordings, steps), output, force=force)
     click.echo(f"{output}: {len(steps)} step{'s' if len(steps) > 1 else ''}, {_size(output)}")
 
 
 def _render_film(
-    paths: Sequence[Path],
-    output: Path,
-    *,
-    first: int | None,
-    last: int | None,
-    every: int,
-    fps: float | None,
-    force: bool,
+    paths: Sequence[Path], output: Path, *, first: int | None, last: int | None, every: int, fps: float | None
 ) -> None:
+    from fireworld_viewer.pictures.figure_files import plain_style
     from fireworld_viewer.pictures.film import FPS, save_film
     from fireworld_viewer.story.steps import read_steps_between
 
     recordings: list[Recording] = [open_committed(path, doing="drawing") for path in paths]
     shown = read_steps_between(recordings, first=first, last=last, every=every)
-    with bar("film", len(shown)) as advance:
-        save_film(recordings, shown, output, fps=fps or FPS, force=force, on_frame=advance)
+    with plain_style(), bar("film", len(shown)) as advance:
+        save_film(recordings, shown, output, fps=fps or FPS, on_frame=advance)
     span = f"steps {shown[0].step} to {shown[-1].step}"
     click.echo(f"{output}: {len(shown)} frames, {span}, {_size(output)}")
 

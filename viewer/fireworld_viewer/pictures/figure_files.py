@@ -32,14 +32,7 @@ _MISSING: Final = "pictures: matplotlib is not installed; try pip install 'firew
 def new_figure(
     width_inches: float, height_inches: float, *, dpi: int = DPI, paper: str = PAPER, layout: Any = None
 ) -> Figure:
-    """Return an empty figure that needs no screen.
-
-    Args:
-        width_inches: of the figure.
-        height_inches: of the figure.
-        dpi: pixels an inch.
-        paper: color of the ground.
-        layout: "constrained" makes room for all labels; by default everything is placed by hand.
+    """Return an empty figure that needs no screen, on paper of a color; a "constrained" layout makes room for labels.
 
     Raises:
         ViewError: matplotlib is not installed.

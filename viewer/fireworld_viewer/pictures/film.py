@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fireworld.errors import ViewError
-from fireworld.files import check_output, written_beside
+from fireworld.files import written_beside
 from fireworld.records import Recording
 from fireworld_viewer import colors
 from fireworld_viewer.pictures.city_map import GROUND, STREET
-from fireworld_viewer.pictures.figure_files import INK, PAPER, plain_style
+from fireworld_viewer.pictures.figure_files import INK, PAPER
 from fireworld_viewer.pictures.map_grid import MapGrid
 from fireworld_viewer.pictures.map_legend import LABELS, count_marks
 from fireworld_viewer.pictures.maps import cells_of
@@ -44,7 +44,6 @@ def save_film(
     path: Path,
     *,
     fps: float = FPS,
-    force: bool = False,
     on_frame: Callable[[], object] = lambda: None,
 ) -> None:
     """Write a film, of the kind that the file's ending names; nothing is left of it after an error or Ctrl-C.
@@ -52,23 +51,20 @@ def save_film(
     Args:
         recordings: one, or two of the same city.
         steps: one for each frame, from `story.steps.read_steps_between`.
-        path: the file.
+        path: the file; one that exists is replaced.
         fps: frames a second.
-        force: replace an existing file.
         on_frame: called after each frame.
 
     Raises:
-        OutputError: the ending is of no such kind, or the file exists or cannot be written.
+        OutputError: the file cannot be written.
         ViewError: matplotlib, or for MP4 PyAV, is not installed.
     """
-    check_output(path, endings=FILMS, force=force)
     write = FILMS[path.suffix.lower()]
     if write is _write_mp4:
         import_av()
-    with plain_style():
-        frames = FilmFrames(recordings, steps)
-        with written_beside(path) as partial:
-            write(frames, partial, fps, on_frame)
+    frames = FilmFrames(recordings, steps)
+    with written_beside(path) as partial:
+        write(frames, partial, fps, on_frame)
 
 
 class FilmFrames:

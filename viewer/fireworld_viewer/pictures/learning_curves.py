@@ -29,12 +29,7 @@ class LearningPanel:
 
 
 def draw_learning_curves(panels: Sequence[LearningPanel], *, label: str, mark: str) -> Figure:
-    """Draw the panels in rows of four.
-
-    Args:
-        panels: what to draw; the teams are those of the first.
-        label: of the numbers.
-        mark: what the dotted lines stand for.
+    """Draw the panels in rows of four; the label is that of the numbers, the mark that of the dotted lines.
 
     Raises:
         ViewError: matplotlib is not installed.

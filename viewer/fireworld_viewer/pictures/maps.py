@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fireworld.errors import one_line
-from fireworld.files import check_output
 from fireworld.records import CityRecord, Recording, StepRecord
 from fireworld_viewer.pictures.city_map import WIDTH_INCHES, BrigadeMarks, MapState, state_of
-from fireworld_viewer.pictures.figure_files import STILLS, plain_style, save_figure
 from fireworld_viewer.pictures.map_grid import MapCell, MapGrid
 from fireworld_viewer.story.steps import ShownStep, read_steps
 
@@ -69,18 +66,6 @@ def draw_record(city: CityRecord, record: StepRecord, *, title: str) -> Figure:
         civilian_hp=record.civilians.hp,
         title=title,
     )
-
-
-def save_steps(recordings: Sequence[Recording], steps: Sequence[int], path: Path, *, force: bool = False) -> None:
-    """Write the picture that `draw_steps` draws; the same recordings give the same bytes.
-
-    Raises:
-        OutputError: the ending is not that of a picture, or the file exists or cannot be written.
-        ViewError: as in `draw_steps`.
-    """
-    check_output(path, endings=STILLS, force=force)
-    with plain_style():
-        save_figure(draw_steps(recordings, steps), path, force=force)
 
 
 def draw_steps(recordings: Sequence[Recording], steps: Sequence[int]) -> Figure:

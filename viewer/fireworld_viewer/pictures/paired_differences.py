@@ -41,10 +41,6 @@ class DifferencePanel:
 def draw_paired_differences(panels: Sequence[DifferencePanel], *, title: str) -> Figure:
     """Draw a panel for each quantity, two in a row: a point for every seed, and the mean with its 95 % interval.
 
-    Args:
-        panels: what to draw, each with as many lines.
-        title: what is compared.
-
     Raises:
         ViewError: matplotlib is not installed.
     """

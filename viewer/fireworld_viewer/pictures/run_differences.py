@@ -34,11 +34,7 @@ _KINDS: Final = {
 def draw_difference_map(city: CityRecord, a: StepRecord, b: StepRecord, differing: Mapping[str, Array]) -> Figure:
     """Draw which buildings, brigades and civilians differ; brigades where they are in the second run.
 
-    Args:
-        city: of both runs.
-        a: a step of the first run.
-        b: the same step of the second.
-        differing: which differ, (n,) bool each: "building", "brigade", "civilian".
+    `a` and `b` are one step of both runs; `differing`: "building", "brigade" and "civilian", (n,) bool which differ.
 
     Raises:
         ViewError: matplotlib is not installed.

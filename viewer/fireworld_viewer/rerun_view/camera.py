@@ -35,9 +35,7 @@ class Camera:
 def frame_fire(recordings: Sequence[Recording], *, aspect: float) -> Camera:
     """Look from the south, from above, at the fire while it can still be fought, or at the whole city without one.
 
-    Args:
-        recordings: runs in one city.
-        aspect: width of the view by its height.
+    aspect: width of the view by its height.
     """
     city = recordings[0].city
     low, high = city_box_m(city)
@@ -56,13 +54,7 @@ def frame_fire(recordings: Sequence[Recording], *, aspect: float) -> Camera:
 
 
 def frame_from_above(low: tuple[float, float], high: tuple[float, float], *, aspect: float) -> Camera:
-    """Look straight down on a box, north up.
-
-    Args:
-        low: south-west corner in metres.
-        high: north-east corner.
-        aspect: width of the view by its height.
-    """
+    """Look straight down, north up, on a box between its south-west and its north-east corner in metres."""
     (x_m, y_m), (half_width_m, half_depth_m) = _middle_and_halves(low, high)
     far_m = 1.08 * max(half_width_m / (_SLOPE * aspect), half_depth_m / _SLOPE, _LEAST_DISTANCE_M)
     return Camera(eye_m=(x_m, y_m, far_m), target_m=(x_m, y_m, 0.0), up=(0.0, 1.0, 0.0))

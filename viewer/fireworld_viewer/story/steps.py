@@ -40,11 +40,7 @@ def select_steps(
 
 
 def read_steps(recordings: Sequence[Recording], steps: Sequence[int]) -> list[ShownStep]:
-    """Read single steps, in the order given.
-
-    Args:
-        recordings: one, or two of the same city.
-        steps: steps, or LAST.
+    """Read single steps, or LAST, of one recording or two, in the order given.
 
     Raises:
         ViewError: there is no such step, or the cities differ.
@@ -78,11 +74,7 @@ def evenly_spaced(recordings: Sequence[Recording], n: int) -> list[int]:
 
 
 def steps_of(recordings: Sequence[Recording]) -> NDArray[np.int64]:
-    """Return the steps that can be shown: (k,) int64.
-
-    Raises:
-        ViewError: there is none, or the cities differ.
-    """
+    """Return the steps that can be shown, (k,) int64; errors as in `read_steps`."""
     if len(recordings) == 1:
         if len(recordings[0].steps) == 0:
             raise ViewError(expected("pictures", "", "a recording with steps", "one without"))
