@@ -9,8 +9,8 @@ from pathlib import Path
 
 from fireworld_recorder.reader import Log, open_log
 from fireworld_viewer.pictures.figure_files import plain_style
-from fireworld_viewer.pictures.film import FILMS, Reel, save_film
-from fireworld_viewer.pictures.moments import Moment, moments_between
+from fireworld_viewer.pictures.film import FILMS, FilmFrames, save_film
+from fireworld_viewer.story.steps import ShownStep, read_steps_between
 
 from benchmarks.runs import new_world, write_log
 from benchmarks.timing import Contender, Row, compare, measure
@@ -25,32 +25,32 @@ def rows(*, quick: bool) -> Iterator[Row]:
         folder = Path(name)
         write_log(folder / "run.mcap", new_world(size, n_steps))
         log = open_log(folder / "run.mcap")
-        moments = moments_between([log])
-        city = f"{len(log.city.building_id)} buildings, {len(moments)} steps"
+        shown = read_steps_between([log])
+        city = f"{len(log.city.building_id)} buildings, {len(shown)} steps"
 
         def blitted(_: None) -> None:
-            reel = Reel([log], moments)
-            for index in range(len(reel)):
-                reel.frame(index)
+            frames = FilmFrames([log], shown)
+            for index in range(len(frames)):
+                frames.frame(index)
 
         def anew(_: None) -> None:
-            for moment in moments[:: len(moments) // 10]:
-                Reel([log], [moment]).frame(0)
+            for step in shown[:: len(shown) // 10]:
+                FilmFrames([log], [step]).frame(0)
 
         with plain_style():
-            ours = Contender("the city once", blitted, parts=len(moments))
-            baseline = Contender("a figure each", anew, parts=len(moments[:: len(moments) // 10]))
+            ours = Contender("the city once", blitted, parts=len(shown))
+            baseline = Contender("a figure each", anew, parts=len(shown[:: len(shown) // 10]))
             yield compare("pictures", "a frame of a film", city, ours, baseline, seconds=seconds)
             for ending in FILMS:
                 if ending == ".gif" or importlib.util.find_spec("av") is not None:
-                    yield measure_film(log, moments, folder / f"film{ending}", size=city, seconds=seconds)
+                    yield measure_film(log, shown, folder / f"film{ending}", size=city, seconds=seconds)
 
 
-def measure_film(log: Log, moments: Sequence[Moment], path: Path, *, size: str, seconds: float) -> Row:
+def measure_film(log: Log, shown: Sequence[ShownStep], path: Path, *, size: str, seconds: float) -> Row:
     """Measure the writing of a film from a log that is read."""
 
     def write(_: None) -> None:
-        save_film([log], moments, path)
+        save_film([log], shown, path)
 
     write(None)
     label = f"{size}, {path.stat().st_size / 1e6:.1f} MB"

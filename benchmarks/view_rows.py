@@ -11,7 +11,7 @@ from typing import Final
 
 from fireworld_recorder.reader import open_log
 from fireworld_viewer.rerun_view.app import save
-from fireworld_viewer.rerun_view.selection import select_steps
+from fireworld_viewer.story.steps import select_steps
 
 from benchmarks.fires import city_of
 from benchmarks.runs import new_world, write_log
@@ -59,7 +59,7 @@ def _to_file(what: str, log_path: Path, size: int, *, n_runs: int, seconds: floa
 def _by_steps(log_path: Path, size: int, *, seconds: float) -> Row:
     """Send a run step by step, as a live view does, beside all steps at once."""
     import rerun
-    from fireworld_viewer.rerun_view.mapping import Feed
+    from fireworld_viewer.rerun_view.run_layers import RunLayers
 
     whole = select_steps(open_log(log_path))
     parts = [MemoryRecording(whole.header, whole.city, [record]) for record in whole]
@@ -67,12 +67,12 @@ def _by_steps(log_path: Path, size: int, *, seconds: float) -> Row:
     def send(recordings: list[MemoryRecording]) -> None:
         stream = rerun.RecordingStream("benchmark", send_properties=False)
         memory = stream.memory_recording()
-        feed = Feed(stream, whole.city)
+        layers = RunLayers(stream, whole.city)
         for recording in recordings:
-            feed.take(recording)
+            layers.add(recording)
         memory.drain_as_bytes()
 
-    ours = Contender("Feed.take for each step", lambda _: send(parts))
+    ours = Contender("RunLayers.add for each step", lambda _: send(parts))
     baseline = Contender("for all steps at once", lambda _: send([whole]))
     return compare("view", "a run sent step by step", _label(log_path, size), ours, baseline, seconds=seconds)
 

@@ -245,10 +245,10 @@ def _write(found: Comparison, *, junit: Path | None, plot: Path | None, force: b
 
         write_file(junit, to_junit(found))
     if plot is not None:
-        from fireworld_viewer.pictures.maps import save_figure
+        from fireworld_viewer.pictures.figure_files import save_figure
 
         from fireworld.cli.comparison_text import scopes
-        from fireworld.evaluation.paired_figure import draw_differences
+        from fireworld.evaluation.figures import draw_differences
 
         title = f"{found.policies[1]} (B) against {found.policies[0]} (A), {len(found.seeds)} seeds"
         save_figure(draw_differences(scopes(found), title=title), plot, force=force)

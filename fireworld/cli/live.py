@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import click
 
 if TYPE_CHECKING:
-    from fireworld_viewer.rerun_view.live import Screen, Showing
-    from fireworld_viewer.rerun_view.training_curves import Point, Sheet
+    from fireworld_viewer.rerun_view.live import PlayRun, Screen
+    from fireworld_viewer.rerun_view.training_curves import TrainingLayout, TrainingPoint
 
     from fireworld.records import CityRecord, RunHeader, StepRecord
     from fireworld.training.teams import Training
@@ -63,7 +63,7 @@ def watched_run(screen: Screen | None, header: RunHeader, city: CityRecord) -> I
         return
     from fireworld_viewer.rerun_view.live import RunView
 
-    with closing(RunView(screen, header, city, tell=tell)) as watched:
+    with closing(RunView(screen, header, city, warn=warn)) as watched:
         yield watched.add
 
 
@@ -80,20 +80,20 @@ def watched_training(screen: Screen | None) -> Iterator[Callable[[Training, Epis
     from fireworld_viewer.rerun_view.live import TrainingView
 
     episodes, lock = Episodes(), Lock()
-    with closing(TrainingView(screen, _sheet(), tell=tell)) as watched:
+    with closing(TrainingView(screen, _layout(), warn=warn)) as watched:
 
         def show(training: Training, episode: EpisodeReport) -> None:
             with lock:
-                point, showing = episodes.point(training, episode)
-                watched.add(point, showing=showing)
+                point, play = episodes.point(training, episode)
+                watched.add(point, play=play)
 
         yield show
 
 
-def _sheet() -> Sheet:
-    from fireworld_viewer.rerun_view.training_curves import Sheet
+def _layout() -> TrainingLayout:
+    from fireworld_viewer.rerun_view.training_curves import TrainingLayout
 
-    return Sheet(title="training", timeline="episode", plots=CURVES, log="Scenarios")
+    return TrainingLayout(title="training", timeline="episode", plots=CURVES, log="Scenarios")
 
 
 class Episodes:
@@ -103,9 +103,9 @@ class Episodes:
         self._n_episodes: dict[int, int] = {}
         self._first: int | None = None
 
-    def point(self, training: Training, episode: EpisodeReport) -> tuple[Point, Showing | None]:
+    def point(self, training: Training, episode: EpisodeReport) -> tuple[TrainingPoint, PlayRun | None]:
         """Return an episode as it is drawn, and what is to be played after it."""
-        from fireworld_viewer.rerun_view.training_curves import Point
+        from fireworld_viewer.rerun_view.training_curves import TrainingPoint
 
         seed = training.trainer.seed
         number = self._n_episodes.get(seed, 0)
@@ -122,12 +122,12 @@ class Episodes:
             "n_steps": episode.n_steps,
         }
         team = f"seed {seed}"
-        point = Point(
+        point = TrainingPoint(
             number=number,
             values={name: {team: value} for name, value in values.items()},
             note=f"{team}: {episode.scenario}: {settled} after {episode.episode + 1} episodes" if ended else "",
         )
-        return point, _showing(training, episode) if ended and seed == self._first and _ends_stage(training) else None
+        return point, _play(training, episode) if ended and seed == self._first and _ends_stage(training) else None
 
 
 def _ends_stage(training: Training) -> bool:
@@ -137,7 +137,7 @@ def _ends_stage(training: Training) -> bool:
     return training.trainer.progress.scenario_number in lasts
 
 
-def _showing(training: Training, episode: EpisodeReport) -> Showing:
+def _play(training: Training, episode: EpisodeReport) -> PlayRun:
     """Prepare the play of a scenario by the team that has just finished it; the tables are copied now."""
     trainer = training.trainer
     team = trainer.graduate if trainer.graduate is not None else trainer.team()
@@ -159,6 +159,6 @@ def _showing(training: Training, episode: EpisodeReport) -> Showing:
     return play
 
 
-def tell(line: str) -> None:
+def warn(line: str) -> None:
     """Say why a view has ended before what it shows."""
     click.echo(line, err=True)

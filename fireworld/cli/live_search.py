@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING, Final
 
-from fireworld.cli.live import tell
+from fireworld.cli.live import warn
 
 if TYPE_CHECKING:
     from fireworld_viewer.rerun_view.live import Screen
-    from fireworld_viewer.rerun_view.training_curves import Point, Sheet
+    from fireworld_viewer.rerun_view.training_curves import TrainingLayout, TrainingPoint
 
     from fireworld.policy.ranking import Weight
     from fireworld.training.search import Generation, Searcher
@@ -43,28 +43,30 @@ def watched_search(
         return
     from fireworld_viewer.rerun_view.live import TrainingView
 
-    with closing(TrainingView(screen, _sheet([run.searcher for run in runs]), tell=tell)) as watched:
+    with closing(TrainingView(screen, _layout([run.searcher for run in runs]), warn=warn)) as watched:
         yield lambda run, generation: watched.add(_point(run.searcher, generation))
 
 
-def _sheet(searchers: Sequence[Searcher]) -> Sheet:
+def _layout(searchers: Sequence[Searcher]) -> TrainingLayout:
     """Return what is drawn: scores and spread of all searches, and a tab with the weights of each."""
-    from fireworld_viewer.rerun_view.training_curves import Sheet, Tab
+    from fireworld_viewer.rerun_view.training_curves import LayoutTab, TrainingLayout
 
-    return Sheet(
+    return TrainingLayout(
         title="search",
         timeline="generation",
         plots={SCORE: "Score, as a share of the maximum", SPREAD: "Spread: mean standard deviation of the weights"},
         tabs={
-            f"Seed {one.seed}": Tab({_plot(one, group): f"Weights of {group}" for group in _groups(one)}, _page(one))
+            f"Seed {one.seed}": LayoutTab(
+                {_plot(one, group): f"Weights of {group}" for group in _groups(one)}, _page(one)
+            )
             for one in searchers
         },
     )
 
 
-def _point(searcher: Searcher, generation: Generation) -> Point:
+def _point(searcher: Searcher, generation: Generation) -> TrainingPoint:
     """Return a generation as it is drawn."""
-    from fireworld_viewer.rerun_view.training_curves import Point
+    from fireworld_viewer.rerun_view.training_curves import TrainingPoint
 
     team, mean = f"seed {searcher.seed}", searcher.state.mean.tolist()
     weights = {
@@ -72,7 +74,7 @@ def _point(searcher: Searcher, generation: Generation) -> Point:
         for group, members in _groups(searcher).items()
     }
     scores = {f"{team}, all": generation.score_mean, f"{team}, the best": generation.score_best}
-    return Point(
+    return TrainingPoint(
         number=generation.generation + 1,
         values={SCORE: scores, SPREAD: {team: generation.spread}, **weights},
         pages={_page(searcher): _found(searcher)},

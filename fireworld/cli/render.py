@@ -62,8 +62,10 @@ def command(
     """
     if len(logs) > 2:
         raise click.UsageError(f"Expected one or two recordings, got {len(logs)}.")
-    from fireworld_viewer.pictures.figure_files import STILLS, check_output
+    from fireworld_viewer.pictures.figure_files import STILLS
     from fireworld_viewer.pictures.film import FILMS
+
+    from fireworld.files import check_output
 
     check_output(output, endings=[*STILLS, *FILMS], force=force)
     if output.suffix.lower() in FILMS:
@@ -83,7 +85,7 @@ def command(
 
 def _step_numbers(option: str, text: str) -> list[int]:
     """Turn "0,60,last" into steps."""
-    from fireworld_viewer.pictures.moments import LAST
+    from fireworld_viewer.story.steps import LAST
 
     words = [word.strip() for word in text.split(",")]
     if len(words) > _STEPS_MAX:
@@ -108,14 +110,14 @@ def _render_film(
 ) -> None:
     from fireworld_viewer.pictures.figure_files import plain_style
     from fireworld_viewer.pictures.film import FPS, save_film
-    from fireworld_viewer.pictures.moments import moments_between
+    from fireworld_viewer.story.steps import read_steps_between
 
     recordings: list[Recording] = [open_committed(path, doing="drawing") for path in paths]
-    moments = moments_between(recordings, first=first, last=last, every=every)
-    with plain_style(), bar("film", len(moments)) as advance:
-        save_film(recordings, moments, output, fps=fps or FPS, on_frame=advance)
-    span = f"steps {moments[0].step} to {moments[-1].step}"
-    click.echo(f"{output}: {len(moments)} frames, {span}, {_size(output)}")
+    shown = read_steps_between(recordings, first=first, last=last, every=every)
+    with plain_style(), bar("film", len(shown)) as advance:
+        save_film(recordings, shown, output, fps=fps or FPS, on_frame=advance)
+    span = f"steps {shown[0].step} to {shown[-1].step}"
+    click.echo(f"{output}: {len(shown)} frames, {span}, {_size(output)}")
 
 
 def _size(path: Path) -> str:

@@ -36,9 +36,7 @@ def command(*, logs: tuple[Path, ...], output: Path, force: bool) -> None:
     """
     if len(logs) > 2:
         raise click.UsageError(f"Expected one or two recordings, got {len(logs)}.")
-    from fireworld_viewer.pictures.figure_files import check_output
-
-    from fireworld.files import write_file
+    from fireworld.files import check_output, write_file
     from fireworld.recording.pages.run_page import run_page
 
     check_output(output, endings=(".html", ".htm"), force=force)
@@ -58,11 +56,11 @@ def _draw_all(recordings: Sequence[Log]) -> Mapping[str, bytes]:
     from fireworld_viewer.pictures.decision_timeline import draw_timeline
     from fireworld_viewer.pictures.figure_files import plain_style, png_bytes
     from fireworld_viewer.pictures.maps import draw_steps
-    from fireworld_viewer.pictures.moments import evenly
+    from fireworld_viewer.story.steps import evenly_spaced
 
     with plain_style():
         return {
-            "maps": png_bytes(draw_steps(recordings, evenly(recordings, _MAPS))),
+            "maps": png_bytes(draw_steps(recordings, evenly_spaced(recordings, _MAPS))),
             "curves": png_bytes(draw_curves(recordings)),
             "timeline": png_bytes(draw_timeline(recordings)),
         }

@@ -59,7 +59,8 @@ def show(*, scenario: str, output: Path | None, force: bool, as_yaml: bool, sett
 def _draw(scenario: Scenario, path: Path, *, force: bool) -> None:
     """Draw the map of a scenario at its start."""
     import numpy as np
-    from fireworld_viewer.pictures.maps import draw_map, save_figure
+    from fireworld_viewer.pictures.figure_files import save_figure
+    from fireworld_viewer.pictures.maps import draw_map
 
     from fireworld.simulation.built import build_scenario
 

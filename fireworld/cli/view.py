@@ -11,7 +11,7 @@ import click
 from fireworld.cli.opening import open_committed
 
 if TYPE_CHECKING:
-    from fireworld_viewer.rerun_view.outcome_panel import Outcome
+    from fireworld_viewer.rerun_view.outcome_page import OutcomePage
 
     from fireworld.records import MemoryRecording, Recording
 
@@ -79,7 +79,7 @@ def command(
     if force and output is None:
         raise click.UsageError("--force goes with --save.")
     from fireworld_viewer.rerun_view import app
-    from fireworld_viewer.rerun_view.selection import select_steps
+    from fireworld_viewer.story.steps import select_steps
 
     held = [open_committed(path, doing="showing") for path in logs]
     read = [_with_air(recording, path) if air else recording for recording, path in zip(held, logs, strict=True)]
@@ -112,12 +112,12 @@ def _with_air(recording: Recording, path: Path) -> MemoryRecording:
     return replayed
 
 
-def _outcome(logs: Sequence[Path], recordings: Sequence[Recording]) -> Outcome:
+def _outcome(logs: Sequence[Path], recordings: Sequence[Recording]) -> OutcomePage:
     """Work out what the runs came to, and where two first differ, in the steps that are shown."""
     from fireworld_recorder.diff import Difference, compare
     from fireworld_recorder.totals import totals_of
-    from fireworld_viewer.rerun_view.comparison import check_same_city
-    from fireworld_viewer.rerun_view.outcome_panel import Outcome
+    from fireworld_viewer.rerun_view.outcome_page import OutcomePage
+    from fireworld_viewer.story.two_runs import check_same_city
 
     from fireworld.cli.difference_text import totals_rows
 
@@ -125,15 +125,15 @@ def _outcome(logs: Sequence[Path], recordings: Sequence[Recording]) -> Outcome:
     if len(recordings) == 1:
         totals = totals_of(recordings[0])
         alone = Difference(None, (totals, totals), {}, totals.n_steps, {})
-        return Outcome(heads=heads, rows=[(label, value) for label, value, _ in totals_rows(alone)])
+        return OutcomePage(heads=heads, rows=[(label, value) for label, value, _ in totals_rows(alone)])
     first_run, second_run = recordings
     check_same_city(first_run.city, second_run.city)
     difference = compare(first_run, second_run)
     rows, first = list(totals_rows(difference)), difference.first
     if first is None:
-        return Outcome(heads=heads, rows=rows)
+        return OutcomePage(heads=heads, rows=rows)
     step = int(first_run.steps[0]) if first.step is None else first.step
-    return Outcome(heads=heads, rows=rows, first_step=step, first_sentence=first.sentence)
+    return OutcomePage(heads=heads, rows=rows, first_step=step, first_sentence=first.sentence)
 
 
 def _announce(address: str) -> None:

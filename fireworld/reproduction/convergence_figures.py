@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Final
-
-import numpy as np
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from fireworld.kernels.arrays import Array
 from fireworld.reproduction import paper
@@ -13,9 +11,6 @@ from fireworld.reproduction.study import TOGETHER, TOGETHER_WITHOUT_FLAGS, Lesso
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-COLORS: Final = {TOGETHER: "#1f6feb", TOGETHER_WITHOUT_FLAGS: "#c2571a"}
-_PANELS_ACROSS: Final = 4
 
 
 def draw_returns(study: Study) -> Figure:
@@ -29,35 +24,17 @@ def draw_policy_changes(study: Study) -> Figure:
 
 
 def _draw(study: Study, label: str, of: Callable[[Lesson], Array]) -> Figure:
-    """One panel a scenario: the mean over the repetitions still in it, and each of them as a thin line."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    from fireworld_viewer.pictures.learning_curves import LearningPanel, draw_learning_curves
 
-    figure = Figure(figsize=(12.0, 5.6), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
-    rows = -(-len(paper.TABLE_1) // _PANELS_ACROSS)
-    panels = figure.subplots(rows, _PANELS_ACROSS, sharex=True, squeeze=False).ravel()
-    for panel, row in zip(panels, paper.TABLE_1, strict=False):
-        for team, color in COLORS.items():
-            curves = [of(lesson) for lesson in study.lessons_of(team, row.scenario)]
-            for curve in curves:
-                panel.plot(curve, color=color, linewidth=0.5, alpha=0.25)
-            panel.plot(_mean_curve(curves), color=color, linewidth=1.8, label=team)
-        panel.axvline(row.convergence_episode, color="#555555", linewidth=1.0, linestyle=":", label="paper converged")
-        panel.set_title(row.scenario, fontsize=10, loc="left")
-        panel.spines[["top", "right"]].set_visible(False)
-        panel.tick_params(labelsize=8)
-    panels[0].legend(fontsize=8, frameon=False)
-    figure.supxlabel("episode", fontsize=10)
-    figure.supylabel(label, fontsize=10)
-    return figure
-
-
-def _mean_curve(curves: Sequence[Array]) -> Array:
-    """Return the mean over the repetitions that are still in the scenario: (longest,)."""
-    longest = max(len(curve) for curve in curves)
-    padded = np.full((len(curves), longest), np.nan)
-    for row, curve in zip(padded, curves, strict=True):
-        row[: len(curve)] = curve
-    means: Array = np.nanmean(padded, axis=0)
-    return means
+    panels = [
+        LearningPanel(
+            title=row.scenario,
+            curves={
+                team: [of(lesson) for lesson in study.lessons_of(team, row.scenario)]
+                for team in (TOGETHER, TOGETHER_WITHOUT_FLAGS)
+            },
+            marked_episode=row.convergence_episode,
+        )
+        for row in paper.TABLE_1
+    ]
+    return draw_learning_curves(panels, label=label, mark="paper converged")

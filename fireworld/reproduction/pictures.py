@@ -8,10 +8,10 @@ from pathlib import Path
 
 from fireworld_recorder.writer import LogWriter
 from fireworld_viewer.pictures.figure_files import png_bytes
+from fireworld_viewer.pictures.maps import draw_record
 
 from fireworld.policy.names import NamedPolicy
 from fireworld.policy.team import Team
-from fireworld.recording.pages.record_map import draw_record
 from fireworld.records import CityRecord, StepRecord
 from fireworld.reproduction import paper
 from fireworld.reproduction.convergence_figures import draw_policy_changes, draw_returns
@@ -97,4 +97,4 @@ def draw_all(study: Study, recorded: list[Recorded]) -> Iterator[tuple[str, byte
 
 def _map(run: Recorded, record: StepRecord, moment: str) -> bytes:
     title = f"{run.scenario}: {moment}, score {record.score.score:.2f} of {record.score.score_max:.0f}"
-    return draw_record(run.city, record, title=title)
+    return png_bytes(draw_record(run.city, record, title=title))

@@ -307,7 +307,7 @@ def test_rerun_draws_the_points_and_the_log(here, log):  # noqa: F811
         places, rgba = clouds[record.step]
         np.testing.assert_allclose(np.array(places)[:, 0], log.city.center_x_m, rtol=1e-6)
         wanted = colors.packed_table(colors.FIERYNESS_RGB)[record.buildings.fieryness]
-        wanted[refuges] = colors.packed(colors.REFUGE_RGB)
+        wanted[refuges] = colors.single(colors.REFUGE_RGB)
         assert rgba == wanted.tolist()
     assert len([line for line in lines if line]) == topics_of_events(log)
 

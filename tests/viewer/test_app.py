@@ -13,8 +13,9 @@ from pathlib import Path
 import pytest
 import rerun
 from fireworld_viewer.rerun_view import app
-from fireworld_viewer.rerun_view.blueprint import frame_fire, frame_from_above, title
-from fireworld_viewer.rerun_view.outcome_panel import Outcome
+from fireworld_viewer.rerun_view.blueprint import title
+from fireworld_viewer.rerun_view.camera import frame_fire, frame_from_above
+from fireworld_viewer.rerun_view.outcome_page import OutcomePage
 
 from fireworld.errors import OutputError, ViewError
 from tests.viewer import rrd
@@ -23,7 +24,7 @@ from tests.viewer.conftest import make_recording
 
 def test_rerun_verifies_what_is_saved(small, slower, tmp_path: Path):
     app.save([small], tmp_path / "one.rrd", focus=[100])
-    outcome = Outcome(heads=["a", "b"], rows=[("steps", "41", "31")], first_step=1, first_sentence="step 1")
+    outcome = OutcomePage(heads=["a", "b"], rows=[("steps", "41", "31")], first_step=1, first_sentence="step 1")
     app.save([small, slower], tmp_path / "two.rrd", outcome=outcome)
     done = rrd.rerun_program("rrd", "verify", str(tmp_path / "one.rrd"), str(tmp_path / "two.rrd"))
     assert done.returncode == 0, done.stderr
@@ -44,7 +45,9 @@ def test_the_same_recording_gives_the_same_data(small, tmp_path: Path):
 def test_an_existing_file_is_replaced_only_when_asked(small, tmp_path: Path):
     path = tmp_path / "run.rrd"
     path.write_text("mine")
-    with pytest.raises(OutputError, match=r"run\.rrd: exists already; try --force"):
+    with pytest.raises(
+        OutputError, match=r"run\.rrd: expected a name that is free, got an existing file; use --force to replace it"
+    ):
         app.save([small], path)
     assert path.read_text() == "mine"
     app.save([small], path, force=True)
@@ -53,7 +56,7 @@ def test_an_existing_file_is_replaced_only_when_asked(small, tmp_path: Path):
 
 
 def test_a_missing_folder_is_named(small, tmp_path: Path):
-    with pytest.raises(OutputError, match="its folder does not exist"):
+    with pytest.raises(OutputError, match=r"expected an existing folder .*nowhere"):
         app.save([small], tmp_path / "nowhere" / "run.rrd")
 
 

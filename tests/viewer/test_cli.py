@@ -130,10 +130,10 @@ def test_misuse_is_explained(logs, arguments: list[str], said: str):
 @pytest.mark.parametrize(
     ("arguments", "error", "said"),
     [
-        (["a.mcap", "--save", "x.rrd", "--from", "50"], ViewError, "holds steps 0 to 40"),
+        (["a.mcap", "--save", "x.rrd", "--from", "50"], ViewError, "expected steps from 0 to 40, got steps 50 to 40"),
         (["a.mcap", "--save", "x.rrd", "--from", "9", "--to", "3"], ViewError, "got steps 9 to 3"),
         (["a.mcap", "--save", "x.rrd", "--focus", "1"], ViewError, "ids of buildings of city 'grid', got 1"),
-        (["a.mcap", "--save", "nowhere/x.rrd"], OutputError, "its folder does not exist"),
+        (["a.mcap", "--save", "nowhere/x.rrd"], OutputError, "expected an existing folder nowhere"),
     ],
 )
 def test_mistakes_are_one_sentence(
@@ -182,7 +182,7 @@ from fireworld_viewer.rerun_view import app
 app.save([make_recording(3, 3, 2)], Path(tempfile.mkdtemp()) / "x.rrd")
 assert "numba" not in sys.modules and "matplotlib" not in sys.modules
 parts = {name.split(".")[1] for name in sys.modules if name.startswith("fireworld.")}
-assert parts <= {"errors", "records"}, parts
+assert parts <= {"errors", "files", "outcome", "records"}, parts
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode == 0, done.stderr

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fireworld_viewer import colors
 from fireworld_viewer.rerun_view import plots
-from fireworld_viewer.story import narration as telling
+from fireworld_viewer.story import narration
 
 from fireworld.records import ACTIVITIES, FIERYNESS
 
@@ -18,7 +18,7 @@ def test_every_code_and_activity_has_a_color_of_its_own():
 
 
 def test_packed_is_red_green_blue_and_opaque():
-    assert colors.packed((1, 2, 3)) == 0x010203FF
+    assert colors.single((1, 2, 3)).tolist() == [0x010203FF]
     assert colors.packed_table(((1, 2, 3), (255, 0, 16))).tolist() == [0x010203FF, 0xFF0010FF]
 
 
@@ -57,9 +57,9 @@ def contrast(one: colors.Rgb, other: colors.Rgb) -> float:
 
 
 def test_curves_and_logs_are_to_be_read_on_black_and_on_white():
-    said = [rgb for *_, rgb in telling._EVENT_LINES.values()]
+    events = [rgb for *_, rgb in narration._EVENT_LINES.values()]
     single_run = [*colors.BRIGADE_RGB, *plots._COUNT_RGB, *plots._REWARD_RGB]
     scores = [rgb for pair in plots._SCORE_RGB.values() for rgb in pair]
-    for rgb in (*said, *single_run, *map(colors.paler, single_run), *scores):
+    for rgb in (*events, *single_run, *map(colors.paler, single_run), *scores):
         assert contrast(rgb, (255, 255, 255)) > 2.2, rgb
         assert contrast(rgb, (13, 16, 17)) > 2.2, rgb  # Rerun's dark background

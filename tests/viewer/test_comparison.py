@@ -10,8 +10,9 @@ import pytest
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh
 from fireworld_viewer.rerun_view import app
-from fireworld_viewer.rerun_view.comparison import AGREEMENT, DAMAGE_ORDER, common_steps, difference
-from fireworld_viewer.rerun_view.outcome_panel import Outcome
+from fireworld_viewer.rerun_view.comparison import AGREEMENT
+from fireworld_viewer.rerun_view.outcome_page import OutcomePage
+from fireworld_viewer.story.two_runs import DAMAGE_ORDER, common_steps, compare_damage
 
 from fireworld.errors import ViewError
 from fireworld.records import MemoryRecording
@@ -29,7 +30,7 @@ def test_damage_follows_the_score():
 
 def test_difference_is_zero_only_for_equal_codes():
     every = np.arange(9, dtype=np.uint8)
-    table = difference(np.repeat(every, 9), np.tile(every, 9)).reshape(9, 9)
+    table = compare_damage(np.repeat(every, 9), np.tile(every, 9)).reshape(9, 9)
     assert np.array_equal(table == 0, np.eye(9, dtype=bool))
     assert np.array_equal(table, -table.T)
     assert table[0, 8] == 1  # unburnt in the first run, burnt out in the second: worse
@@ -49,7 +50,7 @@ def test_the_difference_is_colored_at_every_step(small, slower, tmp_path: Path):
     codes_a = small.column("/buildings", "fieryness")
     codes_b = slower.column("/buildings", "fieryness")
     codes_b = np.concatenate([codes_b, np.repeat(codes_b[-1:], len(codes_a) - len(codes_b), axis=0)])
-    change = difference(codes_a, codes_b)
+    change = compare_damage(codes_a, codes_b)
     assert set(np.unique(change).tolist()) == {-1, 0, 1}
 
     numbers = rrd.at_every_step(found["/diff/city/handles"]["Difference:difference"], steps)
@@ -76,7 +77,7 @@ def test_both_runs_are_told_apart_in_one_plot(small, slower, tmp_path: Path):
 
 
 def test_the_first_difference_is_marked_and_the_outcome_is_a_page(small, slower, tmp_path: Path):
-    outcome = Outcome(
+    outcome = OutcomePage(
         heads=["a.mcap", "b|.mcap"],
         rows=[("steps", "41", "31"), ("score", "4.9", "5.5")],
         first_step=2,
@@ -106,7 +107,7 @@ def test_the_first_difference_is_marked_and_the_outcome_is_a_page(small, slower,
 
 
 def test_runs_that_are_the_same_have_no_mark(small, tmp_path: Path):
-    app.save([small, small], tmp_path / "same.rrd", outcome=Outcome(heads=["a", "b"], rows=[]))
+    app.save([small, small], tmp_path / "same.rrd", outcome=OutcomePage(heads=["a", "b"], rows=[]))
     found = rrd.read(tmp_path / "same.rrd")
     assert not {"/diff/log/first_difference", "/diff/plots/first_difference"} & set(found)
     assert [state.as_py() for _, state in found["/diff/agreement"]["StateChange:state"]] == [[AGREEMENT[0]]]

@@ -13,9 +13,8 @@ from threading import Event
 
 import numpy as np
 import pytest
-from fireworld_viewer.rerun_view import app, live
-from fireworld_viewer.rerun_view import feed as courier
-from fireworld_viewer.rerun_view.feed import Courier
+from fireworld_viewer.rerun_view import app, live, live_sender
+from fireworld_viewer.rerun_view.live_sender import BackgroundSender
 
 from fireworld.errors import ViewError
 from fireworld.policy.files import load_team_file
@@ -29,7 +28,7 @@ from tests.viewer import rrd
 SHORT = ("run", "quick", "--steps", 9, "--json")
 TRAIN = ("train", "tiny.yaml", *SHORT_WORDS, "--stages", "alone", "-o")
 DYING = (sys.executable, "-S", "-c", "import os; os.read(0, 1)")
-NOTE = "view: the viewer is closed; the run goes on without it\n"
+NOTE = "view: the viewer is closed; the run continues without it\n"
 
 
 @pytest.fixture
@@ -73,55 +72,57 @@ class Pipe:
         return finished
 
 
-def carry(pipe: Pipe, items, **changes) -> tuple[Courier[int], list[str]]:
+def send(pipe: Pipe, items, **changes) -> tuple[BackgroundSender[int], list[str]]:
     told: list[str] = []
-    words = {"n_waiting_max": 100, "tell": told.append} | changes
-    carrier: Courier[int] = Courier(lambda batch: "".join(f"{one} " for one in batch).encode(), pipe, **words)
+    words = {"n_waiting_max": 100, "warn": told.append} | changes
+    sender: BackgroundSender[int] = BackgroundSender(
+        lambda batch: "".join(f"{one} " for one in batch).encode(), pipe, **words
+    )
     for item in items:
-        carrier.put(item)
-    return carrier, told
+        sender.put(item)
+    return sender, told
 
 
-def test_a_courier_brings_everything_in_order():
+def test_everything_is_sent_in_order():
     pipe = Pipe()
-    carrier, told = carry(pipe, range(50))
-    carrier.close()
+    sender, told = send(pipe, range(50))
+    sender.close()
     assert pipe.content.decode().split() == [str(number) for number in range(50)]
     assert (pipe.finished, told) == (True, [])
 
 
 def test_who_hands_over_never_waits_and_a_slow_viewer_misses_some_evenly():
     pipe = Pipe(blocked=True)
-    carrier, told = carry(pipe, range(10_000))  # would never end if it waited
+    sender, told = send(pipe, range(10_000))  # would never end if it waited
     pipe.go.set()
-    carrier.close()
+    sender.close()
     seen = [int(number) for number in pipe.content.decode().split()]
     assert seen == sorted(seen)
     assert seen[-1] == 9999
-    assert len(seen) == 10_000 - carrier.n_left_out < 300
-    assert told == [f"view: it is slower than the run; {carrier.n_left_out} steps are left out in it"]
+    assert len(seen) == 10_000 - sender.n_left_out < 300
+    assert told == [f"view: the viewer is slower than the run; {sender.n_left_out} steps are left out in it"]
 
 
 def test_a_closed_viewer_is_told_of_once():
     pipe = Pipe(broken=True)
-    carrier, told = carry(pipe, range(5))
-    carrier._thread.join()
+    sender, told = send(pipe, range(5))
+    sender._thread.join()
     for item in range(5):
-        carrier.put(item)
-    carrier.close()
+        sender.put(item)
+    sender.close()
     assert told == [NOTE.strip()]
-    assert carrier._waiting == []
+    assert sender._waiting == []
 
 
 def test_a_viewer_that_hangs_does_not_keep_the_end(monkeypatch):
-    monkeypatch.setattr(courier, "PATIENCE_SECONDS", 0.02)
+    monkeypatch.setattr(live_sender, "PATIENCE_SECONDS", 0.02)
     pipe = Pipe(blocked=True)
-    carrier, told = carry(pipe, range(5))
-    carrier.close()
+    sender, told = send(pipe, range(5))
+    sender.close()
     assert pipe.finished is False
-    assert told == ["view: the viewer has not taken the end of it"]
+    assert told == ["view: the viewer did not take the last of it"]
     pipe.go.set()
-    carrier._thread.join()
+    sender._thread.join()
     assert len(told) == 1
 
 
@@ -131,17 +132,17 @@ def failing_encoder(batch) -> bytes:
 
 def test_a_mistake_in_the_view_does_not_stop_the_run():
     told: list[str] = []
-    carrier: Courier[int] = Courier(failing_encoder, Pipe(), n_waiting_max=10, tell=told.append)
-    carrier.put(1)
-    carrier.close()
-    assert told == ["view: ZeroDivisionError: division by zero; the run goes on without it"]
+    sender: BackgroundSender[int] = BackgroundSender(failing_encoder, Pipe(), n_waiting_max=10, warn=told.append)
+    sender.put(1)
+    sender.close()
+    assert told == ["view: ZeroDivisionError: division by zero; the run continues without it"]
 
 
 def test_step_by_step_shows_what_a_recording_shows(small, tmp_path: Path):
     app.save([small], tmp_path / "whole.rrd")
-    drawing = live.RunDrawing(small.header, small.city)
+    encoder = live.RunEncoder(small.header, small.city)
     records = list(small)
-    content = b"".join(drawing.encode(batch) for batch in ([records[0]], [records[1]], records[2:7], records[7:]))
+    content = b"".join(encoder.encode(batch) for batch in ([records[0]], [records[1]], records[2:7], records[7:]))
     pipe = to_file(tmp_path / "live.rrd").open()
     while content:
         content = content[pipe.write(content) :]
@@ -203,13 +204,13 @@ def test_a_server_that_dies_in_mid_run(here, fireworld, monkeypatch):  # noqa: F
             url = f"rerun+http://{app.LOCALHOST}:{port}/proxy"
             until_it_listens(url)
             monkeypatch.setenv("SERVER", str(server.pid))
-            monkeypatch.setattr(courier, "PATIENCE_SECONDS", 0.5)
+            monkeypatch.setattr(live_sender, "PATIENCE_SECONDS", 0.5)
             done = fireworld(*SHORT, "--policy", "killing:Killer", "--view-url", url)
             assert server.wait() == -signal.SIGKILL
         finally:
             server.kill()
     assert done.code == 0
-    assert done.err in {"", NOTE, "view: the viewer has not taken the end of it\n"}  # by what was on its way just then
+    assert done.err in {"", NOTE, "view: the viewer did not take the last of it\n"}  # by what was on its way just then
     assert json.loads(done.out)["steps"] == 9
 
 

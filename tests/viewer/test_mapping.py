@@ -10,8 +10,7 @@ import pytest
 import rerun
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh
-from fireworld_viewer.rerun_view import app, mapping
-from fireworld_viewer.rerun_view import people as crews
+from fireworld_viewer.rerun_view import app, brigades, run_layers
 from fireworld_viewer.rerun_view.plots import COUNTS, REWARDS, SCORES, first_burning
 
 from fireworld.errors import ViewError
@@ -70,12 +69,12 @@ def test_handles_sit_on_the_roofs_and_know_their_buildings(small, saved):
 
 
 @pytest.mark.parametrize(
-    ("path", "topic", "names"),
-    [("score", "/score", SCORES), ("buildings", "/score", COUNTS), ("reward", "/rewards", REWARDS)],
+    ("path", "fields"),
+    [("score", SCORES), ("buildings", COUNTS), ("reward", REWARDS)],
 )
-def test_plots_hold_the_recorded_scalars(small, saved, path: str, topic: str, names: tuple[str, ...]):
+def test_plots_hold_the_recorded_scalars(small, saved, path: str, fields: tuple[str, ...]):
     shown = rrd.at_every_step(saved[f"/plots/{path}"]["Scalars:scalars"], small.steps.tolist())
-    assert np.array_equal(np.array(shown), np.column_stack([small.column(topic, name) for name in names]))
+    assert np.array_equal(np.array(shown), np.column_stack([small.column(*field.split(".")) for field in fields]))
 
 
 def test_tanks_and_the_focus_are_plotted(small, saved):
@@ -166,7 +165,7 @@ def test_lanes_tell_the_actions_too(small, saved):
 
 def test_the_terms_of_the_reward_are_stacked_up_to_their_sum(small, saved):
     shown = np.array(rrd.at_every_step(saved["/plots/reward_stacked"]["Scalars:scalars"], small.steps.tolist()))
-    terms = np.column_stack([small.column("/rewards", name) for name in REWARDS[:4]])
+    terms = np.column_stack([small.column(*field.split(".")) for field in REWARDS[:4]])
     assert np.array_equal(shown[:, 0], terms[:, 0])
     assert np.array_equal(shown[:, 3], terms.sum(axis=1))
 
@@ -209,9 +208,9 @@ def test_steps_sent_one_by_one_show_the_same_as_all_at_once(small, saved, tmp_pa
     stream.set_log_time_enabled(False)
     stream.set_log_tick_enabled(False)
     memory = stream.memory_recording()
-    feed = mapping.Feed(stream, small.city, focus=[121, 100])
+    layers = run_layers.RunLayers(stream, small.city, focus=[121, 100])
     for record in small:
-        feed.take(MemoryRecording(small.header, small.city, [record]))
+        layers.add(MemoryRecording(small.header, small.city, [record]))
     (tmp_path / "parts.rrd").write_bytes(memory.drain_as_bytes())
     found = rrd.read(tmp_path / "parts.rrd")
     assert set(found) == {path for path in saved if not path.startswith(("/legend", "/help", "/__prop"))}
@@ -238,9 +237,9 @@ def test_a_fire_that_goes_out_leaves_no_box_when_steps_come_one_by_one(tmp_path:
     )  # fmt: skip
     stream = rerun.RecordingStream("test", recording_id="out", send_properties=False)
     memory = stream.memory_recording()
-    feed = mapping.Feed(stream, recording.city)
+    layers = run_layers.RunLayers(stream, recording.city)
     for record in [*recording, out]:
-        feed.take(MemoryRecording(recording.header, recording.city, [record]))
+        layers.add(MemoryRecording(recording.header, recording.city, [record]))
     (tmp_path / "out.rrd").write_bytes(memory.drain_as_bytes())
     found = rrd.read(tmp_path / "out.rrd", timelines={"step", "log_time", "log_tick"})
     for path, name in (
@@ -289,7 +288,7 @@ def test_brigades_on_one_spot_are_drawn_side_by_side():
     for record in recording:
         record.brigades.x_m[:] = [5.0, 5.0, 5.0]
         record.brigades.x_m[1] = 6.0
-    xyz = crews.brigade_positions_m(recording)
+    xyz = brigades.positions_m(recording)
     assert xyz[0, :, 0].tolist() == [5.0, 6.0, 13.0]
 
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from fireworld_viewer import colors
 from fireworld_viewer.pictures import maps
-from fireworld_viewer.pictures.city_map import Crews, MapState, contrasting, state_of
-from fireworld_viewer.pictures.figure_files import plain_style
+from fireworld_viewer.pictures.city_map import BrigadeMarks, MapState, contrasting, state_of
+from fireworld_viewer.pictures.figure_files import plain_style, save_figure
 from fireworld_viewer.pictures.map_legend import LABELS, count_marks
-from fireworld_viewer.pictures.moments import LAST, evenly, moments_at, moments_between
+from fireworld_viewer.story.steps import LAST, evenly_spaced, read_steps, read_steps_between
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgba
 
@@ -58,10 +58,10 @@ def test_people_are_counted_by_the_health_they_have_left(small):
 
 
 def test_brigades_are_counted_by_what_they_do(small):
-    crews = Crews(
+    brigades = BrigadeMarks(
         xy_m=np.zeros((4, 2)), activity=np.array([1, 2, 2, 4]), tank_share=np.ones(4), target=np.array([5, 6, -1, 7])
     )
-    state = MapState(fieryness=np.zeros(36, np.uint8), civilian_hp=small.city.civilian_hp, crews=crews)
+    state = MapState(fieryness=np.zeros(36, np.uint8), civilian_hp=small.city.civilian_hp, brigades=brigades)
     counts = count_marks(small.city, state)
     assert {label: counts[label] for label in counts if label.startswith("brigade")} == {
         "brigade driving": 1, "brigade spraying": 2, "brigade refilling": 1,
@@ -145,16 +145,16 @@ def test_names_are_no_formulas_and_fit(small):
 
 
 def test_which_steps_are_shown(small, slower):
-    assert [moment.step for moment in moments_between([small], first=5, last=20, every=4)] == [5, 9, 13, 17, 20]
-    assert [moment.step for moment in moments_at([small], [LAST, 3, 3])] == [40, 3, 3]
-    assert evenly([small], 5) == [0, 10, 20, 30, 40]
-    assert evenly([MemoryRecording(small.header, small.city, list(small)[:2])], 5) == [0, 1]
-    both = moments_at([small, slower], [35])[0]
+    assert [shown.step for shown in read_steps_between([small], first=5, last=20, every=4)] == [5, 9, 13, 17, 20]
+    assert [shown.step for shown in read_steps([small], [LAST, 3, 3])] == [40, 3, 3]
+    assert evenly_spaced([small], 5) == [0, 10, 20, 30, 40]
+    assert evenly_spaced([MemoryRecording(small.header, small.city, list(small)[:2])], 5) == [0, 1]
+    both = read_steps([small, slower], [35])[0]
     assert [record.step for record in both.records] == [35, 30]
     with pytest.raises(ViewError, match="expected a step from 0 to 40, got 41"):
-        moments_at([small], [41])
+        read_steps([small], [41])
     with pytest.raises(ViewError, match="expected a recording with steps"):
-        moments_at([MemoryRecording(small.header, small.city, [])], [0])
+        read_steps([MemoryRecording(small.header, small.city, [])], [0])
 
 
 def simulated(rgb, matrix):
@@ -197,7 +197,7 @@ def test_the_same_map_gives_the_same_bytes_whatever_the_users_settings(small, tm
     for ending in ("png", "svg", "pdf"):
         for name, width in (("one", 1.0), ("two", 5.0)):
             with mpl.rc_context({"font.size": 8 * width, "axes.linewidth": width}), plain_style():
-                maps.save_figure(maps.draw_steps([small], [7]), tmp_path / f"{name}.{ending}")
+                save_figure(maps.draw_steps([small], [7]), tmp_path / f"{name}.{ending}")
         assert (tmp_path / f"one.{ending}").read_bytes() == (tmp_path / f"two.{ending}").read_bytes()
     assert (tmp_path / "one.png").read_bytes().startswith(b"\x89PNG")
     assert b"<svg" in (tmp_path / "one.svg").read_bytes()
@@ -208,20 +208,20 @@ def test_files_are_not_replaced_unasked_and_never_half_written(small, tmp_path: 
     figure = maps.draw_map(small.city)
     path = tmp_path / "map.png"
     path.write_text("mine")
-    with pytest.raises(OutputError, match="exists already; try --force"):
-        maps.save_figure(figure, path)
+    with pytest.raises(OutputError, match="expected a name that is free, got an existing file; use --force"):
+        save_figure(figure, path)
     assert path.read_text() == "mine"
-    maps.save_figure(figure, path, force=True)
+    save_figure(figure, path, force=True)
     assert path.read_bytes().startswith(b"\x89PNG")
-    with pytest.raises(OutputError, match="cannot be written: No such file"):
-        maps.save_figure(figure, tmp_path / "nowhere" / "map.png")
+    with pytest.raises(OutputError, match="expected an existing folder"):
+        save_figure(figure, tmp_path / "nowhere" / "map.png")
     with pytest.raises(OutputError, match=r"expected a file ending in .png, .svg, .pdf, got '.jpg'"):
-        maps.save_figure(figure, tmp_path / "map.jpg")
+        save_figure(figure, tmp_path / "map.jpg")
     assert [item.name for item in tmp_path.iterdir()] == ["map.png"]
 
 
 def test_a_state_has_what_the_record_says(small):
     record = next(iter(small))  # nobody was asked yet: there are no targets
     state = state_of(small.city, record)
-    assert state.crews.target.tolist() == [-1, -1, -1]
-    assert state.crews.tank_share.tolist() == pytest.approx((record.brigades.tank_litres / 15000).tolist())
+    assert state.brigades.target.tolist() == [-1, -1, -1]
+    assert state.brigades.tank_share.tolist() == pytest.approx((record.brigades.tank_litres / 15000).tolist())

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from fireworld_viewer import colors
 from fireworld_viewer.rerun_view import app
-from fireworld_viewer.rerun_view.outcome_panel import Outcome
+from fireworld_viewer.rerun_view.outcome_page import OutcomePage
 
 from tests import command_line
 from tests.viewer.conftest import make_recording
@@ -52,7 +52,7 @@ def test_the_fire_is_seen_to_spread(viewer: Any, tmp_path: Path):
 def test_two_runs_are_seen_side_by_side_with_their_difference(viewer: Any, tmp_path: Path):
     path = tmp_path / "pair.rrd"
     faster, slower = make_recording(10, 8, 40, speed_m=6.0), make_recording(10, 8, 40, speed_m=3.0)
-    outcome = Outcome(heads=["a", "b"], rows=[("steps", "41", "41")], first_step=3, first_sentence="step 3")
+    outcome = OutcomePage(heads=["a", "b"], rows=[("steps", "41", "41")], first_step=3, first_sentence="step 3")
     app.save([faster, slower], path, outcome=outcome)
     state = opened(viewer, path)
     assert state.recordings[0].current_time == 0

@@ -38,14 +38,13 @@ def assert_shown(log: Log, found: dict[str, rrd.Rows], prefix: str = "") -> None
     for name in ("temperature", "fuel_share", "water_litres", "fieryness"):
         shown = rrd.at_every_step(found[f"{prefix}/city/handles"][f"Building:{name}"], steps)
         assert np.array_equal(np.array(shown), log.column("/buildings", name))
-    for path, topic, names in (
-        ("score", "/score", SCORES),
-        ("buildings", "/score", COUNTS),
-        ("reward", "/rewards", REWARDS),
-        ("tanks", "/brigades", None),
-    ):
+    for path, fields in (("score", SCORES), ("buildings", COUNTS), ("reward", REWARDS), ("tanks", None)):
         shown = rrd.at_every_step(found[f"{prefix}/plots/{path}"]["Scalars:scalars"], steps)
-        columns = [log.column(topic, name) for name in names] if names else log.column(topic, "tank_litres").T
+        columns = (
+            [log.column(*f"/{field}".split(".")) for field in fields]
+            if fields
+            else log.column("/brigades", "tank_litres").T
+        )
         assert np.array_equal(np.array(shown), np.column_stack(list(columns)))
 
 

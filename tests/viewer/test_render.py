@@ -12,7 +12,7 @@ import pytest
 from fireworld_viewer import colors
 from fireworld_viewer.pictures import film
 from fireworld_viewer.pictures.figure_files import plain_style
-from fireworld_viewer.pictures.moments import moments_between
+from fireworld_viewer.story.steps import read_steps_between
 from PIL import Image
 
 from tests import command_line
@@ -82,24 +82,24 @@ def test_a_gif_plays_every_step_and_holds_the_last(render, tmp_path):
 
 def test_the_frames_of_a_gif_are_the_pictures(small, tmp_path):
     """What is left of a frame after palette and differences is the frame, but for rounded colors."""
-    moments = moments_between([small], first=0, last=30, every=10)
+    shown = read_steps_between([small], first=0, last=30, every=10)
     with plain_style():
-        film.save_film([small], moments, tmp_path / "film.gif")
-        wanted = film.Reel([small], moments).frame(2)
+        film.save_film([small], shown, tmp_path / "film.gif")
+        wanted = film.FilmFrames([small], shown).frame(2)
     with Image.open(tmp_path / "film.gif") as picture:
         picture.seek(2)
-        shown = np.asarray(picture.convert("RGB")).astype(int)
-    assert np.abs(shown - wanted.astype(int)).max() < 80
-    assert np.abs(shown - wanted.astype(int)).mean() < 0.5
+        seen = np.asarray(picture.convert("RGB")).astype(int)
+    assert np.abs(seen - wanted.astype(int)).max() < 80
+    assert np.abs(seen - wanted.astype(int)).mean() < 0.5
     for rgb in (*colors.FIERYNESS_RGB, *colors.ACTIVITY_RGB):
         there = (wanted == np.array(rgb)).all(axis=-1)
-        assert (shown[there] == np.array(rgb)).all(), "what has a color of the table keeps it exactly"
+        assert (seen[there] == np.array(rgb)).all(), "what has a color of the table keeps it exactly"
 
 
 def test_a_frame_does_not_depend_on_those_before(small):
-    moments = moments_between([small], first=0, last=40, every=10)
+    shown = read_steps_between([small], first=0, last=40, every=10)
     with plain_style():
-        forward, backward = film.Reel([small], moments), film.Reel([small], moments)
+        forward, backward = film.FilmFrames([small], shown), film.FilmFrames([small], shown)
         frames = [forward.frame(index) for index in range(len(forward))]
         for index in reversed(range(len(backward))):
             assert np.array_equal(backward.frame(index), frames[index])
@@ -138,7 +138,7 @@ def test_a_cut_off_recording_is_drawn_as_far_as_it_is_good(render, tmp_path):
     [
         (("a.mcap", "-o", "a.bmp"), "a.bmp: expected a file ending in .png, .svg, .pdf, .gif, .mp4, got '.bmp'"),
         (("a.mcap", "-o", "a"), "a: expected a file ending in .png, .svg, .pdf, .gif, .mp4, got no ending"),
-        (("a.mcap", "-o", "none/a.png"), "none/a.png: cannot be written: No such file or directory"),
+        (("a.mcap", "-o", "none/a.png"), "none/a.png: expected an existing folder none, got 'none'; make it first"),
         (("a.mcap", "-o", "a.png", "--step", "41"), "pictures: step: expected a step from 0 to 40, got 41"),
         (("cut.mcap", "-o", "a.png", "--steps", "3,18"), "pictures: step: expected a step from 0 to 17, got 18"),
         (
@@ -169,7 +169,10 @@ def test_a_file_is_not_replaced_unasked(render, tmp_path):
     for name in ("a.png", "a.gif"):
         (tmp_path / name).write_text("mine")
         done = render("a.mcap", "-o", name)
-        assert (done.code, done.err) == (2, f"fireworld: {name}: exists already; try --force\n")
+        assert (done.code, done.err) == (
+            2,
+            f"fireworld: {name}: expected a name that is free, got an existing file; use --force to replace it\n",
+        )
         assert (tmp_path / name).read_text() == "mine"
     assert render("a.mcap", "-o", "a.png", "--force").code == 0
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
@@ -195,14 +198,14 @@ def test_a_missing_library_is_named(render, monkeypatch, tmp_path, absent, name,
 def test_an_interrupted_film_leaves_nothing(render, monkeypatch, tmp_path, ending):
     if ending == "mp4":
         pytest.importorskip("av")
-    frame = film.Reel.frame
+    frame = film.FilmFrames.frame
 
-    def interrupted(reel, index):
+    def interrupted(frames, index):
         if index == 5:
             raise KeyboardInterrupt
-        return frame(reel, index)
+        return frame(frames, index)
 
-    monkeypatch.setattr(film.Reel, "frame", interrupted)
+    monkeypatch.setattr(film.FilmFrames, "frame", interrupted)
     done = render("a.mcap", "-o", f"film.{ending}", "--to", "12")
     assert (done.code, done.err.strip()) == (130, "interrupted")
     assert files(tmp_path) == []

@@ -171,11 +171,14 @@ def test_the_commands_of_a_page_repeat_the_run(fireworld, tmp_path):
     ("words", "message"),
     [
         (("a.mcap", "-o", "a.txt"), "a.txt: expected a file ending in .html, .htm, got '.txt'"),
-        (("a.mcap", "-o", "none/a.html"), "none/a.html: cannot be written: No such file or directory"),
+        (("a.mcap", "-o", "none/a.html"), "none/a.html: expected an existing folder none, got 'none'; make it first"),
         (("absent.mcap", "-o", "a.html"), "absent.mcap: cannot be read"),
         (("a.mcap", "b.mcap", "a.mcap", "-o", "a.html"), "Expected one or two recordings, got 3"),
         (("a.mcap", "other.mcap", "-o", "a.html"), "expected two recordings of one city"),
-        (("start.mcap", "-o", "mine.html"), "mine.html: exists already; try --force"),
+        (
+            ("start.mcap", "-o", "mine.html"),
+            "mine.html: expected a name that is free, got an existing file; use --force to replace it",
+        ),
     ],
     ids=lambda words: " ".join(words) if isinstance(words, tuple) else "",
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Final
 
@@ -14,7 +15,7 @@ STOREY_M: Final = 3.0
 SHADES_PERCENT: Final = (100, 82, 70, 58)
 """Brightness of a roof and of walls that face south, east or west, and north: light from above and the south."""
 
-_ROOF, _SOUTH, _SIDE, _NORTH = range(4)
+_SOUTH, _SIDE, _NORTH = range(1, 4)
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,13 @@ class CityMesh:
     vertex_building: NDArray[np.int32]  # (v,) building of each vertex, rising
     vertex_shade: NDArray[np.uint8]  # (v,) index into SHADES_PERCENT
     roof_xyz_m: NDArray[np.float32]  # (n, 3) middle of each roof
+
+
+def city_box_m(city: CityRecord, margin_m: float = 0.0) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the south-west and the north-east corner of the city with a margin."""
+    x, y = np.asarray(city.outline_x_m), np.asarray(city.outline_y_m)
+    low = float(x.min()) - margin_m, float(y.min()) - margin_m
+    return low, (float(x.max()) + margin_m, float(y.max()) + margin_m)
 
 
 def build_mesh(city: CityRecord) -> CityMesh:
@@ -47,32 +55,27 @@ def build_mesh(city: CityRecord) -> CityMesh:
     xyz = np.zeros((5 * len(x), 3), dtype=np.float32)
     shade = np.zeros(5 * len(x), dtype=np.uint8)
     xyz[roof] = np.column_stack([x, y, height])
-    ground = np.zeros(len(x))
-    corners = (
-        (x, y, ground),
-        (x[following], y[following], ground),
-        (x[following], y[following], height),
-        (x, y, height),
-    )
-    facing = _facing(x, y, following, _areas(x, y, following, building, len(n_corners))[building])
+    doubled_area = np.bincount(building, weights=x * y[following] - x[following] * y, minlength=len(n_corners))
+    facing = _facing(x, y, following, np.sign(doubled_area)[building])
+    next_x, next_y, ground = x[following], y[following], np.zeros(len(x))
+    corners = ((x, y, ground), (next_x, next_y, ground), (next_x, next_y, height), (x, y, height))
     for corner, columns in enumerate(corners):
         xyz[wall + corner] = np.column_stack(columns)
         shade[wall + corner] = facing
     walls = np.concatenate([np.column_stack([wall, wall + 1, wall + 2]), np.column_stack([wall, wall + 2, wall + 3])])
-    roofs = [roof[ptr[index] + triangulate(x[slice_], y[slice_])] for index, slice_ in _slices(ptr)]
+    roofs = [roof[a + triangulate(x[a:b], y[a:b])] for a, b in itertools.pairwise(ptr.tolist())]
+    roof_xyz_m = np.column_stack([city.center_x_m, city.center_y_m, np.asarray(city.floors) * STOREY_M])
     return CityMesh(
         vertex_xyz_m=xyz,
         triangle=np.concatenate([*roofs, walls]).astype(np.uint32),
         vertex_building=np.repeat(np.arange(len(n_corners), dtype=np.int32), 5 * n_corners),
         vertex_shade=shade,
-        roof_xyz_m=np.column_stack([city.center_x_m, city.center_y_m, np.asarray(city.floors) * STOREY_M]).astype(
-            "<f4"
-        ),
+        roof_xyz_m=roof_xyz_m.astype(np.float32),
     )
 
 
 def triangulate(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Cut a simple polygon into triangles: a fan if it is convex, ears otherwise.
+    """Cut a simple polygon into triangles: a fan if it is convex, ears if it is not.
 
     Args:
         x: (c,) corners in either sense of rotation; the closing corner is not repeated.
@@ -81,71 +84,43 @@ def triangulate(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.in
     Returns:
         (c - 2, 3) indices of corners.
     """
-    n = len(x)
-    turns = _turn(np.roll(x, 1), np.roll(y, 1), x, y, np.roll(x, -1), np.roll(y, -1))
+    n, xy = len(x), np.column_stack([x, y])
+    turns = _turn(np.roll(xy, 1, axis=0), xy, np.roll(xy, -1, axis=0))
     if np.all(turns >= 0) or np.all(turns <= 0):
         return np.column_stack([np.zeros(n - 2, dtype=np.int64), np.arange(1, n - 1), np.arange(2, n)])
-    area = float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
-    left = list(range(n)) if area > 0 else list(range(n - 1, -1, -1))
+    doubled_area = float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
+    left = list(range(n)) if doubled_area > 0 else list(range(n - 1, -1, -1))
     triangles = []
     while len(left) > 3:
-        ear = next((at for at in range(len(left)) if _is_ear(x, y, left, at)), 0)
+        ear = next((at for at in range(len(left)) if _is_ear(xy, left, at)), 0)
         triangles.append((left[ear - 1], left[ear], left[(ear + 1) % len(left)]))
         del left[ear]
     triangles.append((left[0], left[1], left[2]))
     return np.array(triangles, dtype=np.int64)
 
 
-def _is_ear(x: NDArray[np.float64], y: NDArray[np.float64], left: list[int], at: int) -> bool:
-    """Whether a corner of a counterclockwise polygon can be cut off: it bulges and no other corner lies in the cut."""
-    a, b, c = left[at - 1], left[at], left[(at + 1) % len(left)]
-    if _turn(x[a], y[a], x[b], y[b], x[c], y[c]) <= 0:
+def _is_ear(xy: NDArray[np.float64], left: list[int], at: int) -> bool:
+    """Return whether a corner of a counterclockwise polygon can be cut off: it bulges, and the cut is empty."""
+    corners = left[at - 1], left[at], left[(at + 1) % len(left)]
+    a, b, c = xy[list(corners)]
+    if _turn(a, b, c) <= 0:
         return False
-    others = np.array([corner for corner in left if corner not in {a, b, c}])
-    px, py = x[others], y[others]
-    inside = (
-        (_turn(x[a], y[a], x[b], y[b], px, py) >= 0)
-        & (_turn(x[b], y[b], x[c], y[c], px, py) >= 0)
-        & (_turn(x[c], y[c], x[a], y[a], px, py) >= 0)
-    )
+    others = xy[[corner for corner in left if corner not in corners]]
+    inside = (_turn(a, b, others) >= 0) & (_turn(b, c, others) >= 0) & (_turn(c, a, others) >= 0)
     return not bool(np.any(inside))
 
 
-def _turn(
-    ax: NDArray[np.float64],
-    ay: NDArray[np.float64],
-    bx: NDArray[np.float64],
-    by: NDArray[np.float64],
-    cx: NDArray[np.float64],
-    cy: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Twice the signed area of the triangles a, b, c: positive where the way a-b-c turns left."""
-    return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-
-
-def _areas(
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
-    following: NDArray[np.int64],
-    building: NDArray[np.int64],
-    n_buildings: int,
-) -> NDArray[np.float64]:
-    """Twice the signed area of each outline, (n,): positive where the corners run counterclockwise."""
-    areas: NDArray[np.float64] = np.bincount(
-        building, weights=x * y[following] - x[following] * y, minlength=n_buildings
-    ).astype(np.float64)
-    return areas
+def _turn(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return twice the signed area of triangles, (..., 2) each to (...): positive where the way a-b-c turns left."""
+    ab, ac = b - a, c - a
+    doubled: NDArray[np.float64] = ab[..., 0] * ac[..., 1] - ab[..., 1] * ac[..., 0]
+    return doubled
 
 
 def _facing(
-    x: NDArray[np.float64], y: NDArray[np.float64], following: NDArray[np.int64], area: NDArray[np.float64]
+    x: NDArray[np.float64], y: NDArray[np.float64], following: NDArray[np.int64], sense: NDArray[np.float64]
 ) -> NDArray[np.uint8]:
-    """Shade of each wall, (corners,), by the direction it faces."""
-    outward_x, outward_y = (y[following] - y) * np.sign(area), (x - x[following]) * np.sign(area)
+    """Return the shade of each wall, (corners,), by the direction it faces; sense 1 is counterclockwise."""
+    outward_x, outward_y = (y[following] - y) * sense, (x - x[following]) * sense
     sideways = np.abs(outward_x) > np.abs(outward_y)
     return np.where(sideways, _SIDE, np.where(outward_y < 0, _SOUTH, _NORTH)).astype(np.uint8)
-
-
-def _slices(ptr: NDArray[np.int64]) -> list[tuple[int, slice]]:
-    """Each building's index and corners."""
-    return [(index, slice(int(ptr[index]), int(ptr[index + 1]))) for index in range(len(ptr) - 1)]

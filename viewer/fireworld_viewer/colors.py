@@ -76,7 +76,7 @@ BRIGADE_RGB: Final[tuple[Rgb, ...]] = (
     (10, 162, 178),
     (226, 92, 82),
 )
-"""Colors of the brigades in plots and logs, to be read on black and on white; repeated when there are more."""
+"""Colors of the brigades in plots and logs, readable on black and on white; repeated when there are more."""
 
 TOTAL_RGB: Final[Rgb] = (140, 110, 200)
 GREY_RGB: Final[Rgb] = (128, 124, 120)
@@ -94,10 +94,11 @@ DIFFERENCE_RGB: Final[tuple[Rgb, ...]] = (BETTER_RGB, SAME_RGB, WORSE_RGB)
 """By difference + 1: -1 less damage in the second run, 0 the same, +1 more."""
 
 
-def packed(rgb: Rgb) -> int:
-    """Pack a color as 0xRRGGBBAA, opaque."""
-    red, green, blue = rgb
-    return red << 24 | green << 16 | blue << 8 | 0xFF
+def packed_array(rgb: NDArray[Any]) -> UInt32Array:
+    """Pack colors as 0xRRGGBBAA, opaque: (..., 3) to (...)."""
+    red, green, blue = np.moveaxis(rgb.astype(np.uint32), -1, 0)
+    joined: UInt32Array = red << 24 | green << 16 | blue << 8 | 0xFF
+    return joined.astype(np.uint32)
 
 
 def packed_table(colors: Sequence[Rgb]) -> UInt32Array:
@@ -105,13 +106,7 @@ def packed_table(colors: Sequence[Rgb]) -> UInt32Array:
 
     Rerun is given packed colors only: it guesses at lists, and takes three numbers for one color.
     """
-    return np.array([packed(rgb) for rgb in colors], dtype=np.uint32)
-
-
-def paler(rgb: Rgb) -> Rgb:
-    """Mix a color half and half with grey: the same thing in the second of two runs, still to be read on any ground."""
-    red, green, blue = ((part + grey) // 2 for part, grey in zip(rgb, GREY_RGB, strict=True))
-    return red, green, blue
+    return packed_array(np.array(colors).reshape(-1, 3))
 
 
 def single(rgb: Rgb) -> UInt32Array:
@@ -119,28 +114,19 @@ def single(rgb: Rgb) -> UInt32Array:
     return packed_table((rgb,))
 
 
-def shaded_table(colors: tuple[Rgb, ...], shades_percent: tuple[int, ...]) -> UInt32Array:
+def shaded_table(colors: Sequence[Rgb], shades_percent: Sequence[int]) -> UInt32Array:
     """Pack every color at every brightness: (len(colors), len(shades_percent)) uint32."""
-    return np.array(
-        [
-            [packed((red * shade // 100, green * shade // 100, blue * shade // 100)) for shade in shades_percent]
-            for red, green, blue in colors
-        ],
-        dtype=np.uint32,
-    )
+    return packed_array(np.array(colors)[:, np.newaxis] * np.array(shades_percent)[:, np.newaxis] // 100)
 
 
-def packed_array(rgb: NDArray[np.uint8]) -> UInt32Array:
-    """Pack an array of colors: (..., 3) to (...)."""
-    parts = rgb.astype(np.uint32)
-    joined = parts[..., 0] << 24 | parts[..., 1] << 16 | parts[..., 2] << 8 | 0xFF
-    return joined.astype(np.uint32)
+def paler(rgb: Rgb) -> Rgb:
+    """Mix a color half and half with grey: the same thing in the second of two runs, readable on any ground."""
+    red, green, blue = ((part + grey) // 2 for part, grey in zip(rgb, GREY_RGB, strict=True))
+    return red, green, blue
 
 
 def health_rgb(hp: NDArray[Any], hp_start: NDArray[Any]) -> NDArray[np.uint8]:
-    """Color people by the share of their health left: green when well, white at half, magenta when dying.
-
-    The dead are black.
+    """Color people by the share of their health left: green well, white half, magenta dying, black dead.
 
     Args:
         hp: (..., n) health points now.

@@ -12,7 +12,7 @@ from fireworld_recorder.chain import SCENE_PREFIX
 from fireworld_recorder.writer import Channel
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import STOREY_M, build_mesh, triangulate
-from fireworld_viewer.story import narration as telling
+from fireworld_viewer.story.narration import event_lines
 from numpy.typing import NDArray
 
 from fireworld.records import ACTIVITIES, CityRecord, MemoryRecording, RunHeader, StepRecord
@@ -137,7 +137,7 @@ class FoxgloveScene:
 
     def _log_lines(self, record: StepRecord) -> Iterator[bytes]:
         """A line for each event."""
-        for step, level, text, _ in telling.event_lines(MemoryRecording(self._header, self._city, [record])):
+        for step, level, text, _ in event_lines(MemoryRecording(self._header, self._city, [record])):
             yield foxglove.log_line(step, level=_LEVELS[level], text=text, name="fireworld")
 
 

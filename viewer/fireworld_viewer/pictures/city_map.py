@@ -1,4 +1,4 @@
-"""A city from above on matplotlib axes: its streets drawn once, what changes from step to step set anew."""
+"""A city from above on matplotlib axes: streets are drawn once, what changes is set step by step."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from fireworld.records import ACTIVITIES, CityRecord, StepRecord
 from fireworld_viewer import colors
+from fireworld_viewer.city_mesh import city_box_m
+from fireworld_viewer.pictures.figure_files import INK
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.collections import PolyCollection
 
-INK: Final = "#333333"
 STREET: Final = "#ffffff"
 GROUND: Final = "#dedad2"
 JET_EDGE: Final = "#174a7c"
@@ -34,8 +35,8 @@ _SPRAYING: Final = ACTIVITIES.index("spraying")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Crews:
-    """The brigades of a moment; n of them."""
+class BrigadeMarks:
+    """The brigades on a map; n of them."""
 
     xy_m: NDArray[np.float64]
     """(n, 2) positions."""
@@ -44,10 +45,10 @@ class Crews:
     tank_share: NDArray[np.float64] | None = None
     """(n,) share of the tank that is full, 0..1; unknown if left out."""
     target: NDArray[Any] | None = None
-    """(n,) index of the building each goes for, -1 none; unknown if left out."""
+    """(n,) index of the building that each has as its target, -1 none; unknown if left out."""
 
-    def goes_for(self, activity: int) -> NDArray[np.intp]:
-        """Which brigades do this, for a target: (k,) indices."""
+    def with_target(self, activity: int) -> NDArray[np.intp]:
+        """Return the indices of the brigades that do this and have a target: (k,)."""
         if self.activity is None or self.target is None:
             return np.zeros(0, dtype=np.intp)
         return np.flatnonzero((self.activity == activity) & (self.target >= 0))
@@ -55,13 +56,13 @@ class Crews:
 
 @dataclass(frozen=True, kw_only=True)
 class MapState:
-    """What a map shows of a moment."""
+    """What a map shows of a step."""
 
     fieryness: NDArray[Any]
     """(n,) official codes 0..8."""
     civilian_hp: NDArray[Any]
     """(n_civilians,) health points."""
-    crews: Crews | None = None
+    brigades: BrigadeMarks | None = None
     """None are drawn if left out."""
 
 
@@ -74,7 +75,7 @@ def state_of(city: CityRecord, record: StepRecord) -> MapState:
     return MapState(
         fieryness=record.buildings.fieryness,
         civilian_hp=record.civilians.hp,
-        crews=Crews(
+        brigades=BrigadeMarks(
             xy_m=np.column_stack([brigades.x_m, brigades.y_m]).astype(np.float64),
             activity=brigades.activity,
             tank_share=np.clip(brigades.tank_litres / full, 0.0, 1.0),
@@ -85,10 +86,8 @@ def state_of(city: CityRecord, record: StepRecord) -> MapState:
 
 def extent_m(city: CityRecord) -> tuple[float, float, float, float]:
     """Return what a map shows of the plane: west, east, south, north."""
-    x, y = np.asarray(city.outline_x_m), np.asarray(city.outline_y_m)
-    edges = x.min() - MARGIN_M, x.max() + MARGIN_M, y.min() - 2 * MARGIN_M, y.max() + MARGIN_M
-    west, east, south, north = (float(edge) for edge in edges)
-    return west, east, south, north
+    (west, south), (east, north) = city_box_m(city, MARGIN_M)
+    return west, east, south - MARGIN_M, north
 
 
 class CityMap:
@@ -129,24 +128,23 @@ class CityMap:
                 *self._numbers]  # fmt: skip
 
     def show(self, state: MapState) -> None:
-        """Set the map to a moment."""
-        table = _table(colors.FIERYNESS_RGB)
-        faces = table[np.asarray(state.fieryness, dtype=np.int64)]
+        """Set the map to a step."""
+        faces = _unit_rgb(colors.FIERYNESS_RGB)[np.asarray(state.fieryness, dtype=np.int64)]
         faces[np.asarray(self.city.refuge_building, dtype=np.int64)] = np.array(colors.REFUGE_RGB) / 255.0
         self._buildings.set_facecolor(list(map(tuple, faces)))
         hp = np.asarray(state.civilian_hp)
         self._civilians.set_facecolor(colors.health_rgb(hp, np.asarray(self.city.civilian_hp)) / 255.0)
         self._civilians.set_edgecolor(["white" if points <= 0 else INK for points in hp.tolist()])  # seen on black
         self._civilians.set_paths([_marker("X" if points <= 0 else "o") for points in hp.tolist()])
-        self._show_crews(state.crews or Crews(xy_m=np.zeros((0, 2))))
+        self._show_brigades(state.brigades or BrigadeMarks(xy_m=np.zeros((0, 2))))
 
-    def _show_crews(self, crews: Crews) -> None:
-        xy = _side_by_side(crews.xy_m, self._m_per_point * np.array([21.0, 15.0]))
+    def _show_brigades(self, brigades: BrigadeMarks) -> None:
+        xy = _side_by_side(brigades.xy_m, self._m_per_point * np.array([21.0, 15.0]))
         n = len(xy)
-        activity = np.full(n, _SPRAYING) if crews.activity is None else np.asarray(crews.activity, dtype=np.int64)
+        activity = np.full(n, _SPRAYING) if brigades.activity is None else np.asarray(brigades.activity, dtype=np.int64)
         self._balls.set_offsets(xy)
-        self._balls.set_facecolor(_table(colors.ACTIVITY_RGB)[activity])
-        share = np.zeros(0) if crews.tank_share is None else crews.tank_share
+        self._balls.set_facecolor(_unit_rgb(colors.ACTIVITY_RGB)[activity])
+        share = np.zeros(0) if brigades.tank_share is None else brigades.tank_share
         self._gauges.set_verts(list(self._bars(xy, np.ones(len(share)))))
         self._water.set_verts(list(self._bars(xy, share)))
         for index, number in enumerate(self._numbers):
@@ -159,8 +157,8 @@ class CityMap:
             ((self._way_casing, self._ways), _DRIVING),
             ((self._jet_casing, self._jets), _SPRAYING),
         ):
-            chosen = crews.goes_for(what)
-            target = aim[crews.target[chosen]] if crews.target is not None else np.zeros((0, 2))
+            chosen = brigades.with_target(what)
+            target = aim[brigades.target[chosen]] if brigades.target is not None else np.zeros((0, 2))
             for line in lines:
                 line.set_segments(list(np.stack([xy[chosen], target], axis=1)))
 
@@ -232,7 +230,7 @@ def contrasting(rgb: Sequence[int]) -> str:
     return INK if 299 * red + 587 * green + 114 * blue > 140_000 else "white"
 
 
-def _table(rgb: Sequence[colors.Rgb]) -> NDArray[np.float64]:
+def _unit_rgb(rgb: Sequence[colors.Rgb]) -> NDArray[np.float64]:
     return np.array(rgb) / 255.0
 
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from fireworld.records import Array, Recording
-from fireworld_viewer.pictures.city_map import INK
-from fireworld_viewer.pictures.figure_files import new_figure
+from fireworld_viewer.pictures.figure_files import INK, new_figure, open_frame
+from fireworld_viewer.story.series import LABELS, series
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,11 +27,10 @@ _ROW_INCHES: Final = 2.3
 
 
 @dataclass(frozen=True)
-class Line:
+class Curve:
     """A curve of a panel."""
 
     label: str
-    steps: Array
     numbers: Array
     color: str
     style: Any = "-"
@@ -43,7 +42,7 @@ class Panel:
     """What one panel shows."""
 
     title: str
-    lines: Callable[[Recording], list[Line]]
+    curves: Callable[[Recording], list[Curve]]
     from_zero: bool = False
     counts: bool = False
 
@@ -65,104 +64,86 @@ def draw_curves(recordings: Sequence[Recording]) -> Figure:
     grid = figure.subplots(n_rows, 2, sharex=True, sharey="row" if pair else "none", squeeze=False)
     for index, panel in enumerate(PANELS):
         places = grid[index] if pair else [grid[divmod(index, 2)]]
-        shown = [panel.lines(one) for one in recordings]
-        alike = len({tuple(line.label for line in lines) for lines in shown}) == 1
-        for axes, lines, letter in zip(places, shown, "AB", strict=False):
-            named = axes is places[-1] or not alike
-            _draw_panel(axes, panel, lines, letter=letter if pair else "", named=named)
-        limits = _limits(panel, [line.numbers for lines in shown for line in lines])
+        shown = [panel.curves(one) for one in recordings]
+        alike = len({tuple(curve.label for curve in curves) for curves in shown}) == 1
+        for axes, recording, curves, letter in zip(places, recordings, shown, "AB", strict=False):
+            for curve in curves:
+                style: dict[str, Any] = {"color": curve.color, "linestyle": curve.style, "linewidth": curve.width}
+                axes.plot(np.asarray(recording.steps), curve.numbers, label=curve.label, **style)
+            named = bool(curves) and (axes is places[-1] or not alike)
+            _dress_panel(axes, f"{letter}: {panel.title}" if pair else panel.title, counts=panel.counts, named=named)
+        limits = _limits([curve.numbers for curves in shown for curve in curves], from_zero=panel.from_zero)
         for axes in places:
             axes.set_ylim(limits)
     figure.text(0.475, 0.18 / high, "step (a simulated minute)", fontsize=10, color=INK, ha="center", va="center")
     return figure
 
 
-def _draw_panel(axes: Axes, panel: Panel, lines: Sequence[Line], *, letter: str = "", named: bool = True) -> None:
+def _dress_panel(axes: Axes, title: str, *, counts: bool, named: bool) -> None:
+    """Set title, legend, ticks and grid of a panel."""
     from matplotlib.ticker import MaxNLocator
 
-    for line in lines:
-        style: dict[str, Any] = {"color": line.color, "linestyle": line.style, "linewidth": line.width}
-        axes.plot(line.steps, line.numbers, label=line.label, **style)
-    axes.set_title(f"{letter}: {panel.title}" if letter else panel.title, fontsize=10.5, loc="left", color=INK)
-    if named and lines:
+    axes.set_title(title, fontsize=10.5, loc="left", color=INK)
+    if named:
         axes.legend(fontsize=8.5, frameon=False, labelcolor=INK, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    axes.yaxis.set_major_locator(MaxNLocator(6, integer=panel.counts))
+    axes.yaxis.set_major_locator(MaxNLocator(6, integer=counts))
     axes.margins(x=0.01)
-    axes.spines[["top", "right"]].set_visible(False)
+    open_frame(axes)
     axes.grid(axis="y", color="#e3dfd6", linewidth=0.8)
     axes.set_axisbelow(True)
     axes.set_facecolor("white")
     axes.tick_params(labelsize=9, colors=INK, labelbottom=True)
-    axes.yaxis.set_major_formatter(_with_commas)
+    axes.yaxis.set_major_formatter(lambda number, _: f"{number:,.10g}")
 
 
-def _limits(panel: Panel, numbers: Sequence[Array]) -> tuple[float, float]:
+def _limits(numbers: Sequence[Array], *, from_zero: bool) -> tuple[float, float]:
     """Return the ends of the axis: zero is in it, and a little more than the greatest number."""
     every = np.concatenate([np.zeros(1), *(np.asarray(row, dtype=np.float64) for row in numbers)])
     low, high = float(every.min()), float(every.max())
-    if panel.from_zero:
-        return 0.0, 1.05 * max(1.0, high)
-    return 1.05 * min(-1.0, low), 1.05 * high
+    return (0.0, 1.05 * max(1.0, high)) if from_zero else (1.05 * min(-1.0, low), 1.05 * high)
 
 
-def _with_commas(number: float, _: float) -> str:
-    return f"{number:,.10g}"
-
-
-def _line(recording: Recording, topic: str, name: str, label: str, color: str, style: str = "-") -> Line:
-    return Line(label, np.asarray(recording.steps), recording.column(topic, name), color, style)
-
-
-def _score(recording: Recording) -> list[Line]:
-    return [
-        _line(recording, "/score", "score_max", "greatest", "#9a9a9a", ":"),
-        _line(recording, "/score", "score", "score", INK),
-        _line(recording, "/score", "score_now", "by today's rule", "#8a6fb0", "--"),
+def _fields(styles: Mapping[str, tuple[str, str]]) -> Callable[[Recording], list[Curve]]:
+    """Draw fields of a recording: color and style by field."""
+    return lambda recording: [
+        Curve(LABELS[field], series(recording, field), color, style) for field, (color, style) in styles.items()
     ]
 
 
-def _buildings(recording: Recording) -> list[Line]:
-    return [
-        _line(recording, "/score", "n_burning", "burning", BURNING),
-        _line(recording, "/score", "n_burnt_out", "burnt out", BURNT_OUT, "--"),
-        _line(recording, "/score", "n_water_damaged", "water-damaged", WATER_DAMAGED, "-."),
-    ]
-
-
-def _reward_of_buildings(recording: Recording) -> list[Line]:
-    return [
-        _line(recording, "/rewards", "burning", "burning", BURNING),
-        _line(recording, "/rewards", "burnt_out", "burnt out", BURNT_OUT, "--"),
-        _line(recording, "/rewards", "water_damaged", "water-damaged", WATER_DAMAGED, "-."),
-    ]
-
-
-def _reward(recording: Recording) -> list[Line]:
-    return [
-        _line(recording, "/rewards", "civilians", "civilians", PEOPLE),
-        _line(recording, "/rewards", "total", "all terms", INK, "--"),
-    ]
-
-
-def _sum_of_rewards(recording: Recording) -> list[Line]:
-    return [_line(recording, "/rewards", "sum_so_far", "return", INK)]
-
-
-def _tanks(recording: Recording) -> list[Line]:
-    """Curves thinner and thinner: of brigades that refill together, all can be seen."""
-    steps, litres = np.asarray(recording.steps), np.asarray(recording.column("/brigades", "tank_litres"))
+def _tanks(recording: Recording) -> list[Curve]:
+    """Draw curves thinner and thinner: of brigades that refill together, all can be seen."""
     n = len(TANKS)
     return [
-        Line(f"brigade {k}", steps, litres[:, k], TANKS[k % n], "-" if k < n else "--", 2.8 - 0.6 * (k % 4))
-        for k in range(litres.shape[1])
+        Curve(f"brigade {k}", litres, TANKS[k % n], "-" if k < n else "--", 2.8 - 0.6 * (k % 4))
+        for k, litres in enumerate(series(recording, "brigades.tank_litres").T)
     ]
 
 
+_BUILDING_STYLES: Final = {
+    "n_burning": (BURNING, "-"),
+    "n_burnt_out": (BURNT_OUT, "--"),
+    "n_water_damaged": (WATER_DAMAGED, "-."),
+}
 PANELS: Final = (
-    Panel("score", _score, from_zero=True),
-    Panel("buildings", _buildings, from_zero=True, counts=True),
-    Panel("reward of the step: buildings", _reward_of_buildings),
-    Panel("reward of the step: civilians, and in all", _reward),
-    Panel("reward so far (return)", _sum_of_rewards),
+    Panel(
+        "score",
+        _fields({"score.score_max": ("#9a9a9a", ":"), "score.score": (INK, "-"), "score.score_now": ("#8a6fb0", "--")}),
+        from_zero=True,
+    ),
+    Panel(
+        "buildings",
+        _fields({f"score.{name}": style for name, style in _BUILDING_STYLES.items()}),
+        from_zero=True,
+        counts=True,
+    ),
+    Panel(
+        "reward of the step: buildings",
+        _fields({f"rewards.{name.removeprefix('n_')}": style for name, style in _BUILDING_STYLES.items()}),
+    ),
+    Panel(
+        "reward of the step: civilians, and in all",
+        _fields({"rewards.civilians": (PEOPLE, "-"), "rewards.total": (INK, "--")}),
+    ),
+    Panel("reward so far (return)", _fields({"rewards.sum_so_far": (INK, "-")})),
     Panel("water in the tanks, litres", _tanks, from_zero=True),
 )

@@ -1,30 +1,38 @@
-"""Figures as files: the same figure gives the same bytes, and no half-written file bears a name."""
+"""Figures and their files: drawn without a screen, and the same figure gives the same bytes."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from fireworld.errors import OutputError, ViewError, expected
+from fireworld.errors import ViewError
+from fireworld.files import check_output, written_beside
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 DPI: Final = 120
 PAPER: Final = "#f4f2ee"
+INK: Final = "#333333"
+PAIR_COLORS: Final = ("#1f6feb", "#c2571a")
+"""Of curves of two runs or teams."""
 STILLS: Final[Mapping[str, Mapping[str, Any]]] = {
     ".png": {"Software": "fireworld"},
     ".svg": {"Creator": "fireworld", "Date": None},
     ".pdf": {"Creator": "fireworld", "CreationDate": None},
 }
 """Endings of still pictures, and what is written into such a file besides the picture: no time, no version."""
+_MISSING: Final = "pictures: matplotlib is not installed; try pip install 'fireworld[figures]'"
 
 
-def new_figure(width_inches: float, height_inches: float, *, dpi: int = DPI) -> Figure:
-    """Return an empty figure that needs no screen.
+def new_figure(
+    width_inches: float, height_inches: float, *, dpi: int = DPI, paper: str = PAPER, layout: Any = None
+) -> Figure:
+    """Return an empty figure that needs no screen, on paper of a color; a "constrained" layout makes room for labels.
 
     Raises:
         ViewError: matplotlib is not installed.
@@ -33,10 +41,15 @@ def new_figure(width_inches: float, height_inches: float, *, dpi: int = DPI) -> 
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
     except ImportError:
-        raise ViewError("pictures: matplotlib is not installed; try pip install 'fireworld[figures]'") from None
-    figure = Figure(figsize=(width_inches, height_inches), dpi=dpi, facecolor=PAPER)
+        raise ViewError(_MISSING) from None
+    figure = Figure(figsize=(width_inches, height_inches), dpi=dpi, facecolor=paper, layout=layout)
     FigureCanvasAgg(figure)
     return figure
+
+
+def open_frame(axes: Axes) -> None:
+    """Leave out the lines above and to the right of a panel."""
+    axes.spines[["top", "right"]].set_visible(False)
 
 
 @contextmanager
@@ -50,7 +63,7 @@ def plain_style() -> Iterator[None]:
         import matplotlib as mpl
         from matplotlib import style
     except ImportError:
-        raise ViewError("pictures: matplotlib is not installed; try pip install 'fireworld[figures]'") from None
+        raise ViewError(_MISSING) from None
     with style.context("default"), mpl.rc_context({"svg.hashsalt": "fireworld"}):
         yield
 
@@ -72,34 +85,3 @@ def png_bytes(figure: Figure) -> bytes:
     data = io.BytesIO()
     figure.savefig(data, format="png", metadata=dict(STILLS[".png"]))
     return data.getvalue()
-
-
-def check_output(path: Path, *, endings: Collection[str], force: bool) -> None:
-    """See that a file may be written, before there is any work in it.
-
-    Raises:
-        OutputError: its ending is none of these, its folder is missing, or it exists and shall not be replaced.
-    """
-    if path.suffix.lower() not in endings:
-        raise OutputError(expected(str(path), "", f"a file ending in {', '.join(endings)}", path.suffix or "no ending"))
-    if not path.parent.is_dir():
-        raise OutputError(f"{path}: cannot be written: No such file or directory")
-    if path.exists() and not force:
-        raise OutputError(f"{path}: exists already; try --force")
-
-
-@contextmanager
-def written_beside(path: Path) -> Iterator[Path]:
-    """Yield where to write what gets the name `path` once it is whole; nothing is left of it after an error or Ctrl-C.
-
-    Raises:
-        OutputError: it cannot be written.
-    """
-    partial = path.with_name(path.name + ".partial")
-    try:
-        yield partial
-        partial.replace(path)
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from None
-    finally:
-        partial.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Films of recordings, GIF or MP4: the city is drawn once, and on it what changes, frame by frame."""
+"""Films of recordings, GIF or MP4: the city is drawn once, and what changes is drawn on it frame by frame."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fireworld.errors import ViewError
+from fireworld.files import written_beside
 from fireworld.records import Recording
 from fireworld_viewer import colors
-from fireworld_viewer.pictures.city_map import GROUND, INK, STREET
-from fireworld_viewer.pictures.figure_files import PAPER, written_beside
+from fireworld_viewer.pictures.city_map import GROUND, STREET
+from fireworld_viewer.pictures.figure_files import INK, PAPER
+from fireworld_viewer.pictures.map_grid import MapGrid
 from fireworld_viewer.pictures.map_legend import LABELS, count_marks
 from fireworld_viewer.pictures.maps import cells_of
-from fireworld_viewer.pictures.moments import Moment
-from fireworld_viewer.pictures.sheet import Sheet
+from fireworld_viewer.story.steps import ShownStep
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -31,7 +32,7 @@ _PAIR_INCHES: Final = 4.6
 _HOLD_SECONDS: Final = 2.0
 """How long the last frame stays."""
 _TRANSPARENT: Final = 255
-"""Number of the color that lets the frame before be seen; it comes after all others."""
+"""Number of the color that shows the frame before; it comes after all others."""
 _NEAR: Final = 6
 Frame = NDArray[np.uint8]
 """(height, width, 3) sRGB; both even."""
@@ -39,7 +40,7 @@ Frame = NDArray[np.uint8]
 
 def save_film(
     recordings: Sequence[Recording],
-    moments: Sequence[Moment],
+    steps: Sequence[ShownStep],
     path: Path,
     *,
     fps: float = FPS,
@@ -49,7 +50,7 @@ def save_film(
 
     Args:
         recordings: one, or two of the same city.
-        moments: one for each frame, from moments.moments_between.
+        steps: one for each frame, from `story.steps.read_steps_between`.
         path: the file; one that exists is replaced.
         fps: frames a second.
         on_frame: called after each frame.
@@ -61,41 +62,41 @@ def save_film(
     write = FILMS[path.suffix.lower()]
     if write is _write_mp4:
         import_av()
-    reel = Reel(recordings, moments)
+    frames = FilmFrames(recordings, steps)
     with written_beside(path) as partial:
-        write(reel, partial, fps, on_frame)
+        write(frames, partial, fps, on_frame)
 
 
-class Reel:
+class FilmFrames:
     """The frames of a film, drawn when asked for; the city is drawn once.
 
     Args:
         recordings: one, or two of the same city.
-        moments: one for each frame.
+        steps: one for each frame.
 
     Raises:
         ViewError: matplotlib is not installed.
     """
 
-    def __init__(self, recordings: Sequence[Recording], moments: Sequence[Moment]) -> None:
-        self._recordings, self._moments = recordings, moments
+    def __init__(self, recordings: Sequence[Recording], steps: Sequence[ShownStep]) -> None:
+        self._recordings, self._steps = recordings, steps
         inches = _MAP_INCHES if len(recordings) == 1 else _PAIR_INCHES
-        there = {label for moment in moments for cell in cells_of(recordings, moment)
+        there = {label for step in steps for cell in cells_of(recordings, step)
                  for label in count_marks(cell.city, cell.state)}  # fmt: skip
         labels = [label for label in LABELS if label in there]
-        first = cells_of(recordings, moments[0])
-        self._sheet = Sheet(first, columns=len(recordings), map_inches=inches, labels=labels, dpi=_DPI)
-        self._canvas = cast("Any", self._sheet.figure.canvas)  # matplotlib does not say its types
-        for _, item in self._sheet.changing:
+        first = cells_of(recordings, steps[0])
+        self._grid = MapGrid(first, columns=len(recordings), map_inches=inches, labels=labels, dpi=_DPI)
+        self._canvas = cast("Any", self._grid.figure.canvas)  # matplotlib has no type for it
+        for _, item in self._grid.changing:
             item.set_animated(True)
-        for row in self._sheet.legend_rows:  # not drawn, but given their places
+        for row in self._grid.legend_rows:  # not drawn, but given their places
             row.set_alpha(0.0)
         self._canvas.draw()
-        self._ground = self._canvas.copy_from_bbox(self._sheet.figure.bbox)
+        self._ground = self._canvas.copy_from_bbox(self._grid.figure.bbox)
         self._rows: dict[tuple[int, str], Any] = {}
 
     def __len__(self) -> int:
-        return len(self._moments)
+        return len(self._steps)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -106,15 +107,15 @@ class Reel:
     def frame(self, index: int) -> Frame:
         """Draw a frame."""
         self._canvas.restore_region(self._ground)
-        self._sheet.show(cells_of(self._recordings, self._moments[index]))
-        for axes, item in self._sheet.changing:
+        self._grid.show(cells_of(self._recordings, self._steps[index]))
+        for axes, item in self._grid.changing:
             axes.draw_artist(item)
         self._draw_legend()
         return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
 
     def _draw_legend(self) -> None:
-        """Draw the rows of the legend, those that were drawn before as they were: letters take most of the time."""
-        for index, row in enumerate(self._sheet.legend_rows):
+        """Draw the rows of the legend; copy those that were drawn before: letters take most of the time."""
+        for index, row in enumerate(self._grid.legend_rows):
             key = index, row.get_text()
             if key in self._rows:
                 self._canvas.restore_region(self._rows[key])
@@ -139,11 +140,11 @@ def import_av() -> ModuleType:
     return module
 
 
-def _write_gif(reel: Reel, path: Path, fps: float, on_frame: Callable[[], object]) -> None:
+def _write_gif(frames: FilmFrames, path: Path, fps: float, on_frame: Callable[[], object]) -> None:
     """Write a GIF: one palette for all frames, and of each frame what has changed."""
-    samples = [reel.frame(place) for place in sorted({round(k * (len(reel) - 1) / 2) for k in range(3)})]
-    pictures = _differences(reel, _palette(samples), on_frame)
-    durations = [round(1000.0 / fps)] * (len(reel) - 1) + [round(1000.0 * _HOLD_SECONDS)]
+    samples = [frames.frame(place) for place in sorted({round(k * (len(frames) - 1) / 2) for k in range(3)})]
+    pictures = _differences(frames, _palette(samples), on_frame)
+    durations = [round(1000.0 / fps)] * (len(frames) - 1) + [round(1000.0 * _HOLD_SECONDS)]
     with path.open("wb") as file:
         next(pictures).save(
             file, format="GIF", save_all=True, append_images=pictures, duration=durations, loop=0, disposal=1,
@@ -151,16 +152,16 @@ def _write_gif(reel: Reel, path: Path, fps: float, on_frame: Callable[[], object
         )  # fmt: skip
 
 
-def _differences(reel: Reel, palette: Image, on_frame: Callable[[], object]) -> Iterator[Image]:
-    """Yield the frames in the colors of a palette; what is as it was in the frame before is transparent."""
+def _differences(frames: FilmFrames, palette: Image, on_frame: Callable[[], object]) -> Iterator[Image]:
+    """Yield the frames in the colors of a palette; what is the same as in the frame before is transparent."""
     from PIL import Image
 
-    table = np.zeros((256, 3), dtype=np.uint8)  # all of it, so that the last number is one of the file's too
+    table = np.zeros((256, 3), dtype=np.uint8)  # all of it, so that the last number is in the file, too
     own = np.array(palette.getpalette(), dtype=np.uint8).reshape(-1, 3)
     table[: len(own)] = own
     before: NDArray[np.uint8] | None = None
-    for index in range(len(reel)):
-        now = np.asarray(Image.fromarray(reel.frame(index)).quantize(palette=palette, dither=Image.Dither.NONE))
+    for index in range(len(frames)):
+        now = np.asarray(Image.fromarray(frames.frame(index)).quantize(palette=palette, dither=Image.Dither.NONE))
         picture = Image.fromarray(now if before is None else np.where(now == before, np.uint8(_TRANSPARENT), now))
         picture.putpalette(table.tobytes())
         picture.info["transparency"] = _TRANSPARENT
@@ -186,23 +187,23 @@ def _palette(samples: Sequence[Frame]) -> Image:
     return palette
 
 
-def _write_mp4(reel: Reel, path: Path, fps: float, on_frame: Callable[[], object]) -> None:
+def _write_mp4(frames: FilmFrames, path: Path, fps: float, on_frame: Callable[[], object]) -> None:
     """Write H.264 that every browser plays; one thread, so that the bytes are the same on every machine."""
     av = import_av()
     options = {"crf": "20", "preset": "veryfast", "threads": "1"}
     with av.open(str(path), mode="w", format="mp4", options={"movflags": "+faststart"}) as film:
         stream = film.add_stream("libx264", rate=Fraction(fps).limit_denominator(1000), options=options)
-        stream.width, stream.height, stream.pix_fmt = *reel.size, "yuv420p"
-        for index in range(len(reel) + round(_HOLD_SECONDS * fps) - 1):
-            if index < len(reel):
-                frame = reel.frame(index)
+        stream.width, stream.height, stream.pix_fmt = *frames.size, "yuv420p"
+        for index in range(len(frames) + round(_HOLD_SECONDS * fps) - 1):
+            if index < len(frames):
+                frame = frames.frame(index)
                 on_frame()
             film.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24")))
         film.mux(stream.encode(None))
 
 
-FILMS: Final[Mapping[str, Callable[[Reel, Path, float, Callable[[], object]], None]]] = {
+FILMS: Final[Mapping[str, Callable[[FilmFrames, Path, float, Callable[[], object]], None]]] = {
     ".gif": _write_gif,
     ".mp4": _write_mp4,
 }
-"""Endings of films, and who writes them."""
+"""Endings of films, and the functions that write them."""

@@ -9,7 +9,8 @@ import numpy as np
 
 from fireworld.records import ACTIVITIES, FIERYNESS, CityRecord
 from fireworld_viewer import colors
-from fireworld_viewer.pictures.city_map import INK, JET_EDGE, MapState, hexadecimal
+from fireworld_viewer.pictures.city_map import JET_EDGE, MapState, hexadecimal
+from fireworld_viewer.pictures.figure_files import INK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,10 +31,8 @@ _BRIGADE: Final = "brigade"
 _DOING: Final = tuple(f"brigade {activity.removeprefix('driving-').replace('-', ' ')}" for activity in ACTIVITIES)
 _CIVILIAN: Final = tuple(f"civilian {health}" for health in HEALTH)
 _CODES: Final = tuple(name.replace("-", " ") for name in FIERYNESS)
-LABELS: Final = (
-    *_CODES, "refuge", "hydrant", *_CIVILIAN, _BRIGADE, *_DOING, _TANK, _JET, _WAY,
-)  # fmt: skip
-"""All that can be on a map, in the order of the legend."""
+LABELS: Final = (*_CODES, "refuge", "hydrant", *_CIVILIAN, _BRIGADE, *_DOING, _TANK, _JET, _WAY)
+"""Everything that can be on a map, in the order of the legend."""
 _UNCOUNTED: Final = frozenset({_TANK, _JET, _WAY})
 
 
@@ -45,26 +44,20 @@ def count_marks(city: CityRecord, state: MapState) -> dict[str, int]:
     hp, start = np.asarray(state.civilian_hp, dtype=np.float64), np.maximum(city.civilian_hp, 1)
     band = np.digitize(hp / start, [0.0, 0.25, 0.75], right=True)  # 0 dead, 3 well
     counts |= dict(zip(reversed(_CIVILIAN), np.bincount(band, minlength=4).tolist(), strict=True))
-    crews = state.crews
-    if crews is not None and crews.activity is None:
-        counts[_BRIGADE] = len(crews.xy_m)
-    elif crews is not None:
-        doing = np.bincount(np.asarray(crews.activity, dtype=np.int64), minlength=len(_DOING)).tolist()
+    brigades = state.brigades
+    if brigades is not None and brigades.activity is None:
+        counts[_BRIGADE] = len(brigades.xy_m)
+    elif brigades is not None:
+        doing = np.bincount(np.asarray(brigades.activity, dtype=np.int64), minlength=len(_DOING)).tolist()
         counts |= dict(zip(_DOING, doing, strict=True))
-        counts[_TANK] = len(crews.xy_m)
-        counts[_JET] = len(crews.goes_for(ACTIVITIES.index("spraying")))
-        counts[_WAY] = len(crews.goes_for(ACTIVITIES.index("driving")))
+        counts[_TANK] = len(brigades.xy_m)
+        counts[_JET] = len(brigades.with_target(ACTIVITIES.index("spraying")))
+        counts[_WAY] = len(brigades.with_target(ACTIVITIES.index("driving")))
     return {label: count for label, count in counts.items() if count}
 
 
 def draw_legend(axes: Axes, labels: Sequence[str], *, n_maps: int) -> Legend:
-    """Draw a legend to the right of a map.
-
-    Args:
-        axes: of the map.
-        labels: of LABELS, what is named.
-        n_maps: on how many maps the marks will be counted.
-    """
+    """Draw a legend, of some of LABELS, to the right of a map; it will have counts of `n_maps` maps, 0 for none."""
     handles = [_handle(label) for label in labels]
     title = "how many: (A | B)" if n_maps > 1 else None
     return axes.legend(

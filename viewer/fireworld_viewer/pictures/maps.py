@@ -9,16 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fireworld.errors import one_line
-from fireworld.records import CityRecord, Recording, RunHeader, StepRecord
-from fireworld_viewer.pictures.city_map import WIDTH_INCHES, Crews, MapState, state_of
-from fireworld_viewer.pictures.figure_files import png_bytes, save_figure
-from fireworld_viewer.pictures.moments import Moment, moments_at
-from fireworld_viewer.pictures.sheet import Cell, Sheet
+from fireworld.records import CityRecord, Recording, StepRecord
+from fireworld_viewer.pictures.city_map import WIDTH_INCHES, BrigadeMarks, MapState, state_of
+from fireworld_viewer.pictures.map_grid import MapCell, MapGrid
+from fireworld_viewer.story.steps import ShownStep, read_steps
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-__all__ = ["draw_map", "draw_steps", "png_bytes", "save_figure"]
 
 PAIR_INCHES: Final = 5.4
 """Width of each of two maps side by side."""
@@ -49,15 +46,26 @@ def draw_map(
     Raises:
         ViewError: matplotlib is not installed.
     """
-    crews = None
+    brigades = None
     if brigades_xy is not None:
-        crews = Crews(xy_m=np.asarray(brigades_xy, dtype=np.float64).reshape(-1, 2))
+        brigades = BrigadeMarks(xy_m=np.asarray(brigades_xy, dtype=np.float64).reshape(-1, 2))
     state = MapState(
         fieryness=np.zeros(len(city.building_id), dtype=np.uint8) if fieryness is None else np.asarray(fieryness),
         civilian_hp=np.asarray(city.civilian_hp) if civilian_hp is None else np.asarray(civilian_hp),
-        crews=crews,
+        brigades=brigades,
     )
-    return Sheet([Cell(city=city, state=state, title=one_line(title or city.name))]).figure
+    return MapGrid([MapCell(city=city, state=state, title=one_line(title or city.name))]).figure
+
+
+def draw_record(city: CityRecord, record: StepRecord, *, title: str) -> Figure:
+    """Draw buildings, brigades and civilians after a step, without what the brigades do; errors as in `draw_map`."""
+    return draw_map(
+        city,
+        fieryness=record.buildings.fieryness,
+        brigades_xy=np.column_stack([record.brigades.x_m, record.brigades.y_m]),
+        civilian_hp=record.civilians.hp,
+        title=title,
+    )
 
 
 def draw_steps(recordings: Sequence[Recording], steps: Sequence[int]) -> Figure:
@@ -65,70 +73,71 @@ def draw_steps(recordings: Sequence[Recording], steps: Sequence[int]) -> Figure:
 
     Args:
         recordings: one, or two of the same city.
-        steps: steps, or moments.LAST.
+        steps: steps, or `story.steps.LAST`.
 
     Raises:
         ViewError: there is no such step, the cities differ, or matplotlib is not installed.
     """
-    moments = moments_at(recordings, steps)
-    if len(moments) == 1:
+    shown = read_steps(recordings, steps)
+    if len(shown) == 1:
         inches = WIDTH_INCHES if len(recordings) == 1 else PAIR_INCHES
-        return Sheet(cells_of(recordings, moments[0]), columns=len(recordings), map_inches=inches).figure
+        return MapGrid(cells_of(recordings, shown[0]), columns=len(recordings), map_inches=inches).figure
     cells = [
-        _strip_cell(recording.city, moment, row, letter=letter)
+        MapCell(
+            city=recording.city,
+            state=state_of(recording.city, step.records[row]),
+            title=letter + _when(step.records[row], step.step),
+            facts=_facts(step.records[row], apart=", "),
+        )
         for row, (recording, letter) in enumerate(zip(recordings, _letters(recordings), strict=True))
-        for moment in moments
+        for step in shown
     ]
-    columns = len(moments)
+    columns = len(shown)
     if len(recordings) == 1:
-        columns = -(-columns // -(-columns // _STRIP_COLUMNS))  # as few rows as will do, evenly filled
-    names = (
-        f"{letter}: {name_of(one.header)}" if letter else name_of(one.header)
-        for one, letter in zip(recordings, _letters(recordings), strict=True)
-    )
+        columns = -(-columns // -(-columns // _STRIP_COLUMNS))  # as few rows as possible, evenly filled
     least, greatest = _STRIP_INCHES
     inches = min(max(_STRIP_WIDTH_INCHES / columns, least), greatest)
-    return Sheet(cells, columns=columns, map_inches=inches, heading="     ".join(names)).figure
+    return MapGrid(cells, columns=columns, map_inches=inches, heading="     ".join(_names(recordings))).figure
 
 
-def cells_of(recordings: Sequence[Recording], moment: Moment) -> list[Cell]:
-    """Return the maps of a moment, one for each recording, headed by what it is a recording of."""
+def cells_of(recordings: Sequence[Recording], shown: ShownStep) -> list[MapCell]:
+    """Return the maps of a step, one for each recording, headed by what it is a recording of."""
     return [
-        Cell(
+        MapCell(
             city=one.city,
             state=state_of(one.city, record),
-            title=f"{letter}: {name_of(one.header)}" if letter else name_of(one.header),
-            facts=facts_of(record, moment.step),
+            title=name,
+            facts=f"{_when(record, shown.step)}   {_facts(record, apart='   ')}",
         )
-        for one, record, letter in zip(recordings, moment.records, _letters(recordings), strict=True)
+        for one, record, name in zip(recordings, shown.records, _names(recordings), strict=True)
     ]
 
 
-def name_of(header: RunHeader) -> str:
-    """Name a run: scenario, policy, seed."""
-    scenario, policy = (one_line(name) for name in (header.scenario, header.policy))
-    return f"{_shortened(scenario)}, {_shortened(policy)}, seed {header.seed}"
+def _names(recordings: Sequence[Recording]) -> list[str]:
+    """Return scenario, policy and seed of each run."""
+    headers = [one.header for one in recordings]
+    return [
+        f"{letter}{_shortened(header.scenario)}, {_shortened(header.policy)}, seed {header.seed}"
+        for header, letter in zip(headers, _letters(recordings), strict=True)
+    ]
 
 
-def facts_of(record: StepRecord, step: int) -> str:
-    """Say how things stand at a step; `record` is an earlier one where the run has ended."""
+def _when(record: StepRecord, step: int) -> str:
+    """Name a step; the record is an earlier one where the run has ended."""
+    return f"step {step}" if record.step == step else f"step {step} (ended at {record.step})"
+
+
+def _facts(record: StepRecord, *, apart: str) -> str:
+    """Return the score and the fire after a step in words."""
     score = record.score
-    when = f"step {step}" if record.step == step else f"step {step} (ended at {record.step})"
-    standing = f"score {score.score:.2f} of {score.score_max:.0f}"
-    return f"{when}   {standing}   {score.n_burning} burning, {score.n_burnt_out} burnt out"
-
-
-def _strip_cell(city: CityRecord, moment: Moment, row: int, *, letter: str) -> Cell:
-    record = moment.records[row]
-    _, standing, buildings = facts_of(record, moment.step).split("   ")
-    ended = "" if record.step == moment.step else f" (ended at {record.step})"
-    title = f"{letter}: step {moment.step}{ended}" if letter else f"step {moment.step}{ended}"
-    return Cell(city=city, state=state_of(city, record), title=title, facts=f"{standing}, {buildings}")
+    fire = f"{score.n_burning} burning, {score.n_burnt_out} burnt out"
+    return f"score {score.score:.2f} of {score.score_max:.0f}{apart}{fire}"
 
 
 def _letters(recordings: Sequence[Recording]) -> Sequence[str]:
-    return ("A", "B") if len(recordings) > 1 else ("",)
+    return ("A: ", "B: ") if len(recordings) > 1 else ("",)
 
 
 def _shortened(name: str) -> str:
-    return name if len(name) <= _NAME_LETTERS else f"…{name[1 - _NAME_LETTERS :]}"
+    line = one_line(name)
+    return line if len(line) <= _NAME_LETTERS else f"…{line[1 - _NAME_LETTERS :]}"

@@ -1,7 +1,7 @@
 """The heat of the air over the city, as a translucent layer: known at the steps of snapshots only.
 
-A recording holds the air in a snapshot at every fiftieth step; in between the layer of the last one stays, under a
-label that says of which step it is. A replay may put one at every step.
+A recording has a snapshot at every fiftieth step; in between, the layer of the last one stays, with a label that names
+its step. A replay can have a snapshot at every step.
 """
 
 from __future__ import annotations
@@ -9,13 +9,15 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+import rerun
 from numpy.typing import NDArray
 
 from fireworld.records import AIR, CityRecord, Recording
 from fireworld_viewer import colors
-from fireworld_viewer.rerun_view.layers import Stage
+from fireworld_viewer.city_mesh import CityMesh
+from fireworld_viewer.rerun_view.layers import Layers
 
-ABOVE_ROOFS_M: Final = 4.0
+_ABOVE_ROOFS_M: Final = 4.0
 HOTTEST: Final = 600.0
 """Degrees above ambient at which the color is at its end."""
 _COLDEST: Final = 1.0
@@ -24,20 +26,13 @@ _OPACITY: Final = 0.999
 _ALPHA: Final = (70, 215)
 
 
-def log_air(stage: Stage, recording: Recording, *, height_m: float) -> None:
-    """Send the air of every snapshot, at the step of it.
-
-    Args:
-        stage: where to.
-        recording: the steps; those without a snapshot send nothing.
-        height_m: of the layer.
-    """
-    import rerun
-
+def log_air(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
+    """Send the air of every snapshot, above the highest roof; nothing for steps without a snapshot."""
     city = recording.city
     held = {one.step: one.snapshot.arrays[AIR] for one in recording if one.snapshot and AIR in one.snapshot.arrays}
     if not held or city.air_nx * city.air_ny == 0:
         return
+    height_m = float(mesh.roof_xyz_m[:, 2].max(initial=0.0)) + _ABOVE_ROOFS_M
     cells = [air_cells(city, array) for array in held.values()]
     steps = np.array(list(held), dtype=np.int64)
     grid = rerun.GridMap.from_fields(
@@ -48,19 +43,19 @@ def log_air(stage: Stage, recording: Recording, *, height_m: float) -> None:
         opacity=_OPACITY,
         translation=(city.air_origin_x_m, city.air_origin_y_m, height_m),
     )
-    stage.static("air/heat", grid)
+    layers.static("air/heat", grid)
     pixels = [air_pixels(one).tobytes() for one in cells]
-    stage.rows("air/heat", rerun.GridMap.columns(data=pixels), steps=steps)
+    layers.rows("air/heat", rerun.GridMap.columns(data=pixels), steps=steps)
 
     corner = (city.air_origin_x_m, city.air_origin_y_m + city.air_ny * city.air_cell_m, height_m)
     style = rerun.Points3D([corner], radii=[0.1], colors=colors.single(colors.LABEL_RGB), show_labels=[True])
-    stage.static("air/when", style)
-    said = [f"air after step {step}: at most {one.max():.0f} degrees" for step, one in zip(held, cells, strict=True)]
-    stage.rows("air/when", rerun.Points3D.columns(labels=said), steps=steps)
+    layers.static("air/when", style)
+    labels = [f"air after step {step}: at most {one.max():.0f} degrees" for step, one in zip(held, cells, strict=True)]
+    layers.rows("air/when", rerun.Points3D.columns(labels=labels), steps=steps)
 
 
 def air_cells(city: CityRecord, array: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Take the (air_nx, air_ny) cells out of a snapshot's array, which has a border."""
+    """Return the (air_nx, air_ny) cells of a snapshot's array, which has a border."""
     border = (array.shape[0] - city.air_nx) // 2
     return array[border : border + city.air_nx, border : border + city.air_ny]
 

@@ -13,12 +13,15 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from fireworld.errors import OutputError, ViewError, expected
+from fireworld.errors import ViewError, expected
+from fireworld.files import check_output, write_file
 from fireworld.records import Recording
-from fireworld_viewer.pictures.figure_files import written_beside
-from fireworld_viewer.rerun_view.outcome_panel import Outcome
+from fireworld_viewer.rerun_view.outcome_page import OutcomePage
+
+if TYPE_CHECKING:
+    import rerun
 
 RERUN_MINOR: Final = "0.41."
 INSTALL_HINT: Final = "try pip install 'fireworld[view]'"
@@ -33,7 +36,7 @@ def save(
     *,
     focus: Sequence[int] = (),
     force: bool = False,
-    outcome: Outcome | None = None,
+    outcome: OutcomePage | None = None,
 ) -> None:
     """Write one recording, or two side by side, as a Rerun file; an unfinished file never bears the final name.
 
@@ -42,30 +45,24 @@ def save(
         path: the .rrd file.
         focus: ids of buildings whose temperatures are plotted; if there are none, those that burn first.
         force: replace an existing file.
-        outcome: what the runs came to, and where two first differ; left out of the view if not given.
+        outcome: how the runs came out, and where two first differ; left out of the view if not given.
 
     Raises:
         OutputError: the file exists or cannot be written.
         ViewError: Rerun is missing, the cities differ or a building of the focus is unknown.
     """
-    if path.exists() and not force:
-        raise OutputError(f"{path}: exists already; try --force")
-    if not path.parent.is_dir():
-        raise OutputError(f"{path}: its folder does not exist")
-    content = _rrd(recordings, focus, outcome)
-    with written_beside(path) as partial:
-        partial.write_bytes(content)
+    check_output(path, force=force)
+    write_file(path, _rrd(recordings, focus, outcome))
 
 
-def show(recordings: Sequence[Recording], *, focus: Sequence[int] = (), outcome: Outcome | None = None) -> None:
+def show(recordings: Sequence[Recording], *, focus: Sequence[int] = (), outcome: OutcomePage | None = None) -> None:
     """Open recordings in Rerun's own window and return when it is closed; the arguments are those of `save`.
 
     Raises:
         ViewError: there is no display, or no viewer.
     """
     _import_rerun()
-    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise ViewError("view: no display here; try --save FILE.rrd, --web, or `fireworld render` for pictures")
+    check_display("view", "--save FILE.rrd, --web, or `fireworld render` for pictures")
     _run_viewer(recordings, focus, outcome, ["--port", str(free_port()), "--hide-welcome-screen"])
 
 
@@ -73,18 +70,18 @@ def serve(
     recordings: Sequence[Recording],
     *,
     focus: Sequence[int] = (),
-    outcome: Outcome | None = None,
+    outcome: OutcomePage | None = None,
     port: int = WEB_PORT,
     announce: Callable[[str], None],
 ) -> None:
-    """Serve Rerun with the recordings to browsers on this machine until interrupted.
+    """Serve Rerun with the recordings to browsers on this machine until interrupted; arguments as in `save`.
 
     Args:
         recordings: one, or two of the same city.
-        focus: as `save` has it.
-        outcome: as `save` has it.
+        focus: ids of buildings.
+        outcome: how the runs came out.
         port: of the page.
-        announce: told the address of the page.
+        announce: called with the address of the page.
 
     Raises:
         ViewError: the port is taken, or there is no viewer.
@@ -98,8 +95,14 @@ def serve(
     _run_viewer(recordings, focus, outcome, ["--serve-web", *ports])
 
 
+def check_display(option: str, others: str) -> None:
+    """Raise ViewError where no window can be opened; the message names the option and what others to try."""
+    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise ViewError(f"{option}: no display here; try {others}")
+
+
 def viewer_executable() -> Path:
-    """Path of Rerun's viewer itself; the `rerun` script is a wrapper that leaves it running when it is stopped.
+    """Return the path of Rerun's viewer; the `rerun` script is a wrapper that leaves it running when it is stopped.
 
     Raises:
         ViewError: it is not there.
@@ -113,58 +116,72 @@ def viewer_executable() -> Path:
 
 
 def viewer_environment(environment: Mapping[str, str]) -> dict[str, str]:
-    """Environment for Rerun's viewer: it reports usage unless it believes to run in continuous integration."""
-    kept = {name: value for name, value in environment.items() if name != "RERUN_ANALYTICS"}
-    return {**kept, "CI": "1", "RUST_LOG": environment.get("RUST_LOG", "error")}
+    """Return an environment for Rerun's viewer: it reports usage, except in continuous integration."""
+    others = {name: value for name, value in environment.items() if name != "RERUN_ANALYTICS"}
+    return {**others, "CI": "1", "RUST_LOG": environment.get("RUST_LOG", "error")}
 
 
 def free_port() -> int:
-    """A port of this machine that nobody listens on at the moment."""
+    """Return a port of this machine that nobody listens on at the moment."""
     with socket.socket() as probe:
         probe.bind((LOCALHOST, 0))
         port: int = probe.getsockname()[1]
         return port
 
 
-def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome | None) -> bytes:
-    """Make the Rerun file of one recording, or of two of the same city, in memory.
+def new_stream(application_id: str = APPLICATION_ID, *, recording_id: str | None = None) -> rerun.RecordingStream:
+    """Return an empty stream without timelines of its own.
 
-    Rerun can write files too, in a thread of its own that tells nobody when the disk is full.
+    Raises:
+        ViewError: Rerun is missing or switched off.
     """
     rerun = _import_rerun()
-    from fireworld_viewer.rerun_view import blueprint, comparison, mapping, plots
-    from fireworld_viewer.rerun_view import legend_page as legend
-    from fireworld_viewer.rerun_view.outcome_panel import log_outcome
-
-    comparing = len(recordings) > 1
-    if comparing:
-        comparison.check_same_city(*(one.city for one in recordings))
-    stream = rerun.RecordingStream(APPLICATION_ID, recording_id=_identity(recordings), send_properties=False)
+    stream = rerun.RecordingStream(application_id, recording_id=recording_id, send_properties=False)
     if not rerun.is_enabled(stream):
         raise ViewError("view: Rerun is switched off by the environment variable RERUN; try unsetting it")
     stream.set_log_time_enabled(False)
     stream.set_log_tick_enabled(False)
+    return stream
+
+
+def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: OutcomePage | None) -> bytes:
+    """Make the Rerun file of one recording, or of two of the same city, in memory.
+
+    Rerun can write files too, in a thread of its own that reports no error when the disk is full.
+    """
+    rerun = _import_rerun()
+    from fireworld_viewer.rerun_view import blueprint
+    from fireworld_viewer.rerun_view.comparison import log_comparison
+    from fireworld_viewer.rerun_view.pages import log_legend, log_outcome
+    from fireworld_viewer.rerun_view.plots import first_burning
+    from fireworld_viewer.rerun_view.run_layers import RunLayers
+    from fireworld_viewer.story.two_runs import check_same_city
+
+    comparing = len(recordings) > 1
+    if comparing:
+        check_same_city(*(one.city for one in recordings))
+    stream = new_stream(recording_id=_identity(recordings))
     memory = stream.memory_recording()
     with warnings.catch_warnings():
-        # Rerun warns of data it cannot take and goes on; a view that lacks something is worse than none.
+        # Rerun warns of data it cannot take and continues; a view that lacks something is worse than none.
         warnings.simplefilter("error", rerun.error_utils.RerunWarning)
-        plotted = focus or plots.first_burning(recordings[0])
+        plotted = focus or first_burning(recordings[0])
         lay_out = blueprint.pair if comparing else blueprint.single
         stream.send_blueprint(lay_out(*recordings, focus=bool(plotted), outcome=outcome))
         stream.send_recording_name(" | ".join(map(blueprint.title, recordings)))
-        legend.log_legend(stream, comparing=comparing)
+        log_legend(stream, comparing=comparing)
         if outcome is not None:
             log_outcome(stream, outcome)
         if comparing:
-            comparison.log_comparison(stream, *recordings, focus=plotted, outcome=outcome)
+            log_comparison(stream, *recordings, focus=plotted, outcome=outcome)
         else:
-            mapping.log_recording(stream, *recordings, focus=plotted)
+            RunLayers(stream, recordings[0].city, focus=plotted).add(recordings[0])
     content: bytes = memory.drain_as_bytes()
     return content
 
 
 def _identity(recordings: Sequence[Recording]) -> str:
-    """Name what is shown: Rerun merges what has one name, so that different runs must have different ones."""
+    """Return a name for what is shown: Rerun merges what has one name, so different runs must have different ones."""
     digest = hashlib.sha256()
     for one in recordings:
         digest.update(f"{one.header.scenario_digest} {one.header.seed} {one.header.policy_digest}".encode())
@@ -174,16 +191,16 @@ def _identity(recordings: Sequence[Recording]) -> str:
 
 
 def _run_viewer(
-    recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome | None, options: list[str]
+    recordings: Sequence[Recording], focus: Sequence[int], outcome: OutcomePage | None, options: list[str]
 ) -> None:
-    """Run Rerun's viewer on recordings until it ends or we are told to stop; it never outlives us."""
+    """Run Rerun's viewer on recordings until it ends or this process is stopped; it never outlives this process."""
     with tempfile.TemporaryDirectory(prefix="fireworld-") as folder:
         path = Path(folder) / "view.rrd"
         save(recordings, path, focus=focus, outcome=outcome)
         command = [str(viewer_executable()), "--bind", LOCALHOST, *options, str(path)]
         before = signal.signal(signal.SIGTERM, _stop)
-        with (Path(folder) / "said").open("w+", encoding="utf-8", errors="replace") as said:
-            viewer = subprocess.Popen(command, env=viewer_environment(os.environ), stderr=said)  # noqa: S603 - our own
+        with (Path(folder) / "errors").open("w+", encoding="utf-8", errors="replace") as errors:
+            viewer = subprocess.Popen(command, env=viewer_environment(os.environ), stderr=errors)  # noqa: S603 - our own
             try:
                 status = viewer.wait()
             except KeyboardInterrupt:
@@ -192,8 +209,8 @@ def _run_viewer(
                 signal.signal(signal.SIGTERM, before)
                 viewer.terminate()
                 viewer.wait()
-            said.seek(0)
-            reason = " ".join(said.read().split())
+            errors.seek(0)
+            reason = " ".join(errors.read().split())
     if status:
         why = f": {reason.rpartition(': ')[2][-120:]}" if reason else ""
         hint = "try --save FILE.rrd, --web, or `fireworld render`"
@@ -221,14 +238,14 @@ def _import_rerun() -> ModuleType:
     Raises:
         ViewError: it is not installed, or is of another minor version.
     """
-    spoken = os.environ.get("RUST_LOG")
-    os.environ["RUST_LOG"] = spoken or "off"  # read once, when Rerun is first imported
+    level = os.environ.get("RUST_LOG")
+    os.environ["RUST_LOG"] = level or "off"  # read once, when Rerun is first imported
     try:
         import rerun
     except ImportError:
         raise ViewError(f"view: Rerun is not installed; {INSTALL_HINT}") from None
     finally:
-        if spoken is None:
+        if level is None:
             del os.environ["RUST_LOG"]
     if not rerun.__version__.startswith(RERUN_MINOR):
         raise ViewError(expected("rerun-sdk", "version", f"{RERUN_MINOR}*", rerun.__version__, INSTALL_HINT))

@@ -1,35 +1,32 @@
-"""Two runs in one city, side by side: /a, /b and, in /diff, which buildings fare worse or better in the second."""
+"""Two runs in one city, side by side: /a, /b and, in /diff, which buildings are worse or better off in the second."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+import rerun
 from numpy.typing import NDArray
 
-from fireworld.errors import ViewError, expected
-from fireworld.records import CityRecord, Recording
+from fireworld.records import Recording
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh
-from fireworld_viewer.rerun_view import mapping
-from fireworld_viewer.rerun_view.activity_lanes import log_lane
-from fireworld_viewer.rerun_view.layers import Stage, values
-from fireworld_viewer.rerun_view.outcome_panel import Outcome
+from fireworld_viewer.rerun_view import city_layers
+from fireworld_viewer.rerun_view.layers import Layers
+from fireworld_viewer.rerun_view.outcome_page import OutcomePage
 from fireworld_viewer.rerun_view.plots import log_plot
-
-if TYPE_CHECKING:
-    import rerun
-
-DAMAGE_ORDER: Final = (0, 4, 5, 1, 6, 2, 7, 3, 8)
-"""Fieryness codes from the least damage to the most: by the official score's factors; 8 comes after 3, both count 0."""
+from fireworld_viewer.rerun_view.run_layers import RunLayers
+from fireworld_viewer.rerun_view.state_timelines import log_state_timeline
+from fireworld_viewer.rerun_view.text_logs import log_lines
+from fireworld_viewer.story.narration import LogLine
+from fireworld_viewer.story.two_runs import check_same_city, common_steps, compare_damage
 
 MARK_PATH: Final = "/diff/plots/first_difference"
 AGREEMENT: Final = ("the same", "buildings the same, something else not", "buildings differ")
-"""What the lane of two runs says of a step."""
+"""States of the timeline of two runs."""
 
 _AGREEMENT_RGB: Final = (colors.HEALTHY_RGB, colors.MARK_RGB, colors.WORSE_RGB)
-_DAMAGE: Final = np.argsort(np.array(DAMAGE_ORDER)).astype(np.int8)  # code to its place in the order
 _DIFFERENCE_COLORS: Final = colors.shaded_table(colors.DIFFERENCE_RGB, SHADES_PERCENT)
 
 
@@ -39,103 +36,52 @@ def log_comparison(
     second: Recording,
     *,
     focus: Sequence[int] = (),
-    outcome: Outcome | None = None,
+    outcome: OutcomePage | None = None,
 ) -> None:
-    """Send two runs and their difference to one Rerun stream, on one `step` timeline.
-
-    Args:
-        stream: where to.
-        first: shown below /a.
-        second: shown below /b.
-        focus: ids of buildings whose temperatures are plotted.
-        outcome: where they first differ is marked, if it is told.
+    """Send two runs, below /a and /b, and their difference; where they first differ is marked if the outcome is given.
 
     Raises:
-        ViewError: the runs are of different cities, or have no steps in common.
+        ViewError: the runs are of different cities, one has no steps, or a building of the focus is unknown.
     """
     check_same_city(first.city, second.city)
     steps, rows_a, rows_b = common_steps(first.steps, second.steps)
-    mapping.log_recording(stream, first, prefix="/a", name="A", focus=focus)
-    mapping.log_recording(stream, second, prefix="/b", name="B", focus=focus)
+    RunLayers(stream, first.city, prefix="/a", name="A", focus=focus).add(first)
+    RunLayers(stream, second.city, prefix="/b", name="B", focus=focus).add(second)
 
-    stage = Stage(stream, "/diff", steps)
+    layers = Layers(stream, "/diff", steps)
     mesh = build_mesh(first.city)
-    mapping.log_city(stage, first.city)
+    city_layers.log_city(layers, first.city)
     fieryness_a = first.column("/buildings", "fieryness")[rows_a]
     fieryness_b = second.column("/buildings", "fieryness")[rows_b]
-    change = difference(fieryness_a, fieryness_b)
-    mapping.log_mesh(stage, mesh, (change + 1).astype(np.uint8), _DIFFERENCE_COLORS)
-    mapping.log_handles(stage, first.city, mesh)
+    change = compare_damage(fieryness_a, fieryness_b)
+    city_layers.log_mesh(layers, mesh, (change + 1).astype(np.uint8), _DIFFERENCE_COLORS)
+    city_layers.log_handles(layers, first.city, mesh)
     codes = {"difference": change, "fieryness_a": fieryness_a, "fieryness_b": fieryness_b}
-    for block in stage.blocks(3 * change.shape[1]):
-        part = {name: numbers[block] for name, numbers in codes.items()}
-        stage.rows("city/handles", values("Difference", part), steps=stage.steps[block])
+    layers.numbers("city/handles", "Difference", codes)
 
     counts = np.column_stack([np.count_nonzero(change == sign, axis=1) for sign in (1, -1)]).astype(np.float64)
-    log_plot(stage, "plots/buildings", counts, ("worse in B", "better in B"), (colors.WORSE_RGB, colors.BETTER_RGB))
+    log_plot(layers, "plots/buildings", counts, ("worse in B", "better in B"), (colors.WORSE_RGB, colors.BETTER_RGB))
     if outcome is not None:
-        _mark_first_difference(stage, outcome, np.any(change != 0, axis=1))
+        _mark_first_difference(layers, outcome, np.any(change != 0, axis=1))
 
 
-def _mark_first_difference(stage: Stage, outcome: Outcome, buildings_differ: NDArray[np.bool_]) -> None:
-    """Send a lane that says from where the runs differ, a mark in the plots and a line in the log."""
-    import rerun
-
-    differs = np.zeros(len(stage.steps), dtype=np.int64)
-    if outcome.first_step is not None:
-        differs[stage.steps >= outcome.first_step] = 1
-        differs[buildings_differ] = 2
-    log_lane(stage, "agreement", differs, AGREEMENT, _AGREEMENT_RGB)
-    if outcome.first_step is None:
+def _mark_first_difference(layers: Layers, outcome: OutcomePage, buildings_differ: NDArray[np.bool_]) -> None:
+    """Send a timeline of whether the runs are the same, a mark in the plots and a line in the log."""
+    first = outcome.first_step
+    states = np.zeros(len(layers.steps), dtype=np.int64)
+    if first is not None:
+        states[layers.steps >= first] = 1
+        states[buildings_differ] = 2
+    log_state_timeline(layers, "agreement", states, AGREEMENT, _AGREEMENT_RGB)
+    if first is None:
         return
-    at = np.array([outcome.first_step], dtype=np.int64)
     style = rerun.SeriesPoints(
-        names=[f"first difference, step {outcome.first_step}"],
+        names=[f"first difference, step {first}"],
         colors=colors.single(colors.MARK_RGB),
         markers="diamond",
         marker_sizes=[6.0],
     )
-    stage.static("plots/first_difference", style)
-    stage.rows("plots/first_difference", rerun.Scalars.columns(scalars=[0.0]), steps=at)
-    said = f"first difference: {outcome.first_sentence}"
-    line = rerun.TextLog.columns(text=[said], level=["ERROR"], color=colors.single(colors.MARK_RGB))
-    stage.rows("log/first_difference", line, steps=at)
-
-
-def difference(fieryness_a: NDArray[np.uint8], fieryness_b: NDArray[np.uint8]) -> NDArray[np.int8]:
-    """Compare codes: -1 where the second run has less damage, 1 where it has more, 0 where the codes are equal."""
-    signs: NDArray[np.int8] = np.sign(_DAMAGE[fieryness_b] - _DAMAGE[fieryness_a])
-    return signs
-
-
-def common_steps(
-    steps_a: NDArray[np.int64], steps_b: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.intp], NDArray[np.intp]]:
-    """Align two runs: every step of either from where both have begun; a run that has ended keeps its last state.
-
-    Returns:
-        steps, (k,), and the row of each run that holds the state of that step.
-
-    Raises:
-        ViewError: a run has no steps.
-    """
-    if len(steps_a) == 0 or len(steps_b) == 0:
-        raise ViewError(expected("view", "", "two recordings with steps", f"{len(steps_a)} and {len(steps_b)} steps"))
-    steps = np.union1d(steps_a, steps_b)
-    steps = steps[steps >= max(steps_a[0], steps_b[0])]
-    rows_a, rows_b = (np.searchsorted(own, steps, side="right") - 1 for own in (steps_a, steps_b))
-    return steps, rows_a, rows_b
-
-
-def check_same_city(first: CityRecord, second: CityRecord) -> None:
-    """Refuse to compare runs of cities that differ in any building.
-
-    Raises:
-        ViewError: names the cities and what differs.
-    """
-    for name in ("building_id", "outline_ptr", "outline_x_m", "outline_y_m", "floors"):
-        if not np.array_equal(getattr(first, name), getattr(second, name)):
-            cities = f"{first.name!r} with {len(first.building_id)} buildings"
-            others = f"{second.name!r} with {len(second.building_id)}"
-            hint = f"{name} differs; try to view them one by one"
-            raise ViewError(expected("view", "", "two recordings of one city", f"{cities} and {others}", hint))
+    layers.static("plots/first_difference", style)
+    layers.rows("plots/first_difference", rerun.Scalars.columns(scalars=[0.0]), steps=[first])
+    line = LogLine(first, "ERROR", f"first difference: {outcome.first_sentence}", colors.MARK_RGB)
+    log_lines(layers, "log/first_difference", [line])

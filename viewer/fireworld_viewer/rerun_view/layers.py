@@ -1,32 +1,32 @@
-"""Stage: where a recording's layers are put, below one prefix and on the one `step` timeline of a Rerun stream."""
+"""The layers of one run in a Rerun stream: entities below one prefix, on the one `step` timeline."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+import rerun
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    import rerun
+from fireworld_viewer import colors
 
 TIMELINE: Final = "step"
 CHUNK_BYTES: Final = 1 << 20
 """Size of the pieces in which wide data is sent: a viewer loads and drops whole chunks."""
 
 
-class Stage:
-    """Sends static things and whole columns to a Rerun stream, all below one entity path.
+class Layers:
+    """Sends static entities and whole columns to a Rerun stream, all below one entity path.
 
-    Steps may come in several parts, one after another: what is static is sent once, and what is told only where it
+    Steps may come in several parts, one after another: what is static is sent once, and what is sent only where it
     changes is compared with the last step of the part before.
 
     Args:
         stream: where to.
         prefix: entity path, "" or like "/a".
-        steps: (k,) steps of the first part.
-        name: what this run is called beside another, "" where it is alone.
+        steps: (k,) steps of the first part; set the attribute before the next part.
+        name: of this run beside another, "" where it is alone.
     """
 
     def __init__(self, stream: rerun.RecordingStream, prefix: str, steps: NDArray[np.int64], *, name: str = "") -> None:
@@ -37,26 +37,20 @@ class Stage:
         self._sent: set[str] = set()
         self._last: dict[str, NDArray[Any]] = {}
 
-    def path(self, path: str) -> str:
-        """Full entity path of a layer."""
-        return f"{self.prefix}/{path}"
-
     def static(self, path: str, *archetypes: Any) -> None:
-        """Log what does not change in the run; only the first time for each path."""
+        """Send what does not change in the run; only the first time for each path."""
         if path not in self._sent:
             self._sent.add(path)
-            self.stream.log(self.path(path), *archetypes, static=True)
+            self.stream.log(f"{self.prefix}/{path}", *archetypes, static=True)
 
     def has(self, path: str) -> bool:
-        """Whether anything static was sent to a path."""
+        """Return whether anything static was sent to a path."""
         return path in self._sent
 
     def changed(self, path: str, numbers: NDArray[Any]) -> NDArray[np.int64]:
         """Return the rows of (k, w) numbers that differ from the row before, over all parts; the very first counts.
 
-        Args:
-            path: what the numbers are of; one call for each part.
-            numbers: of the steps of this part.
+        Call it once in each part for what is named by the path.
         """
         if len(numbers) == 0:
             return np.zeros(0, dtype=np.int64)
@@ -68,36 +62,37 @@ class Stage:
         return np.flatnonzero(differs)
 
     def rows(self, path: str, *columns: Any, steps: Sequence[int] | NDArray[np.int64] | None = None) -> None:
-        """Send columns of one row for each step of the recording, or for each of the steps given.
-
-        Args:
-            path: entity path below the prefix.
-            columns: column lists of archetypes, already partitioned into rows.
-            steps: (rows,) step of each row; steps may repeat.
-        """
-        import rerun
-
-        rows = self.steps if steps is None else steps
-        index = rerun.TimeColumn(TIMELINE, sequence=rows)
-        self.stream.send_columns(self.path(path), indexes=[index], columns=[one for many in columns for one in many])
+        """Send column lists of archetypes: a row for each step of this part, or for each of the steps given."""
+        index = rerun.TimeColumn(TIMELINE, sequence=self.steps if steps is None else steps)
+        every = [one for many in columns for one in many]
+        self.stream.send_columns(f"{self.prefix}/{path}", indexes=[index], columns=every)
 
     def blocks(self, bytes_per_step: int, rows: NDArray[np.int64] | None = None) -> Iterator[NDArray[np.int64]]:
-        """Split the recording's rows, or those given, into blocks of about CHUNK_BYTES."""
+        """Split the rows of this part, or those given, into blocks of about CHUNK_BYTES."""
         every = np.arange(len(self.steps)) if rows is None else rows
         size = max(1, CHUNK_BYTES // max(1, bytes_per_step))
         for start in range(0, len(every), size):
             yield every[start : start + size]
 
+    def numbers(self, path: str, archetype: str, columns: Mapping[str, NDArray[Any]]) -> None:
+        """Send (k, width) numbers by name, in blocks, shown under a heading when an instance is selected."""
+        bytes_per_step = sum(column.shape[1] * column.itemsize for column in columns.values())
+        for block in self.blocks(bytes_per_step):
+            part = {name: column[block] for name, column in columns.items()}
+            self.rows(path, number_columns(archetype, part), steps=self.steps[block])
 
-def values(archetype: str, columns: Mapping[str, NDArray[Any]]) -> Any:
-    """Columns of plain numbers under names of our own, shown when an instance is selected; NaN becomes nothing.
+    def strips(
+        self, path: str, strips: NDArray[np.float32], per_step: NDArray[Any], *, radius_m: float, rgb: colors.Rgb
+    ) -> None:
+        """Send line strips, (strips, points, 3), `per_step` of them for each step; nothing if there never were any."""
+        if len(strips) == 0 and not self.has(path):
+            return
+        self.static(path, rerun.LineStrips3D.from_fields(radii=[radius_m], colors=colors.single(rgb)))
+        self.rows(path, rerun.LineStrips3D.columns(strips=strips).partition(per_step))
 
-    Args:
-        archetype: heading the numbers are shown under.
-        columns: name to (rows, width) numbers.
-    """
-    import rerun
 
+def number_columns(archetype: str, columns: Mapping[str, NDArray[Any]]) -> Any:
+    """Return columns of (rows, width) numbers under names and a heading of our own; NaN becomes nothing."""
     rows, width = next(iter(columns.values())).shape
     flat = {name: _arrow(np.ascontiguousarray(numbers).reshape(-1)) for name, numbers in columns.items()}
     return rerun.DynamicArchetype.columns(archetype, components=flat).partition(np.full(rows, width))

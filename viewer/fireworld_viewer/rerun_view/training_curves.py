@@ -1,8 +1,8 @@
-"""Curves of learning: what a training reports from time to time, as plots of Rerun."""
+"""Curves of learning in Rerun: what a training reports from time to time."""
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
@@ -18,8 +18,8 @@ _COLUMNS_OF_TAB: Final = 3
 
 
 @dataclass(frozen=True)
-class Tab:
-    """Plots of which one needs to see those of one tab at a time only, and a page of text beside them."""
+class LayoutTab:
+    """Plots with a page of text beside them; one tab is seen at a time."""
 
     plots: Mapping[str, str]
     """Titles by name."""
@@ -28,8 +28,8 @@ class Tab:
 
 
 @dataclass(frozen=True)
-class Sheet:
-    """What is drawn of a training.
+class TrainingLayout:
+    """What is plotted of a training.
 
     Attributes:
         title: what the viewer calls it.
@@ -42,43 +42,43 @@ class Sheet:
     title: str
     timeline: str
     plots: Mapping[str, str]
-    tabs: Mapping[str, Tab] = field(default_factory=dict)
+    tabs: Mapping[str, LayoutTab] = field(default_factory=dict)
     log: str = ""
 
 
 @dataclass(frozen=True)
-class Point:
-    """What is drawn at one place of the timeline."""
+class TrainingPoint:
+    """What is plotted at one place of the timeline."""
 
     number: int
     """Its place."""
     values: Mapping[str, Mapping[str, float]]
     """By the name of the plot, then by that of the curve in it."""
     note: str = ""
-    """A line for the log, where there is something to say."""
+    """A line for the log; empty for none."""
     pages: Mapping[str, str] = field(default_factory=dict)
-    """What pages say from here on, in Markdown, by their names."""
+    """Text of pages from here on, in Markdown, by their names."""
 
 
-class CurveDrawing:
-    """Draws points into a stream: a curve for each name that comes up in a plot, in a color of its own there.
+class CurveWriter:
+    """Writes points to a stream: a curve for each name that comes up in a plot, in a color of its own there.
 
     Args:
         stream: of Rerun.
-        sheet: what is to be drawn.
+        layout: of the plots; sent with the first points.
     """
 
-    def __init__(self, stream: rerun.RecordingStream, sheet: Sheet) -> None:
-        self._stream, self._sheet = stream, sheet
-        self._begun = False
-        self._drawn: set[tuple[str, str]] = set()
-        self._n_curves: Counter[str] = Counter()
+    def __init__(self, stream: rerun.RecordingStream, layout: TrainingLayout) -> None:
+        self._stream, self._layout = stream, layout
+        self._drawn: dict[str, list[str]] = defaultdict(list)
 
-    def draw(self, points: Sequence[Point]) -> None:
-        """Draw the next points."""
+    def write(self, points: Sequence[TrainingPoint]) -> None:
+        """Write the next points."""
         import rerun
 
-        self._begin()
+        if not self._drawn:
+            self._stream.send_blueprint(_blueprint(self._layout))
+            self._stream.send_recording_name(self._layout.title)
         curves: dict[tuple[str, str], list[tuple[int, float]]] = defaultdict(list)
         for point in points:
             for plot, values in point.values.items():
@@ -97,22 +97,15 @@ class CurveDrawing:
                 page = rerun.TextDocument.columns(text=[text], media_type=[rerun.MediaType.MARKDOWN])
                 self._send(name, [point.number], page)
 
-    def _begin(self) -> None:
-        if self._begun:
-            return
-        self._begun = True
-        self._stream.send_blueprint(_layout(self._sheet))
-        self._stream.send_recording_name(self._sheet.title)
-
     def _style(self, plot: str, curve: str) -> None:
         """Name and color a curve that is new."""
         import rerun
 
-        if (plot, curve) in self._drawn:
+        drawn = self._drawn[plot]
+        if curve in drawn:
             return
-        rgb = colors.BRIGADE_RGB[self._n_curves[plot] % len(colors.BRIGADE_RGB)]
-        self._drawn.add((plot, curve))
-        self._n_curves[plot] += 1
+        rgb = colors.BRIGADE_RGB[len(drawn) % len(colors.BRIGADE_RGB)]
+        drawn.append(curve)
         style = rerun.SeriesLines(names=[curve], colors=colors.single(rgb), widths=[1.5])
         self._stream.log(f"{plot}/{curve}", style, static=True)
 
@@ -120,40 +113,33 @@ class CurveDrawing:
         """Send what belongs to some places of the timeline."""
         import rerun
 
-        times = rerun.TimeColumn(self._sheet.timeline, sequence=numbers)
+        times = rerun.TimeColumn(self._layout.timeline, sequence=numbers)
         self._stream.send_columns(path, indexes=[times], columns=columns)
 
 
-def _layout(sheet: Sheet) -> Any:
-    """The plots in a grid, the tabs below them, the log beside."""
+def _blueprint(layout: TrainingLayout) -> Any:
+    """Lay out the plots in a grid, the tabs below them, the log beside."""
     import rerun.blueprint as rrb
 
-    plots = _grid(sheet.plots, n_columns=_COLUMNS)
-    if sheet.tabs:
-        tabs = [_tab(title, tab) for title, tab in sheet.tabs.items()]
-        plots = rrb.Vertical(plots, tabs[0] if len(tabs) == 1 else rrb.Tabs(*tabs))
-    if sheet.log:
-        columns = rrb.TextLogColumns(timeline_columns=[sheet.timeline], text_log_columns=["body"])
-        log = rrb.TextLogView(name=sheet.log, origin=f"/{LOG_PATH}", columns=columns)
-        plots = rrb.Horizontal(plots, log, column_shares=[3, 1])
+    def grid(plots: Mapping[str, str], n_columns: int) -> Any:
+        legend = rrb.PlotLegend(rrb.Corner2D.LeftTop)
+        views = [rrb.TimeSeriesView(name=title, origin=f"/{name}", plot_legend=legend) for name, title in plots.items()]
+        return rrb.Grid(*views, grid_columns=n_columns)
+
+    root = grid(layout.plots, _COLUMNS)
+    if layout.tabs:
+        tabs = []
+        for title, tab in layout.tabs.items():
+            page = rrb.TextDocumentView(name=title, origin=f"/{tab.page}")
+            tabs.append(rrb.Horizontal(grid(tab.plots, _COLUMNS_OF_TAB), page, column_shares=[3, 1], name=title))
+        root = rrb.Vertical(root, tabs[0] if len(tabs) == 1 else rrb.Tabs(*tabs))
+    if layout.log:
+        columns = rrb.TextLogColumns(timeline_columns=[layout.timeline], text_log_columns=["body"])
+        log = rrb.TextLogView(name=layout.log, origin=f"/{LOG_PATH}", columns=columns)
+        root = rrb.Horizontal(root, log, column_shares=[3, 1])
     return rrb.Blueprint(
-        plots,
-        rrb.TimePanel(state="collapsed", timeline=sheet.timeline, play_state="following"),
+        root,
+        rrb.TimePanel(state="collapsed", timeline=layout.timeline, play_state="following"),
         rrb.BlueprintPanel(state="expanded"),
         rrb.SelectionPanel(state="collapsed"),
     )
-
-
-def _tab(title: str, tab: Tab) -> Any:
-    import rerun.blueprint as rrb
-
-    page = rrb.TextDocumentView(name=title, origin=f"/{tab.page}")
-    return rrb.Horizontal(_grid(tab.plots, n_columns=_COLUMNS_OF_TAB), page, column_shares=[3, 1], name=title)
-
-
-def _grid(plots: Mapping[str, str], *, n_columns: int) -> Any:
-    import rerun.blueprint as rrb
-
-    legend = rrb.PlotLegend(rrb.Corner2D.LeftTop)
-    views = [rrb.TimeSeriesView(name=title, origin=f"/{name}", plot_legend=legend) for name, title in plots.items()]
-    return rrb.Grid(*views, grid_columns=n_columns)

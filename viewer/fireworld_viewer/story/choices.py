@@ -1,4 +1,4 @@
-"""What brigades chose, as tables over the steps: records leave out what there was none of."""
+"""What brigades chose, as tables over all steps; a record leaves out what there is none of in its step."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from fireworld.records import ACTIONS, Recording
 
 
 @dataclass(frozen=True)
-class Choices:
-    """Choices of k steps and n brigades. Not a number where there is no value."""
+class ChoiceTables:
+    """Choices of k steps and n brigades; NaN where there is no value."""
 
     action: NDArray[np.int64]  # (k, n), -1 no choice
     target: NDArray[np.int64]  # (k, n) index of a building, -1 none
     explored: NDArray[np.bool_]  # (k, n)
-    values: NDArray[np.float64]  # (k, n, 4) of the paper's actions
-    chosen: NDArray[np.float64]  # (k, n) of what was chosen: the target's where targets are ranked, else the action's
+    action_values: NDArray[np.float64]  # (k, n, 4) of the paper's actions
+    value: NDArray[np.float64]  # (k, n) of the choice: the target's where targets are ranked, else the action's
     ranked: NDArray[np.bool_]  # (k, n) targets are ranked
 
 
-def choices_of(recording: Recording) -> Choices:
+def choices_of(recording: Recording) -> ChoiceTables:
     """Read the choices of all steps of a recording."""
     action = per_brigade(recording, "action", missing=-1)
     k, n = action.shape
@@ -38,18 +38,18 @@ def choices_of(recording: Recording) -> Choices:
     of_action = np.full((k, n), np.nan)
     known = (action >= 0) & (action < len(ACTIONS))
     of_action[known] = values[known, action[known]]
-    return Choices(
+    return ChoiceTables(
         action=action,
         target=per_brigade(recording, "target", missing=-1),
         explored=per_brigade(recording, "explored", missing=0).astype(bool),
-        values=values,
-        chosen=np.where(ranked, target_value, of_action),
+        action_values=values,
+        value=np.where(ranked, target_value, of_action),
         ranked=ranked,
     )
 
 
 def is_rule(values: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether values, (..., 4), are those of a rule: 1 for the action that it names and 0 for the others."""
+    """Return whether values, (..., 4), are those of a rule: 1 for the action that it names, 0 for the others."""
     rule: NDArray[np.bool_] = np.all((values == 0) | (values == 1), axis=-1) & (np.sum(values == 1, axis=-1) == 1)
     return rule
 
@@ -61,12 +61,12 @@ def per_brigade(recording: Recording, name: str, *, missing: float, topic: str =
 def per_brigade(
     recording: Recording, name: str, *, missing: float, topic: str = "/decisions"
 ) -> NDArray[np.int64] | NDArray[np.float64]:
-    """Return one field over all steps, (k, n_brigades), where some steps have none of it.
+    """Return one field over all steps, (k, n_brigades), even where some steps have none of it.
 
     Args:
         recording: the steps.
         name: of the field.
-        missing: what stands for none: an int makes a table of whole numbers, a float one of floats.
+        missing: stands where there is none; an int makes a table of whole numbers, a float one of floats.
         topic: of the field.
     """
     n = len(recording.city.brigade_tank_litres)

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from fireworld.records import ACTION_NAMES, ACTIVITIES, EVENT_KINDS, Array, Recording
-from fireworld_viewer.story.choices import per_brigade
+from fireworld_viewer.story.choices import choices_of
 
 _OWN_TARGET: Final = ACTION_NAMES.index("own-target")
 
@@ -27,7 +27,7 @@ class OwnTarget:
 
 @dataclass(frozen=True, kw_only=True)
 class Counts:
-    """What one brigade chose and did in the steps in which brigades were asked."""
+    """What one brigade chose and did in the steps in which brigades were asked for a decision."""
 
     brigade: int
     n_by_action: tuple[int, ...]
@@ -35,7 +35,7 @@ class Counts:
     n_without: int
     """Steps without a choice: refilling, dead, or nothing burns."""
     n_changes: int
-    """How often a choice differed from the one before, steps without one left out."""
+    """How often a choice differed from the one before; steps without a choice are ignored."""
     n_explored: int
     n_by_activity: tuple[int, ...]
     """Steps by index into ACTIVITIES."""
@@ -47,12 +47,11 @@ class Counts:
 
 
 def count_choices(recording: Recording) -> list[Counts]:
-    """Count what each brigade chose and did; a step before anybody was asked does not count."""
+    """Count what each brigade chose and did; steps in which no brigade was asked are left out."""
     asked = np.array([len(row) > 0 for row in recording.ragged("/decisions", "action")], dtype=bool)
     steps = np.asarray(recording.steps)[asked]
-    action, target, explored = (
-        per_brigade(recording, name, missing=-1)[asked].astype(np.int64) for name in ("action", "target", "explored")
-    )
+    choices = choices_of(recording)
+    action, target, explored = choices.action[asked], choices.target[asked], choices.explored[asked]
     activity, sprayed, driven = (
         np.asarray(recording.column("/brigades", name))[asked] for name in ("activity", "sprayed_litres", "driven_m")
     )
@@ -63,7 +62,7 @@ def count_choices(recording: Recording) -> list[Counts]:
             n_by_action=tuple(_numbers(action[:, brigade], len(ACTION_NAMES))),
             n_without=int(np.count_nonzero(action[:, brigade] < 0)),
             n_changes=_changes(action[:, brigade], target[:, brigade]),
-            n_explored=int(np.count_nonzero(explored[:, brigade] > 0)),
+            n_explored=int(np.count_nonzero(explored[:, brigade])),
             n_by_activity=tuple(_numbers(activity[:, brigade], len(ACTIVITIES))),
             sprayed_litres=int(sprayed[:, brigade].sum()),
             driven_m=float(driven[:, brigade].sum()),

@@ -1,22 +1,29 @@
-"""The run in words: a line for each event, and for each choice that is new, with what the brigade saw and weighed."""
+"""The run in words: a line for each event, and for each new choice with its value and what the brigade observed."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fireworld.records import ACTION_NAMES, ACTIONS, EVENT_KINDS, LEVELS, VOLUMES, CityRecord, Recording
 from fireworld_viewer import colors
-from fireworld_viewer.rerun_view.layers import Stage
-from fireworld_viewer.story.choices import Choices, choices_of, per_brigade
+from fireworld_viewer.story.choices import ChoiceTables, per_brigade
 
-Line = tuple[int, str, str, colors.Rgb]
-"""Step, level, text, color."""
 
-SEEN: Final = (
+class LogLine(NamedTuple):
+    """A line of a log."""
+
+    step: int
+    level: str
+    """INFO, WARN, ERROR or CRITICAL."""
+    text: str
+    rgb: colors.Rgb
+
+
+OBSERVED: Final = (
     "free_edges",
     "distance_from_center",
     "distance_from_civilian",
@@ -24,7 +31,7 @@ SEEN: Final = (
     *(f"others_{action.replace('-', '_')}" for action in ACTIONS),
     "state_index",
 )
-"""The features of /observations that a line tells."""
+"""The fields of /observations that a line about a choice contains."""
 
 _EVENT_LINES: Final = {
     "ignited": ("WARN", "building {} ignited", colors.FIERYNESS_RGB[2]),
@@ -40,59 +47,46 @@ _EVENT_LINES: Final = {
 }
 
 
-def log_text(stage: Stage, recording: Recording) -> None:
-    """Send the lines of events and of decisions, each to a log of its own."""
-    _log_lines(stage, "log/events", event_lines(recording))
-    chosen = choices_of(recording)
-    new = chosen.explored.copy()
-    for brigade in range(new.shape[1]):
-        pairs = np.column_stack([chosen.action[:, brigade], chosen.target[:, brigade]])
-        new[stage.changed(f"log/decisions/{brigade}", pairs), brigade] = True
-    new[[len(row) == 0 for row in recording.ragged("/decisions", "action")]] = False  # nobody was asked
-    _log_lines(stage, "log/decisions", decision_lines(recording, chosen, new))
-
-
-def event_lines(recording: Recording) -> Iterator[Line]:
-    """Word the events, in the order in which they happened."""
-    named = _building_names(recording.city)
+def event_lines(recording: Recording) -> Iterator[LogLine]:
+    """Write the events in words, in the order in which they happened."""
+    id_of = _building_ids(recording.city)
     kinds, entities = recording.ragged("/events", "kind"), recording.ragged("/events", "entity")
     for step, kind_row, entity_row in zip(recording.steps.tolist(), kinds, entities, strict=True):
         for kind, entity in zip(kind_row.tolist(), entity_row.tolist(), strict=True):
             level, wording, rgb = _EVENT_LINES[EVENT_KINDS[kind]]
-            yield step, level, wording.format(named(entity) if "building" in wording else entity), rgb
+            yield LogLine(step, level, wording.format(id_of(entity) if "building" in wording else entity), rgb)
 
 
-def decision_lines(recording: Recording, chosen: Choices, new: NDArray[np.bool_]) -> Iterator[Line]:
-    """Word the choices that are new: what for, by which value, and what the brigade saw.
+def decision_lines(recording: Recording, choices: ChoiceTables, new: NDArray[np.bool_]) -> Iterator[LogLine]:
+    """Write choices in words: the action, its target and value, and what the brigade observed.
 
     Args:
         recording: the steps.
-        chosen: their choices.
-        new: (k, n_brigades) which of the choices to word.
+        choices: their choices.
+        new: (k, n_brigades) which of the choices to write.
     """
-    named = _building_names(recording.city)
-    seen = {name: per_brigade(recording, name, missing=-1, topic="/observations") for name in SEEN}
+    id_of = _building_ids(recording.city)
+    observed = {name: per_brigade(recording, name, missing=-1, topic="/observations") for name in OBSERVED}
     steps = recording.steps.tolist()
     for row, brigade in zip(*(places.tolist() for places in np.nonzero(new)), strict=True):
-        action, target = int(chosen.action[row, brigade]), int(chosen.target[row, brigade])
+        action, target = int(choices.action[row, brigade]), int(choices.target[row, brigade])
         parts = ["no choice"]
         if action >= 0:
-            aim = f" → building {named(target)}" if target >= 0 else ""
-            exploring = " (exploring)" if chosen.explored[row, brigade] else ""
-            weighed = weighed_words(chosen, row, brigade)
-            saw = seen_words({name: int(table[row, brigade]) for name, table in seen.items()})
-            parts = [f"{ACTION_NAMES[action]}{aim}{exploring}", weighed, saw]
+            aim = f" → building {id_of(target)}" if target >= 0 else ""
+            exploring = " (exploring)" if choices.explored[row, brigade] else ""
+            state = state_words({name: int(table[row, brigade]) for name, table in observed.items()})
+            parts = [f"{ACTION_NAMES[action]}{aim}{exploring}", value_words(choices, row, brigade), state]
         text = f"brigade {brigade}: {', '.join(part for part in parts if part)}"
-        yield steps[row], "INFO", text, colors.BRIGADE_RGB[brigade % len(colors.BRIGADE_RGB)]
+        yield LogLine(steps[row], "INFO", text, colors.BRIGADE_RGB[brigade % len(colors.BRIGADE_RGB)])
 
 
-def weighed_words(chosen: Choices, row: int, brigade: int) -> str:
-    """Say the value of a choice and that of the best other action; "" where the policy has no values."""
-    values, action = chosen.values[row, brigade], int(chosen.action[row, brigade])
-    own = float(chosen.chosen[row, brigade])
+def value_words(choices: ChoiceTables, row: int, brigade: int) -> str:
+    """Write the value of a choice and that of the best other action; "" where the policy has no values."""
+    values, action = choices.action_values[row, brigade], int(choices.action[row, brigade])
+    own = float(choices.value[row, brigade])
     if np.isnan(own):
         return ""
-    ranked = bool(chosen.ranked[row, brigade])
+    ranked = bool(choices.ranked[row, brigade])
     text = f"{'value' if ranked else 'Q'} {own:.4g}"
     others = [other for other in range(len(ACTIONS)) if other != action and not np.isnan(values[other])]
     if not others:
@@ -103,29 +97,19 @@ def weighed_words(chosen: Choices, row: int, brigade: int) -> str:
     return f"{text} against {values[best]:.4g} of {ACTIONS[best]}"
 
 
-def seen_words(saw: Mapping[str, int]) -> str:
-    """Say the features that a brigade saw, by their names in the records; "" where it saw none."""
-    if saw["state_index"] < 0:
+def state_words(observed: Mapping[str, int]) -> str:
+    """Write the state that a brigade observed, feature by feature; "" where it observed none."""
+    if observed["state_index"] < 0:
         return ""
-    others = [action for action in ACTIONS if saw[f"others_{action.replace('-', '_')}"] == 1]
+    others = [action for action in ACTIONS if observed[f"others_{action.replace('-', '_')}"] == 1]
     return (
-        f"state {saw['state_index']}: free edges {saw['free_edges']}, center {LEVELS[saw['distance_from_center']]}, "
-        f"civilian {LEVELS[saw['distance_from_civilian']]}, volume {VOLUMES[saw['volume']]}, "
+        f"state {observed['state_index']}: free edges {observed['free_edges']}, "
+        f"center {LEVELS[observed['distance_from_center']]}, "
+        f"civilian {LEVELS[observed['distance_from_civilian']]}, volume {VOLUMES[observed['volume']]}, "
         f"others {' '.join(others) or 'nothing'}"
     )
 
 
-def _building_names(city: CityRecord) -> Callable[[int], int]:
-    ids = np.asarray(city.building_id).tolist()
-    return lambda index: ids[index]
-
-
-def _log_lines(stage: Stage, path: str, lines: Iterator[Line]) -> None:
-    import rerun
-
-    table = list(lines)
-    if not table:
-        return
-    steps, levels, texts, rgb = zip(*table, strict=True)
-    columns = rerun.TextLog.columns(text=texts, level=levels, color=colors.packed_table(rgb))
-    stage.rows(path, columns, steps=np.array(steps, dtype=np.int64))
+def _building_ids(city: CityRecord) -> Callable[[int], int]:
+    ids: list[int] = np.asarray(city.building_id).tolist()
+    return ids.__getitem__

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from fireworld.records import CityRecord
-from fireworld_viewer.pictures.city_map import INK, WIDTH_INCHES, CityMap, MapState, extent_m
-from fireworld_viewer.pictures.figure_files import DPI, new_figure
+from fireworld_viewer.pictures.city_map import WIDTH_INCHES, CityMap, MapState, extent_m
+from fireworld_viewer.pictures.figure_files import DPI, INK, new_figure
 from fireworld_viewer.pictures.map_legend import LABELS, count_marks, draw_legend, show_counts
 
 if TYPE_CHECKING:
@@ -26,8 +26,8 @@ _MAPS_COUNTED: Final = 2
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cell:
-    """One map of a sheet."""
+class MapCell:
+    """One map of a grid."""
 
     city: CityRecord
     state: MapState
@@ -36,15 +36,15 @@ class Cell:
     """A second line of the heading."""
 
 
-class Sheet:
-    """A figure of maps; `show` sets all of them anew.
+class MapGrid:
+    """A figure of maps; `show` sets all of them to another step.
 
     Args:
         cells: row by row.
         columns: maps side by side.
         map_inches: width of a map.
-        heading: above everything, if there is something to say.
-        labels: what the legend names; what is on these maps if left out.
+        heading: above everything; empty for none.
+        labels: entries of the legend; what is on these maps if left out.
         dpi: pixels an inch.
 
     Raises:
@@ -53,7 +53,7 @@ class Sheet:
 
     def __init__(
         self,
-        cells: Sequence[Cell],
+        cells: Sequence[MapCell],
         *,
         columns: int = 1,
         map_inches: float = WIDTH_INCHES,
@@ -76,9 +76,8 @@ class Sheet:
         self._maps: list[CityMap] = []
         self._facts: list[Any] = []
         if heading:
-            self._write(
-                _GAP_INCHES, above - 0.5 * _LINE_INCHES, heading, points=13.0, inches=self._width - 2 * _GAP_INCHES
-            )
+            room = self._width - 2 * _GAP_INCHES
+            self._write(_GAP_INCHES, above - 0.5 * _LINE_INCHES, heading, points=13.0, inches=room)
         for index, cell in enumerate(cells):
             row, column = divmod(index, columns)
             left = _GAP_INCHES + column * (map_inches + _GAP_INCHES)
@@ -91,7 +90,7 @@ class Sheet:
 
     @property
     def changing(self) -> list[tuple[Any, Artist]]:
-        """What `show` sets beside the legend, in the order of drawing, with the axes to draw it on."""
+        """What `show` sets besides the legend, in the order of drawing, with the axes to draw it on."""
         on_maps = [(one.axes, item) for one in self._maps for item in one.changing]
         return [*on_maps, *((self._maps[0].axes, item) for item in self._facts)]
 
@@ -100,7 +99,7 @@ class Sheet:
         """The words of the legend, which `show` sets too."""
         return list(self._legend.get_texts())
 
-    def show(self, cells: Sequence[Cell]) -> None:
+    def show(self, cells: Sequence[MapCell]) -> None:
         """Set every map; `cells` are as many as before, of the same cities."""
         for one, facts, cell in zip(self._maps, self._facts, cells, strict=True):
             one.show(cell.state)
@@ -108,14 +107,14 @@ class Sheet:
         counts = [count_marks(cell.city, cell.state) for cell in cells] if self._counted else []
         show_counts(self._legend, self._labels, counts)
 
-    def _add(self, cell: Cell, left: float, top: float, height: float, *, alone: bool, n_lines: int) -> None:
+    def _add(self, cell: MapCell, left: float, top: float, height: float, *, alone: bool, n_lines: int) -> None:
         """Add a map whose upper left corner is there, in inches from the upper left one of the figure."""
         wide, high = self._width, self._height
         box = (left / wide, 1.0 - (top + height) / high, self._map_inches / wide, height / high)
         axes = self.figure.add_axes(box)
         n_brigades = len(cell.city.brigade_tank_litres)
-        if cell.state.crews is not None:
-            n_brigades = max(n_brigades, len(cell.state.crews.xy_m))
+        if cell.state.brigades is not None:
+            n_brigades = max(n_brigades, len(cell.state.brigades.xy_m))
         self._maps.append(CityMap(axes, cell.city, inches=self._map_inches, n_brigades=n_brigades))
         room = wide - 2 * _GAP_INCHES if alone else self._map_inches
         size = 13.0 if alone else 11.0
@@ -124,14 +123,14 @@ class Sheet:
         self._facts.append(self._write(left, top, cell.facts, points=size - 2.0, inches=room))
 
     def _write(self, left: float, bottom: float, text: str, *, points: float, inches: float) -> Any:
-        """Write a line, in smaller letters if it would be too long; names in it are whoever's, and no formulas."""
+        """Write a line, in smaller letters if it would be too long; names in it come from files and are no formulas."""
         fitting = inches * 72.0 / (_POINTS_WIDE * max(1, len(text)))
         place = (left / self._width, 1.0 - (bottom - 0.07) / self._height)
         style: dict[str, Any] = {"ha": "left", "va": "baseline", "color": INK, "parse_math": False}
         return self.figure.text(*place, text, fontsize=min(points, max(fitting, 6.0)), **style)
 
 
-def _labels_of(cells: Sequence[Cell]) -> list[str]:
+def _labels_of(cells: Sequence[MapCell]) -> list[str]:
     there: set[str] = set().union(*(count_marks(cell.city, cell.state) for cell in cells))
     return [label for label in LABELS if label in there]
 

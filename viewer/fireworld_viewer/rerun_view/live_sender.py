@@ -1,4 +1,4 @@
-"""Bring what happens to Rerun's viewer, which never makes it wait: a thread, a bounded queue, a pipe to a process."""
+"""Send what happens to Rerun's viewer without ever waiting for it: a thread, a bounded queue, a pipe to a process."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ PATIENCE_SECONDS: Final = 5.0
 _PIECE_BYTES: Final = 1 << 16
 
 
-class ViewerPipe:
-    """A process of Rerun's program that reads its standard input: the viewer itself, or a bringer to one that runs.
+class ViewerProcess:
+    """A process of Rerun's program that reads its standard input: the viewer itself, or a relay to one that runs.
 
     Args:
         command: the program and its arguments.
         environment: of the process.
-        stays: it goes on when the input ends, as a window does that somebody still looks at.
+        stays: whether it stays when the input ends, as a window does that somebody still looks at.
 
     Raises:
         ViewError: it cannot be started.
@@ -45,25 +45,25 @@ class ViewerPipe:
             )
         except OSError as error:
             raise ViewError(f"--view: Rerun's viewer cannot be started: {error.strerror or error}") from None
+        assert self._process.stdin is not None  # noqa: S101 - asked for above
+        self._input = self._process.stdin
 
     def write(self, content: bytes) -> int:
-        """Write a piece; wait while the viewer is busy. Returns the bytes written, some or all.
+        """Write a piece, waiting while the viewer is busy, and return the number of bytes written, some or all.
 
         Raises:
             OSError: the viewer is closed.
         """
-        assert self._process.stdin is not None  # noqa: S101 - asked for above
-        return self._process.stdin.write(content[:_PIECE_BYTES]) or 0
+        return self._input.write(content[:_PIECE_BYTES]) or 0
 
     def close(self, *, finished: bool) -> bool:
-        """End the input; a bringer is given the time to bring the rest. Returns whether it has.
+        """End the input; a relay is given the time to send the rest. Return whether it has.
 
         Args:
-            finished: all was written; else what is under way is given up.
+            finished: whether all was written; if not, the rest is abandoned.
         """
-        assert self._process.stdin is not None  # noqa: S101 - as above
         if finished:
-            self._process.stdin.close()
+            self._input.close()
         if self._stays:
             self._process.returncode = 0  # it is the user's from now on: no warning that it still runs
             return finished
@@ -72,30 +72,30 @@ class ViewerPipe:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        self._process.stdin.close()  # once more where all was written; else nobody writes to a dead process for long
+        self._input.close()  # again where all was written; else the process is dead, and the writing thread fails
         return finished and self._process.returncode == 0
 
 
-class Courier(Generic[Item]):
-    """Brings items in batches. Who puts one never waits; if too many wait, every second of them is left out.
+class BackgroundSender(Generic[Item]):
+    """Sends items in batches. `put` never waits; if too many items wait, every second of them is left out.
 
     Args:
-        encode: makes the bytes of a batch, in the courier's thread.
-        pipe: where they go.
+        encode: makes the bytes of a batch, in the sender's thread.
+        process: where they go.
         n_waiting_max: items that may wait, which bounds the memory.
-        tell: told, once, why nothing is brought any more.
+        warn: called at most once, with a line on what the viewer does not show and why.
     """
 
     def __init__(
         self,
         encode: Callable[[Sequence[Item]], bytes],
-        pipe: ViewerPipe,
+        process: ViewerProcess,
         *,
         n_waiting_max: int,
-        tell: Callable[[str], None],
+        warn: Callable[[str], None],
     ) -> None:
         self.n_left_out = 0
-        self._encode, self._pipe, self._tell = encode, pipe, tell
+        self._encode, self._process, self._warn = encode, process, warn
         self._n_waiting_max = n_waiting_max
         self._waiting: list[Item] = []
         self._changed = Condition()
@@ -117,7 +117,7 @@ class Courier(Generic[Item]):
             self._changed.notify()
 
     def close(self) -> None:
-        """Bring the rest, as long as the viewer takes it."""
+        """Send the rest, as long as the viewer takes it."""
         with self._changed:
             self._closing = True
             self._changed.notify()
@@ -128,28 +128,28 @@ class Courier(Generic[Item]):
         with self._changed:
             failed, finished = self._failed, not self._thread.is_alive()
             self._failed = True
-        finished = self._pipe.close(finished=finished)
+        finished = self._process.close(finished=finished)
         if failed:
             return
         if not finished:
-            self._tell("view: the viewer has not taken the end of it")
+            self._warn("view: the viewer did not take the last of it")
         elif self.n_left_out:
-            self._tell(f"view: it is slower than the run; {self.n_left_out} steps are left out in it")
+            self._warn(f"view: the viewer is slower than the run; {self.n_left_out} steps are left out in it")
 
     def _work(self) -> None:
         try:
             while batch := self._next_batch():
                 content = self._encode(batch)
                 while content:
-                    content = content[self._pipe.write(content) :]
+                    content = content[self._process.write(content) :]
                     self._n_pieces += 1
         except OSError:
             self._give_up("the viewer is closed")
-        except Exception as error:  # noqa: BLE001 - whatever is wrong with the view, the run goes on
+        except Exception as error:  # noqa: BLE001 - whatever is wrong with the view, the run continues
             self._give_up(f"{type(error).__name__}: {error}")
 
     def _next_batch(self) -> list[Item]:
-        """Wait for items, and a little longer for more; an empty batch at the end."""
+        """Wait for items, and a little longer for more; return an empty batch at the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._waiting or self._closing)
             if not self._closing:
@@ -164,4 +164,4 @@ class Courier(Generic[Item]):
                 return
             self._failed = True
             self._waiting.clear()
-        self._tell(f"view: {reason}; the run goes on without it")
+        self._warn(f"view: {reason}; the run continues without it")

@@ -1,20 +1,21 @@
-"""The legend: every color of the map with its name, and a page on how to read the view."""
+"""The legend, every color of the map with its name, and pages of text: how to read the view, and the outcome."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
+
+import rerun
 
 from fireworld.records import ACTIVITIES, FIERYNESS
 from fireworld_viewer import colors
-
-if TYPE_CHECKING:
-    import rerun
+from fireworld_viewer.rerun_view.outcome_page import OutcomePage
 
 LEGEND_PATH: Final = "/legend"
 HELP_PATH: Final = "/help"
+OUTCOME_PATH: Final = "/outcome"
 
 _COLUMN_WIDTH: Final = 3.9
-"""In rows: a name is so wide, and a row as high as a dot with its name."""
+"""Width of a name in rows; a row is as high as a dot with its name."""
 
 HELP: Final = """\
 # How to read this
@@ -26,19 +27,17 @@ fieryness at this step.
 
 **Brigades** are balls, colored by what they do. The blue bar above a brigade is the water in its tank; the label is
 its name and the litres. A blue arc is water on its way to the target; a thin white one leads to the target that a
-brigade drives to. Brigades on one spot are drawn side by side. Click a ball to read what it chose, and by which values.
+brigade drives to. Brigades on one spot are drawn side by side. Click a ball to read its choice and all actions' values.
 
 **Civilians** are small dots above roofs: green when well, white when hurt, magenta when dying, black when dead.
 
-**Fire sites** are thin boxes, as the brigades saw them before the step; a pink side is one over which the fire can
-still spread.
+**Fire sites** are thin boxes around what burns, as observed before the step; the fire can still spread over pink sides.
 
-**Air**: a recording holds the heat of the air only every 50 steps. The third tab of the map shows the last one that
-there was, and says of which step it is; `fireworld view --air` works out every step. From purple over pink to white it
-gets hotter.
+**Air**: a recording holds the heat of the air only every 50 steps. The third tab of the map shows the latest of these,
+with its step; `fireworld view --air` computes every step. The air gets hotter from purple over pink to white.
 
-**The log** tells what happened, and each choice that is new: what a brigade goes for, the value (Q) of that beside the
-best other action's, and the state that it saw. A rule has no values.
+**The log** lists events, and each choice that is new: the brigade's action and target, its value (Q) beside that of the
+best other action, and the state that the brigade observed. A rule has no values.
 
 The slider below moves through the steps, one simulated minute each; the space bar plays them. With two recordings the
 marked part of the slider begins where they first differ.
@@ -46,7 +45,7 @@ marked part of the slider begins where they first differ.
 
 
 def entries(*, comparing: bool) -> list[list[tuple[str, colors.Rgb]]]:
-    """Rows of names and colors of all that is on the map."""
+    """Return rows of names and colors of everything on the map."""
     buildings = list(zip(FIERYNESS, colors.FIERYNESS_RGB, strict=True))
     names = [f"brigade {activity}".replace("driving-to", "to") for activity in ACTIVITIES]
     brigades = list(zip(names, colors.ACTIVITY_RGB, strict=True))
@@ -69,7 +68,7 @@ def entries(*, comparing: bool) -> list[list[tuple[str, colors.Rgb]]]:
 
 
 def bounds(*, comparing: bool) -> tuple[tuple[float, float], tuple[float, float]]:
-    """What of the legend's plane is to be seen: its range in x and in y."""
+    """Return the part of the legend's plane that is shown: its range in x and in y."""
     rows = entries(comparing=comparing)
     n_columns = max(map(len, rows))
     return (-_COLUMN_WIDTH / 2, _COLUMN_WIDTH * (n_columns - 0.5)), (-0.4, len(rows) - 0.1)
@@ -77,15 +76,13 @@ def bounds(*, comparing: bool) -> tuple[tuple[float, float], tuple[float, float]
 
 def log_legend(stream: rerun.RecordingStream, *, comparing: bool) -> None:
     """Send the legend, as dots in rows with their names below them, and the page of help."""
-    import rerun
-
     rows = entries(comparing=comparing)
     place = [(_COLUMN_WIDTH * x, float(y)) for y, row in enumerate(rows) for x in range(len(row))]
     named = [entry for row in rows for entry in row]
     dots = rerun.Points2D(
         place, colors=colors.packed_table([rgb for _, rgb in named]), radii=rerun.Radius.ui_points(6.0)
     )
-    # The names hang on points of their own: a name takes the color of its point, and black ones could not be read.
+    # The names have points of their own: a name takes the color of its point, and black ones could not be read.
     names = rerun.Points2D(
         place,
         colors=colors.single(colors.LABEL_RGB),
@@ -95,4 +92,13 @@ def log_legend(stream: rerun.RecordingStream, *, comparing: bool) -> None:
     )
     stream.log(f"{LEGEND_PATH}/dots", dots, static=True)
     stream.log(f"{LEGEND_PATH}/names", names, static=True)
-    stream.log(HELP_PATH, rerun.TextDocument(HELP, media_type=rerun.MediaType.MARKDOWN), static=True)
+    _log_page(stream, HELP_PATH, HELP)
+
+
+def log_outcome(stream: rerun.RecordingStream, page: OutcomePage) -> None:
+    """Send the page of the outcome."""
+    _log_page(stream, OUTCOME_PATH, page.markdown)
+
+
+def _log_page(stream: rerun.RecordingStream, path: str, text: str) -> None:
+    stream.log(path, rerun.TextDocument(text, media_type=rerun.MediaType.MARKDOWN), static=True)

@@ -1,0 +1,124 @@
+"""Two runs that differ: a map of what differs at a step, and curves of both."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from fireworld.records import Array, CityRecord, StepRecord
+from fireworld_viewer import colors
+from fireworld_viewer.pictures.city_map import hexadecimal
+from fireworld_viewer.pictures.figure_files import INK, PAIR_COLORS, new_figure, open_frame
+from fireworld_viewer.pictures.maps import draw_map
+from fireworld_viewer.story.two_runs import compare_damage
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Gaps = Sequence[float | None]
+"""Numbers over steps; None where a run does not have the step."""
+
+_VIOLET: Final = "#a0209a"
+_BRIGADE: Final = hexadecimal(colors.ACTIVITY_RGB[2])
+_KINDS: Final = {
+    1: ("worse in B", hexadecimal(colors.WORSE_RGB)),
+    -1: ("better in B", hexadecimal(colors.BETTER_RGB)),
+    0: ("other difference", "#cec4e6"),
+}
+"""Of buildings that differ: label and color by the sign that `compare_damage` returns."""
+
+
+def draw_difference_map(city: CityRecord, a: StepRecord, b: StepRecord, differing: Mapping[str, Array]) -> Figure:
+    """Draw which buildings, brigades and civilians differ; brigades where they are in the second run.
+
+    `a` and `b` are one step of both runs; `differing`: "building", "brigade" and "civilian", (n,) bool which differ.
+
+    Raises:
+        ViewError: matplotlib is not installed.
+    """
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    figure = draw_map(city, civilian_hp=b.civilians.hp, title=f"what differs: step {b.step}")
+    axes = figure.axes[0]
+    chosen = np.flatnonzero(differing["building"])
+    damage = compare_damage(a.buildings.fieryness, b.buildings.fieryness)[chosen].tolist()
+    corners = np.column_stack([city.outline_x_m, city.outline_y_m])
+    outlines = [corners[city.outline_ptr[index] : city.outline_ptr[index + 1]] for index in chosen]
+    faces = [_KINDS[sign][1] for sign in damage]
+    axes.add_collection(PolyCollection(outlines, facecolors=faces, edgecolors=INK, linewidths=0.35, zorder=3))
+    moved = np.flatnonzero(differing["brigade"])
+    before, now = (np.column_stack([record.brigades.x_m, record.brigades.y_m])[moved] for record in (a, b))
+    axes.add_collection(LineCollection(list(np.stack([before, now], axis=1)), colors=INK, linewidths=1.2, zorder=7))
+    for xy, face in ((before, "none"), (now, _BRIGADE)):
+        axes.scatter(xy[:, 0], xy[:, 1], s=70, facecolors=face, edgecolors=INK, linewidths=1.4, zorder=8)
+    hurt = np.flatnonzero(differing["civilian"])
+    x, y = city.civilian_x_m[hurt], city.civilian_y_m[hurt]
+    axes.scatter(x, y, s=120, facecolors="none", edgecolors=_VIOLET, linewidths=1.8, zorder=8)
+    _draw_legend(axes, damage, n_brigades=len(moved), n_civilians=len(hurt))
+    return figure
+
+
+def _draw_legend(axes: Axes, damage: Sequence[int], *, n_brigades: int, n_civilians: int) -> None:
+    """Name what differs, in place of the map's own legend."""
+    from matplotlib.lines import Line2D
+
+    def mark(label: str, count: int, face: str, *, shape: str = "s", edge: str = INK) -> Line2D:
+        style: dict[str, Any] = {"markerfacecolor": face, "markeredgecolor": edge, "markersize": 9}
+        return Line2D([], [], linestyle="", marker=shape, label=f"{label} ({count})", **style)
+
+    handles = [mark(label, damage.count(sign), face) for sign, (label, face) in _KINDS.items() if sign in damage]
+    if n_brigades:
+        handles.append(mark("brigade, from A to B", n_brigades, _BRIGADE, shape="o"))
+    if n_civilians:
+        handles.append(mark("civilian", n_civilians, "none", shape="o", edge=_VIOLET))
+    handles.append(Line2D([], [], linestyle="", label="grey: the same"))
+    axes.legend(
+        handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False, labelcolor=INK, borderaxespad=0
+    )
+
+
+def draw_difference_curves(
+    steps: Sequence[int],
+    curves: Mapping[str, tuple[Gaps, Gaps]],
+    n_buildings: Mapping[str, Gaps],
+    *,
+    first_step: int | None,
+) -> Figure:
+    """Draw three curves of both runs, and how many buildings differ.
+
+    Args:
+        steps: of the numbers.
+        curves: by title: of A and of B; those after the first are counts.
+        n_buildings: by label: how many buildings differ, in anything and in fieryness.
+        first_step: of the first difference; None for none.
+
+    Raises:
+        ViewError: matplotlib is not installed.
+    """
+    figure = new_figure(12.0, 6.4, dpi=110, paper="white", layout="constrained")
+    panels = figure.subplots(2, 2, sharex=True).ravel()
+    for axes, (title, both) in zip(panels, curves.items(), strict=False):
+        for name, curve, color, style in zip("AB", both, PAIR_COLORS, ("-", "--"), strict=True):
+            axes.plot(steps, _with_gaps(curve), color=color, linestyle=style, linewidth=1.8, label=name)
+        axes.set_title(title, fontsize=11, loc="left")
+    for (label, counts), color in zip(n_buildings.items(), (INK, _VIOLET), strict=True):
+        panels[3].plot(steps, _with_gaps(counts), color=color, label=label)
+    panels[3].set_title("buildings that differ", fontsize=11, loc="left")
+    for axes in panels[[0, 3]]:
+        axes.legend(fontsize=9, frameon=False)
+    for axes in panels[1:]:  # counts
+        axes.set_ylim(bottom=0, top=max(1.0, axes.get_ylim()[1]))
+    for axes in panels:
+        if first_step is not None:
+            axes.axvline(first_step, color="#888888", linewidth=1.0, linestyle=":")
+        open_frame(axes)
+    figure.supxlabel("step; dotted: the first difference", fontsize=10)
+    return figure
+
+
+def _with_gaps(curve: Gaps) -> Array:
+    """(k,) float64: NaN where a run does not have the step."""
+    return np.array(curve, dtype=np.float64)

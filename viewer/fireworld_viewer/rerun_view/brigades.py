@@ -1,0 +1,112 @@
+"""Brigades in Rerun: balls with a gauge of their tanks, jets of water, and arcs to where they drive."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+import rerun
+from numpy.typing import NDArray
+
+from fireworld.records import ACTIONS, ACTIVITIES, Recording
+from fireworld_viewer import colors
+from fireworld_viewer.city_mesh import CityMesh
+from fireworld_viewer.rerun_view.layers import Layers, number_columns
+from fireworld_viewer.story.choices import choices_of, per_brigade
+
+_DRIVING: Final = ACTIVITIES.index("driving")
+_BALL_RADIUS_M: Final = 4.0
+_BALL_HEIGHT_M: Final = 6.0
+_GAUGE_HEIGHT_M: Final = 20.0
+_GAUGE_HALF_WIDTH_M: Final = 1.5
+_NAME_RISE_M: Final = 31.0
+_NAME_STACK_M: Final = 12.0
+_CROWD_M: Final = 22.0
+_QUEUE_M: Final = 8.0
+_JET_POINTS: Final = 9
+
+
+def log_brigades(layers: Layers, recording: Recording) -> None:
+    """Draw each brigade as a ball in the color of its activity, with a gauge of its tank and a label."""
+    position = positions_m(recording)
+    k, n = position.shape[:2]
+    if n == 0:
+        return
+    width = np.full(k, n)
+    tank = recording.column("/brigades", "tank_litres")
+    activity = recording.column("/brigades", "activity")
+    choices = choices_of(recording)
+    numbers: dict[str, NDArray[Any]] = {
+        "tank_litres": tank,
+        "sprayed_litres": recording.column("/brigades", "sprayed_litres"),
+        "hp": recording.column("/brigades", "hp"),
+        "activity": activity,
+        "action": choices.action,
+        "target": choices.target,
+        "value": choices.value,
+        **{f"value_{name.replace('-', '_')}": choices.action_values[..., index] for index, name in enumerate(ACTIONS)},
+    }
+    rgb = colors.packed_table(colors.ACTIVITY_RGB)[activity].reshape(-1)
+    balls = rerun.Points3D.columns(positions=position.reshape(-1, 3), colors=rgb)
+    layers.static("team/brigades", rerun.Points3D.from_fields(radii=[_BALL_RADIUS_M]))
+    layers.rows("team/brigades", balls.partition(width), number_columns("Brigade", numbers))
+
+    prefix = "" if layers.name else "brigade "  # there is less room beside another map
+    labels = [f"{prefix}{index} · {litres} l" for row in tank.tolist() for index, litres in enumerate(row)]
+    above = position.copy()
+    above[..., 2] += _NAME_RISE_M + _NAME_STACK_M * crowding(position[..., 0], position[..., 1], within_m=_CROWD_M)
+    names = rerun.Points3D.columns(positions=above.reshape(-1, 3), labels=labels)
+    style = rerun.Points3D.from_fields(radii=[0.1], colors=colors.single(colors.LABEL_RGB), show_labels=[True])
+    layers.static("team/names", style)
+    layers.rows("team/names", names.partition(width))
+
+    full = np.maximum(np.asarray(recording.city.brigade_tank_litres, dtype=np.float32), 1.0)
+    half_height = np.clip(tank / full, 0.0, 1.0).astype(np.float32) * (_GAUGE_HEIGHT_M / 2)
+    half_width = np.full_like(half_height, _GAUGE_HALF_WIDTH_M)
+    middle = position.copy()
+    middle[..., 2] = position[..., 2] + _BALL_RADIUS_M + half_height
+    gauges = rerun.Boxes3D.columns(
+        centers=middle.reshape(-1, 3),
+        half_sizes=np.stack([half_width, half_width, half_height], axis=-1).reshape(-1, 3),
+    )
+    style = rerun.Boxes3D.from_fields(colors=colors.single(colors.WATER_RGB), fill_mode=rerun.components.FillMode.Solid)
+    layers.static("team/tanks", style)
+    layers.rows("team/tanks", gauges.partition(width))
+
+
+def log_water(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
+    """Draw a jet from each brigade that sprays, and a thin arc from each that drives, to the target."""
+    activity = recording.column("/brigades", "activity")
+    sprayed = recording.column("/brigades", "sprayed_litres")
+    target = per_brigade(recording, "target", missing=-1)
+    position = positions_m(recording)
+    for path, shown, radius_m, rgb, rise_m in (
+        ("team/water", (target >= 0) & (sprayed > 0), 0.8, colors.WATER_RGB, 14.0),
+        ("team/ways", (target >= 0) & (activity == _DRIVING), 0.25, colors.DRIVE_RGB, 4.0),
+    ):
+        arcs = _arcs(position[shown], mesh.roof_xyz_m[target[shown]], rise_m)
+        layers.strips(path, arcs, shown.sum(axis=1), radius_m=radius_m, rgb=rgb)
+
+
+def positions_m(recording: Recording) -> NDArray[np.float32]:
+    """Return where brigades are drawn, (k, n_brigades, 3): where they are; those on one spot side by side, eastward."""
+    x, y = recording.column("/brigades", "x_m"), recording.column("/brigades", "y_m")
+    place = crowding(x, y, within_m=0.0)
+    return np.stack([x + _QUEUE_M * place, y, np.full(x.shape, _BALL_HEIGHT_M)], axis=-1).astype(np.float32)
+
+
+def crowding(x: NDArray[Any], y: NDArray[Any], *, within_m: float) -> NDArray[np.int64]:
+    """Count for each brigade those of lower numbers within a distance in x and in y: (k, n) and (k, n) to (k, n)."""
+    near = (np.abs(x[:, :, np.newaxis] - x[:, np.newaxis, :]) <= within_m) & (
+        np.abs(y[:, :, np.newaxis] - y[:, np.newaxis, :]) <= within_m
+    )
+    counts: NDArray[np.int64] = np.tril(near, k=-1).sum(axis=2)
+    return counts
+
+
+def _arcs(start: NDArray[np.float32], end: NDArray[np.float32], rise_m: float) -> NDArray[np.float32]:
+    """Return parabolas from (m, 3) to (m, 3) that rise above the straight line: (m, _JET_POINTS, 3)."""
+    along = np.linspace(0, 1, _JET_POINTS, dtype=np.float32)[np.newaxis, :, np.newaxis]
+    points = start[:, np.newaxis, :] * (1 - along) + end[:, np.newaxis, :] * along
+    points[..., 2] += rise_m * 4 * along[..., 0] * (1 - along[..., 0])
+    return points

@@ -1,0 +1,109 @@
+"""The city in Rerun: ground, streets, and what changes its color: buildings and civilians."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import rerun
+from numpy.typing import NDArray
+
+from fireworld.records import MATERIALS, CityRecord, Recording
+from fireworld_viewer import colors
+from fireworld_viewer.city_mesh import SHADES_PERCENT, STOREY_M, CityMesh, city_box_m
+from fireworld_viewer.rerun_view.layers import Layers, number_columns
+
+_REFUGE: Final = len(colors.FIERYNESS_RGB)
+"""Row of a refuge in the table of building colors."""
+_BUILDING_COLORS: Final = colors.shaded_table((*colors.FIERYNESS_RGB, colors.REFUGE_RGB), SHADES_PERCENT)
+_GROUND_M: Final = -0.4
+_GROUND_MARGIN_M: Final = 15.0
+
+
+def log_city(layers: Layers, city: CityRecord) -> None:
+    """Draw the ground, streets, refuges and hydrants; none of them changes."""
+    (west, south), (east, north) = city_box_m(city, margin_m=_GROUND_MARGIN_M)
+    ground = rerun.Mesh3D(
+        vertex_positions=[(x, y, _GROUND_M) for x, y in ((west, south), (east, south), (east, north), (west, north))],
+        triangle_indices=[(0, 1, 2), (0, 2, 3)],
+        vertex_colors=colors.packed_table([colors.GROUND_RGB] * 4),
+    )
+    layers.static("city/ground", ground)
+    if len(city.street_from):
+        node = np.column_stack([city.node_x_m, city.node_y_m, np.zeros(len(city.node_x_m))]).astype(np.float32)
+        strips = np.stack([node[city.street_from], node[city.street_to]], axis=1)
+        layers.static("city/streets", rerun.LineStrips3D(strips, colors=colors.single(colors.STREET_RGB), radii=[0.8]))
+    if len(city.refuge_building):
+        refuge = np.asarray(city.refuge_building)
+        above_m = STOREY_M * np.asarray(city.floors) + 3.0
+        roof = np.column_stack([city.center_x_m, city.center_y_m, above_m])[refuge]
+        labels = [f"refuge {city.building_id[index]}" for index in refuge]
+        rgb = colors.single(colors.REFUGE_RGB)
+        marks = rerun.Points3D(roof, colors=rgb, radii=[3.0], labels=labels, show_labels=True)
+        layers.static("city/refuges", marks)
+    if len(city.hydrant_x_m):
+        position = np.column_stack([city.hydrant_x_m, city.hydrant_y_m, np.full(len(city.hydrant_x_m), 1.0)])
+        hydrants = rerun.Points3D(position, colors=colors.single(colors.HYDRANT_RGB), radii=[1.2])
+        layers.static("city/hydrants", hydrants)
+
+
+def log_buildings(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
+    """Color the city by fieryness, and give the handle on every roof the numbers of its building."""
+    columns = {
+        name: recording.column("/buildings", name)
+        for name in ("temperature", "fuel_share", "water_litres", "fieryness")
+    }
+    shown = columns["fieryness"].copy()
+    shown[:, np.asarray(recording.city.refuge_building, dtype=np.intp)] = _REFUGE
+    log_mesh(layers, mesh, shown, _BUILDING_COLORS)
+    layers.numbers("city/handles", "Building", columns)
+
+
+def log_handles(layers: Layers, city: CityRecord, mesh: CityMesh) -> None:
+    """Put a dot on every roof that can be clicked, with the facts of its building; one batch, never one by one."""
+    handles = mesh.roof_xyz_m + np.array([0, 0, 0.3], dtype=np.float32)
+    points = rerun.Points3D(handles, colors=colors.single(colors.HANDLE_RGB), radii=[0.9])
+    facts = rerun.DynamicArchetype(
+        "Facts",
+        components={
+            "id": np.asarray(city.building_id),
+            "material": [MATERIALS[code] for code in city.material],
+            "floors": np.asarray(city.floors),
+            "volume_m3": np.asarray(city.volume_m3),
+            "initial_fuel": np.asarray(city.initial_fuel),
+        },
+    )
+    layers.static("city/handles", points, facts)
+
+
+def log_mesh(layers: Layers, mesh: CityMesh, codes: NDArray[np.uint8], table: NDArray[np.uint32]) -> None:
+    """Send the city's mesh once and its colors for every step in which a code changes.
+
+    codes: (k, n) row of the table for each building; table: (codes, len(SHADES_PERCENT)) packed colors.
+    """
+    path = "city/buildings"
+    layers.static(path, rerun.Mesh3D(vertex_positions=mesh.vertex_xyz_m, triangle_indices=mesh.triangle))
+    changed = layers.changed(path, codes)
+    entry = codes.astype(np.intp) * table.shape[1]
+    flat = table.reshape(-1)
+    n_vertices = len(mesh.vertex_building)
+    for block in layers.blocks(4 * n_vertices, changed):
+        vertex_colors = flat[entry[block][:, mesh.vertex_building] + mesh.vertex_shade]
+        columns = rerun.Mesh3D.columns(vertex_colors=vertex_colors.reshape(-1))
+        layers.rows(path, columns.partition(np.full(len(block), n_vertices)), steps=layers.steps[block])
+
+
+def log_civilians(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
+    """Draw each civilian, above the roof of the building it is in, in the color of its health."""
+    city = recording.city
+    n = len(city.civilian_x_m)
+    if n == 0:
+        return
+    inside = np.asarray(city.civilian_building)
+    height = np.where(inside >= 0, mesh.roof_xyz_m[inside, 2] + 3.0, 2.0)
+    position = np.column_stack([city.civilian_x_m, city.civilian_y_m, height])
+    layers.static("civilians", rerun.Points3D(position, radii=[2.6]))
+    hp = recording.column("/civilians", "hp")
+    health = colors.packed_array(colors.health_rgb(hp, np.asarray(city.civilian_hp)))
+    dots = rerun.Points3D.columns(colors=health.reshape(-1)).partition(np.full(len(hp), n))
+    layers.rows("civilians", dots, number_columns("Civilian", {"hp": hp}))

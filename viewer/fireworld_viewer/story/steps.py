@@ -1,0 +1,109 @@
+"""Which steps are shown of one recording, or of two in one city; each recording is read once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fireworld.errors import ViewError, expected
+from fireworld.records import MemoryRecording, Recording, StepRecord
+from fireworld_viewer.story.two_runs import check_same_city, common_steps
+
+LAST: Final = -1
+"""In place of a step: the last one."""
+
+
+@dataclass(frozen=True)
+class ShownStep:
+    """A step of every recording that is shown; of a run that ended earlier, its last step."""
+
+    step: int
+    records: tuple[StepRecord, ...]
+
+
+def select_steps(
+    recording: Recording, *, first: int | None = None, last: int | None = None, every: int = 1
+) -> MemoryRecording:
+    """Read the steps from `first` to `last`, both included, and of these every `every`-th, into memory.
+
+    Events and choices of steps that are left out are left out, too.
+
+    Raises:
+        ViewError: no step is left.
+    """
+    chosen = set(_between("view", recording.steps, first, last)[::every].tolist())
+    return MemoryRecording(recording.header, recording.city, [one for one in recording if one.step in chosen])
+
+
+def read_steps(recordings: Sequence[Recording], steps: Sequence[int]) -> list[ShownStep]:
+    """Read single steps, or LAST, of one recording or two, in the order given.
+
+    Raises:
+        ViewError: there is no such step, or the cities differ.
+    """
+    held = steps_of(recordings)
+    chosen = [int(held[-1]) if step == LAST else step for step in steps]
+    for step in chosen:
+        if step not in held:
+            raise ViewError(expected("pictures", "step", f"a step from {held[0]} to {held[-1]}", step))
+    by_step = {shown.step: shown for shown in _read(recordings, sorted(set(chosen)))}
+    return [by_step[step] for step in chosen]
+
+
+def read_steps_between(
+    recordings: Sequence[Recording], *, first: int | None = None, last: int | None = None, every: int = 1
+) -> list[ShownStep]:
+    """Read the steps from `first` to `last`, both included: every `every`-th of them, and always the last one.
+
+    Raises:
+        ViewError: no step is left, or the cities differ.
+    """
+    between = _between("pictures", steps_of(recordings), first, last)
+    return _read(recordings, sorted({*between[::every].tolist(), int(between[-1])}))
+
+
+def evenly_spaced(recordings: Sequence[Recording], n: int) -> list[int]:
+    """Return n steps spread evenly from the first to the last, each once."""
+    held = steps_of(recordings)
+    places = [round(k * (len(held) - 1) / max(1, n - 1)) for k in range(n)]
+    return [int(held[place]) for place in sorted(set(places))]
+
+
+def steps_of(recordings: Sequence[Recording]) -> NDArray[np.int64]:
+    """Return the steps that can be shown, (k,) int64; errors as in `read_steps`."""
+    if len(recordings) == 1:
+        if len(recordings[0].steps) == 0:
+            raise ViewError(expected("pictures", "", "a recording with steps", "one without"))
+        return recordings[0].steps
+    first, second = recordings
+    check_same_city(first.city, second.city)
+    return common_steps(first.steps, second.steps)[0]
+
+
+def _between(doing: str, steps: NDArray[np.int64], first: int | None, last: int | None) -> NDArray[np.int64]:
+    """Return the steps from `first` to `last`, of which there is at least one."""
+    low = int(steps.min(initial=0)) if first is None else first
+    high = int(steps.max(initial=0)) if last is None else last
+    between = steps[(steps >= low) & (steps <= high)]
+    if len(between) == 0:
+        held = f"steps from {steps[0]} to {steps[-1]}" if len(steps) else "a recording with steps"
+        raise ViewError(expected(doing, "--from and --to", held, f"steps {low} to {high}"))
+    return between
+
+
+def _read(recordings: Sequence[Recording], steps: Sequence[int]) -> list[ShownStep]:
+    """Read every recording once; only what is shown stays in memory. `steps` rise."""
+    found = [_records_at(recording, steps) for recording in recordings]
+    return [ShownStep(step, records) for step, records in zip(steps, zip(*found, strict=True), strict=True)]
+
+
+def _records_at(recording: Recording, steps: Sequence[int]) -> list[StepRecord]:
+    """Return the record of each step, or the last one before it; none of the steps is before the first."""
+    own = recording.steps
+    wanted = own[np.searchsorted(own, steps, side="right") - 1].tolist()
+    found = {record.step: record for record in recording if record.step in set(wanted)}
+    return [found[step] for step in wanted]
