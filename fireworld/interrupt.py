@@ -14,9 +14,9 @@ class Interrupted(KeyboardInterrupt):
 
 
 @contextmanager
-def gentle_interrupt() -> Iterator[Event]:
+def gentle_interrupt(asked: Event | None = None) -> Iterator[Event]:
     """Let the first Ctrl-C but set an event, so that what is under way is done and kept; a second one stops it."""
-    asked = Event()
+    asked = asked or Event()
     previous = signal.getsignal(signal.SIGINT)
     in_main = threading.current_thread() is threading.main_thread()
     if not in_main or previous is not signal.default_int_handler:  # ignored, as below nohup, or handled by others

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from fireworld.evaluation.paired import METRICS, Metric, Pairing
+from fireworld.evaluation.paired import Pairing
 from fireworld.kernels.arrays import Array
+from fireworld.outcome import METRICS, Metric
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
