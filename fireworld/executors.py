@@ -156,6 +156,11 @@ def in_processes(executor: AnyExecutor) -> bool:
     return executor == "processes" or isinstance(executor, ProcessPoolExecutor)
 
 
+def in_this_process(executor: AnyExecutor) -> bool:
+    """Return whether an argument `executor` is known to do all work in this process."""
+    return executor is None or executor == "threads" or isinstance(executor, int | ThreadPoolExecutor)
+
+
 def n_cores() -> int:
     """Return how many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -15,7 +15,11 @@ class Interrupted(KeyboardInterrupt):
 
 @contextmanager
 def gentle_interrupt(asked: Event | None = None) -> Iterator[Event]:
-    """Let the first Ctrl-C but set an event, so that what is under way is done and kept; a second one stops it."""
+    """Let the first Ctrl-C only set an event, so that what is under way is done and kept; a second one stops it.
+
+    Args:
+        asked: the event; None: a new one.
+    """
     asked = asked or Event()
     previous = signal.getsignal(signal.SIGINT)
     in_main = threading.current_thread() is threading.main_thread()

@@ -9,7 +9,7 @@ import numpy as np
 
 from fireworld.kernels.arrays import Array
 from fireworld.reproduction import paper
-from fireworld.reproduction.study import TOGETHER, TOGETHER_WITHOUT_FLAGS, Lesson, Study
+from fireworld.reproduction.study import TOGETHER, TOGETHER_WITHOUT_FLAGS, LearningCurve, Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,15 +20,15 @@ _PANELS_ACROSS: Final = 4
 
 def draw_returns(study: Study) -> Figure:
     """Draw the return of every episode of Table 1's scenarios."""
-    return _draw(study, "return of the episode, in thousands", lambda lesson: lesson.total_reward / 1000.0)
+    return _draw(study, "return of the episode, in thousands", lambda curve: curve.total_reward / 1000.0)
 
 
 def draw_policy_changes(study: Study) -> Figure:
     """Draw in how many states the greedy action changed, episode by episode of Table 1's scenarios."""
-    return _draw(study, "states whose best action changed", lambda lesson: lesson.n_changed)
+    return _draw(study, "states whose best action changed", lambda curve: curve.n_changed)
 
 
-def _draw(study: Study, label: str, of: Callable[[Lesson], Array]) -> Figure:
+def _draw(study: Study, label: str, of: Callable[[LearningCurve], Array]) -> Figure:
     """One panel a scenario: the mean over the repetitions still in it, and each of them as a thin line."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -39,7 +39,7 @@ def _draw(study: Study, label: str, of: Callable[[Lesson], Array]) -> Figure:
     panels = figure.subplots(rows, _PANELS_ACROSS, sharex=True, squeeze=False).ravel()
     for panel, row in zip(panels, paper.TABLE_1, strict=False):
         for team, color in COLORS.items():
-            curves = [of(lesson) for lesson in study.lessons_of(team, row.scenario)]
+            curves = [of(curve) for curve in study.curves_of(team, row.scenario)]
             for curve in curves:
                 panel.plot(curve, color=color, linewidth=0.5, alpha=0.25)
             panel.plot(_mean_curve(curves), color=color, linewidth=1.8, label=team)

@@ -1,4 +1,4 @@
-"""A study made up: every figure is known."""
+"""A study made up: every value is known."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from fireworld.evaluation.runs import Outcomes
 from fireworld.reproduction import paper
-from fireworld.reproduction.study import ALONE, TEAMS, TOGETHER, TOGETHER_WITHOUT_FLAGS, Lesson, Study
+from fireworld.reproduction.study import ALONE, TEAMS, TOGETHER, TOGETHER_WITHOUT_FLAGS, LearningCurve, Study
 
 LEARNED = (ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS, "random-tables")
 
@@ -39,8 +39,8 @@ def study(*, together=0.75, alone=0.5, n_repetitions=2, n_seeds=3):
             ]
             for team in TEAMS
         }
-    lessons = [
-        Lesson(
+    curves = [
+        LearningCurve(
             repetition=repetition,
             team=team,
             scenario=row.scenario,
@@ -58,7 +58,7 @@ def study(*, together=0.75, alone=0.5, n_repetitions=2, n_seeds=3):
     return Study(
         n_repetitions=n_repetitions,
         seeds=seeds,
-        lessons=lessons,
+        curves=curves,
         outcomes=found,
         agreement=[0.25] * n_repetitions,
     )

@@ -140,7 +140,11 @@ def test_a_plot_is_drawn_and_not_drawn_over(fireworld, here):  # noqa: F811
     first = (here / "out.png").read_bytes()
     assert first.startswith(b"\x89PNG")
     again = fireworld(*words)
-    assert (again.code, again.out, again.err) == (2, "", "fireworld: out.png: expected a name that is free, got an existing file; use --force to replace it\n")
+    assert (again.code, again.out, again.err) == (
+        2,
+        "",
+        "fireworld: out.png: expected a name that is free, got an existing file; use --force to replace it\n",
+    )
     assert fireworld(*words, "--force").code == 0
     assert (here / "out.png").read_bytes() == first
 

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from fireworld_recorder.reader import open_log
 
-from fireworld.cli import reproduce
 from fireworld.errors import OutputError
 from fireworld.executors import Workers
 from fireworld.policy.team import load_team
-from fireworld.reproduction import kept, paper
-from fireworld.reproduction.repetitions import Training, random_tables, without_flags
-from fireworld.reproduction.sheets import SHEETS
+from fireworld.reproduction import folder as reproduction_folder
+from fireworld.reproduction import paper
+from fireworld.reproduction.csv_files import CSV_FILES
+from fireworld.reproduction.repetitions import RepetitionTraining, random_tables, without_flags
 from fireworld.reproduction.study import ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import CityCache
@@ -52,10 +52,10 @@ def curriculum(tmp_path):
 def small(tmp_path, monkeypatch, curriculum):
     """A paper whose every scenario is a small town."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(reproduce, "CURRICULUM", curriculum)
-    monkeypatch.setattr("fireworld.training.method.PAPER", METHOD)
-    monkeypatch.setattr("fireworld.reproduction.paper.TABLE_1", (paper.Lesson("quick", 50, 4.5, 5),))
-    test = paper.Test("quick", 2, (90, 60), (5, 1), (3.0, 4.0), 5)
+    monkeypatch.setattr("fireworld.reproduction.reproduce.CURRICULUM", curriculum)
+    monkeypatch.setattr("fireworld.reproduction.reproduce.PAPER", METHOD)
+    monkeypatch.setattr("fireworld.reproduction.paper.TABLE_1", (paper.PaperTraining("quick", 50, 4.5, 5),))
+    test = paper.PaperTest("quick", 2, (90, 60), (5, 1), (3.0, 4.0), 5)
     monkeypatch.setattr("fireworld.reproduction.paper.TABLE_2", (test,))
     monkeypatch.setattr("fireworld.reproduction.paper.TABLE_3", (test,))
     return tmp_path
@@ -63,7 +63,7 @@ def small(tmp_path, monkeypatch, curriculum):
 
 def train(curriculum, number=1, **more):
     stop, seen = Event(), []
-    training = Training(
+    training = RepetitionTraining(
         curriculum=curriculum,
         method=METHOD,
         number=number,
@@ -89,7 +89,7 @@ def test_a_repetition_equals_trainings_from_end_to_end(curriculum):
         reports = [*trainer]
         assert found.teams[name].digest == trainer.team().digest, name
         assert (found.teams[name].visits == trainer.team().visits).all()
-        rewards = [reward for lesson in found.lessons if lesson.team == name for reward in lesson.total_reward]
+        rewards = [reward for curve in found.curves if curve.team == name for reward in curve.total_reward]
         assert rewards == [report.total_reward for report in reports][-len(rewards) :]
     assert found.teams[TOGETHER].digest != train(chosen, number=2)[0].teams[TOGETHER].digest
     assert 0.0 <= found.agreement <= 1.0
@@ -134,7 +134,7 @@ def test_everything_is_written_and_twice_the_same(small, fireworld):  # noqa: F8
     assert "a claim about" in done.out
     folder = small / "found"
     first = {path.name: path.read_bytes() for path in folder.glob("*.csv")}
-    assert sorted(first) == sorted(SHEETS)
+    assert sorted(first) == sorted(CSV_FILES)
     assert sorted(path.name for path in (folder / "teams").iterdir()) == sorted([
         *(f"{name}-{number}.npz" for name in (ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS) for number in (1, 2)),
         f"{TOGETHER}-1-after-quick.npz",
@@ -154,7 +154,7 @@ def test_everything_is_written_and_twice_the_same(small, fireworld):  # noqa: F8
     (folder / "own.csv").write_text("mine")
     assert fireworld(*FEW, "--force", "--jobs", 1).code == 0
     assert (folder / "own.csv").read_text() == "mine"
-    assert first == {name: (folder / name).read_bytes() for name in SHEETS}
+    assert first == {name: (folder / name).read_bytes() for name in CSV_FILES}
 
 
 class Killed(BaseException):
@@ -164,7 +164,7 @@ class Killed(BaseException):
 @pytest.fixture
 def undrawn(monkeypatch):
     """No images, which take most of the time."""
-    monkeypatch.setattr("fireworld.reproduction.pictures.draw_all", lambda *_: iter(()))
+    monkeypatch.setattr("fireworld.reproduction.reproduce.pictures", lambda *_: {})
 
 
 WHOLE = {}
@@ -191,15 +191,15 @@ def assert_whole(folder, whole):
 
 def at_write(monkeypatch, name, act):
     """Do something once, before a piece of work is kept under a name."""
-    write = kept.write_file
+    write = reproduction_folder.write_file
 
     def write_file(path, data):
         if path.name == name:
-            monkeypatch.setattr(kept, "write_file", write)
+            monkeypatch.setattr(reproduction_folder, "write_file", write)
             act()
         write(path, data)
 
-    monkeypatch.setattr(kept, "write_file", write_file)
+    monkeypatch.setattr(reproduction_folder, "write_file", write_file)
 
 
 def kept_files(small):
@@ -210,14 +210,14 @@ def test_ctrl_c_and_resume(small, fireworld, whole, monkeypatch):  # noqa: F811
     at_write(monkeypatch, "tests-1.json", lambda: signal.raise_signal(signal.SIGINT))
     done = fireworld(*FEW, "--jobs", 1)
     assert done.code == 130
-    assert done.err == "interrupted; 1 of 2 trainings are kept in found: go on with --resume\n"
+    assert done.err == "interrupted; 1 of 2 trainings are kept in found: continue with --resume\n"
     assert kept_files(small) == ["settings.json", "tests-1.json", "training-1.json"]
     assert not [*(small / "found").glob("*.csv"), *(small / "found").glob("report.html")]
     refused = fireworld(*FEW)
     assert (refused.code, refused.err.count("\n")) == (2, 1)
-    assert "--resume goes on with it, --force replaces what is there" in refused.err
-    trained, call = [], Training.__call__
-    monkeypatch.setattr(Training, "__call__", lambda self: trained.append(self.number) or call(self))
+    assert "--resume continues it, --force replaces what is there" in refused.err
+    trained, call = [], RepetitionTraining.__call__
+    monkeypatch.setattr(RepetitionTraining, "__call__", lambda self: trained.append(self.number) or call(self))
     resumed = fireworld(*FEW, "--resume")
     assert resumed.code == 0, resumed.err
     assert trained == [2], "the first is not trained again"
@@ -272,10 +272,10 @@ def test_other_settings_are_refused(begun, fireworld, monkeypatch):  # noqa: F81
     hint = "; name what it was begun with, or begin again with --force\n"
     assert refusal(fireworld, begun, "--repetitions", 3) == f"{settings}repetitions: expected 3, got 2{hint}"
     assert refusal(fireworld, begun, "--seeds", 1) == f"{settings}seeds: expected [1000], got [1000, 1001]{hint}"
-    monkeypatch.setattr("fireworld.training.method.PAPER", METHOD.with_settings({"gamma": "0.9"}))
+    monkeypatch.setattr("fireworld.reproduction.reproduce.PAPER", METHOD.with_settings({"gamma": "0.9"}))
     assert refusal(fireworld, begun) == f"{settings}method.gamma: expected 0.9, got 0.5{hint}"
-    monkeypatch.setattr("fireworld.training.method.PAPER", METHOD)
-    monkeypatch.setattr("fireworld.reproduction.pieces.__version__", "9")
+    monkeypatch.setattr("fireworld.reproduction.reproduce.PAPER", METHOD)
+    monkeypatch.setattr("fireworld.reproduction.measurement.__version__", "9")
     assert refusal(fireworld, begun) == f"{settings}fireworld: expected 9, got '0.1.0'{hint}"
 
 
@@ -313,8 +313,7 @@ def test_nothing_to_resume(small, fireworld):  # noqa: F811
     done = fireworld(*FEW, "--resume")
     assert (done.code, done.out) == (2, "")
     assert done.err == (
-        "fireworld: --resume: expected a reproduction to go on with, got no found/kept/settings.json; "
-        "leave out --resume\n"
+        "fireworld: resume: expected a reproduction to continue, got no found/kept/settings.json; leave out --resume\n"
     )
     assert not (small / "found").exists()
     assert fireworld(*FEW, "--resume", "--force").code == 2

@@ -1,4 +1,4 @@
-"""The tables of a reproduction, and every run they rest on, as CSV: equal studies give equal bytes."""
+"""The tables of a reproduction, and every run they rest on, as CSV files: equal studies give equal bytes."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-from fireworld.evaluation.runs import QUANTITIES
 from fireworld.evaluation.statistics import Estimate
+from fireworld.outcome import COLUMNS
 from fireworld.reproduction import paper
-from fireworld.reproduction.paper_tables import Cell, Pair, Standing, Tables
-from fireworld.reproduction.study import Lesson, Study
+from fireworld.reproduction.paper_tables import PaperCell, PaperPair, PaperTables, cells_of
+from fireworld.reproduction.study import LearningCurve, Study
 
 _ESTIMATE = ("mean", "low_95", "high_95", "interquartile_mean", "repetitions", "seeds")
 
-SHEETS: Final = (
+CSV_FILES: Final = (
     "table-1.csv",
     "table-2.csv",
     "table-3.csv",
@@ -30,27 +30,23 @@ SHEETS: Final = (
 """Names of the files."""
 
 
-def sheets(study: Study, tables: Tables) -> dict[str, str]:
-    """Return the text of every CSV file, by file name."""
+def csv_files(study: Study, tables: PaperTables) -> dict[str, str]:
+    """Return the text of every file, by its name."""
     texts = (
-        _paper_sheet(tables.lessons),
-        _paper_sheet(_cells(tables.tests)),
-        _paper_sheet(_cells(tables.more_brigades)),
-        _cooperation_sheet([*tables.tests, *tables.more_brigades]),
-        _controls_sheet(tables),
-        _comparisons_sheet(tables),
-        _training_sheet(study.lessons),
-        _episodes_sheet(study.lessons),
-        _runs_sheet(study),
+        _paper_file(tables.trainings),
+        _paper_file(cells_of(tables.tests)),
+        _paper_file(cells_of(tables.more_brigades)),
+        _cooperation_file([*tables.tests, *tables.more_brigades]),
+        _controls_file(tables),
+        _comparisons_file(tables),
+        _training_file(study.curves),
+        _episodes_file(study.curves),
+        _runs_file(study),
     )
-    return dict(zip(SHEETS, texts, strict=True))
+    return dict(zip(CSV_FILES, texts, strict=True))
 
 
-def _cells(pairs: Iterable[Pair]) -> list[Cell]:
-    return [cell for pair in pairs for cell in (pair.without, pair.together)]
-
-
-def _paper_sheet(cells: Iterable[Cell]) -> str:
+def _paper_file(cells: Iterable[PaperCell]) -> str:
     head = ("scenario", "quantity", "team", "paper", *_ESTIMATE, "max", "verdict")
     return _csv(
         head,
@@ -61,8 +57,8 @@ def _paper_sheet(cells: Iterable[Cell]) -> str:
     )
 
 
-def _cooperation_sheet(pairs: Iterable[Pair]) -> str:
-    """What cooperation changes: with less without."""
+def _cooperation_file(pairs: Iterable[PaperPair]) -> str:
+    """What cooperation changes: with - without."""
     words = {None: "open", True: "as the paper says", False: "the other way round"}
     head = ("scenario", "quantity", "paper_difference", *_ESTIMATE, "direction")
     return _csv(
@@ -80,24 +76,18 @@ def _cooperation_sheet(pairs: Iterable[Pair]) -> str:
     )
 
 
-def _controls_sheet(tables: Tables) -> str:
+def _controls_file(tables: PaperTables) -> str:
     """Score as a share of the greatest; interval; by team and scenario."""
     rows: list[tuple[object, ...]] = []
-    for scenarios, standings in (
-        ([row.scenario for row in paper.TABLE_2], tables.standings),
-        ([row.scenario for row in paper.TABLE_3], tables.standings_more_brigades),
-    ):
-        for standing in standings:
-            rows += _standing_rows(standing, scenarios)
+    for table, shares in ((paper.TABLE_2, tables.shares), (paper.TABLE_3, tables.shares_more_brigades)):
+        scenarios = [row.scenario for row in table]
+        for share in shares:
+            named = zip([*scenarios, "mean of " + " ".join(scenarios)], [*share.by_scenario, share.mean], strict=True)
+            rows += [(share.team, scenario, *_spread(found)) for scenario, found in named]
     return _csv(("team", "scenario", *_ESTIMATE), rows)
 
 
-def _standing_rows(standing: Standing, scenarios: Sequence[str]) -> list[tuple[object, ...]]:
-    named = [*zip(scenarios, standing.by_scenario, strict=True), ("mean of " + " ".join(scenarios), standing.mean)]
-    return [(standing.team, scenario, *_spread(found)) for scenario, found in named]
-
-
-def _comparisons_sheet(tables: Tables) -> str:
+def _comparisons_file(tables: PaperTables) -> str:
     head = ("team", "other", "quantity", *_ESTIMATE)
     rows: list[tuple[object, ...]] = []
     for row in tables.comparisons:
@@ -106,51 +96,50 @@ def _comparisons_sheet(tables: Tables) -> str:
     return _csv(head, rows)
 
 
-def _training_sheet(lessons: Iterable[Lesson]) -> str:
+def _training_file(curves: Iterable[LearningCurve]) -> str:
     head = ("repetition", "team", "scenario", "episodes", "converged", "score", "max", "return")
     return _csv(
         head,
         (
             (
-                lesson.repetition,
-                lesson.team,
-                lesson.scenario,
-                lesson.n_episodes,
-                int(lesson.converged),
-                lesson.score,
-                lesson.score_max,
-                float(lesson.total_reward[-1]),
+                curve.repetition,
+                curve.team,
+                curve.scenario,
+                curve.n_episodes,
+                int(curve.converged),
+                curve.score,
+                curve.score_max,
+                float(curve.total_reward[-1]),
             )
-            for lesson in lessons
+            for curve in curves
         ),
     )
 
 
-def _episodes_sheet(lessons: Iterable[Lesson]) -> str:
+def _episodes_file(curves: Iterable[LearningCurve]) -> str:
     """What the convergence graphs show: means over the repetitions that are still in the scenario."""
-    groups: dict[tuple[str, str], list[Lesson]] = {}
-    for lesson in lessons:
-        groups.setdefault((lesson.team, lesson.scenario), []).append(lesson)
+    groups: dict[tuple[str, str], list[LearningCurve]] = {}
+    for curve in curves:
+        groups.setdefault((curve.team, curve.scenario), []).append(curve)
     rows: list[tuple[object, ...]] = []
     for (team, scenario), group in groups.items():
-        for episode in range(max(lesson.n_episodes for lesson in group)):
-            going_on = [lesson for lesson in group if lesson.n_episodes > episode]
-            rewards = [float(lesson.total_reward[episode]) for lesson in going_on]
-            changes = [int(lesson.n_changed[episode]) for lesson in going_on]
-            n = len(going_on)
+        for episode in range(max(curve.n_episodes for curve in group)):
+            in_it = [curve for curve in group if curve.n_episodes > episode]
+            rewards = [float(curve.total_reward[episode]) for curve in in_it]
+            changes = [int(curve.n_changed[episode]) for curve in in_it]
+            n = len(in_it)
             rows.append((team, scenario, episode, n, math.fsum(rewards) / n, sum(changes) / n))
     return _csv(("team", "scenario", "episode", "repetitions", "mean_return", "mean_policy_changes"), rows)
 
 
-def _runs_sheet(study: Study) -> str:
+def _runs_file(study: Study) -> str:
     rows: list[tuple[object, ...]] = []
     for scenario, teams in study.outcomes.items():
         for team, repetitions in teams.items():
             for number, outcomes in enumerate(repetitions, 1):
-                columns = [outcomes.seed, *(getattr(outcomes, quantity) for quantity in QUANTITIES)]
-                values = zip(*(column.tolist() for column in columns), strict=True)
-                rows += [(scenario, team, number, *map(_plain, row)) for row in values]
-    return _csv(("scenario", "team", "repetition", "seed", *QUANTITIES), rows)
+                values = zip(outcomes.seed.tolist(), outcomes.rows, strict=True)
+                rows += [(scenario, team, number, seed, *map(_plain, row)) for seed, row in values]
+    return _csv(("scenario", "team", "repetition", "seed", *COLUMNS), rows)
 
 
 def _plain(value: object) -> object:
