@@ -83,6 +83,7 @@ def compare(
     chosen = find_metric(metric)
     if not isinstance(margin, int | float) or not (math.isfinite(margin) and margin >= 0):
         raise ArgumentError(expected("margin", "", "a number from 0 on", margin))
+    workers_for(executor)
     run_seeds = _seeds(seeds, first_seed)
     known = open_results(None if results is None else path_of("results", results))
     entries = _entries(policies)

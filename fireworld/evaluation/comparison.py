@@ -12,8 +12,7 @@ from xml.etree import ElementTree as Xml
 
 from fireworld.arguments import ArgumentError
 from fireworld.errors import OutputError, expected, one_line
-from fireworld.evaluation.paired import N_SEEDS_ENOUGH, Judgement, Pairing, Side, Verdict, judge, over_all
-from fireworld.evaluation.statistics import Estimate
+from fireworld.evaluation.paired import N_SEEDS_ENOUGH, Judgement, Pairing, Verdict, judge, over_all
 from fireworld.evaluation.text_table import text_table
 from fireworld.html_page import html_mark, html_table, text_cell
 from fireworld.junit import report
@@ -90,7 +89,7 @@ class Comparison:
     @property
     def same_policy(self) -> bool:
         """Whether all policies are one, whatever they are called."""
-        return len({policy.digest for policy in self.policies}) == 1
+        return all(pairing.same_policy for pairing in self.pairings)
 
     def verdict(self, metric: str | None = None, *, policy: str | None = None) -> Verdict:
         """Return what B is over all scenarios.
@@ -128,28 +127,10 @@ class Comparison:
     @property
     def table(self) -> list[dict[str, Any]]:
         """One row for each policy, scenario (None: over all) and metric, as plain values."""
-        return [
-            {
-                "policy": policy.name,
-                "scenario": pairing.scenario,
-                "metric": pairing.metric.name,
-                "unit": pairing.metric.unit,
-                "mean_a": pairing.a.mean,
-                "mean_b": pairing.b.mean,
-                "difference": pairing.difference.mean,
-                "low": pairing.difference.low,
-                "high": pairing.difference.high,
-                "p_better": pairing.improvement.mean,
-                "n_differing": pairing.n_differing,
-                "verdict": pairing.verdict,
-                "more_seeds": pairing.more_seeds,
-            }
-            for policy in self.policies[1:]
-            for pairing in policy.pairings
-        ]
+        return [{"policy": policy.name, **pairing.to_dict()} for policy in self.policies for pairing in policy.pairings]
 
     def to_pandas(self) -> Any:
-        """Return the table as a pandas DataFrame.
+        """Return the table as a pandas DataFrame; columns are named as in "difference.low".
 
         Raises:
             OutputError: pandas is not installed.
@@ -158,7 +139,7 @@ class Comparison:
             pandas = import_module("pandas")
         except ImportError:
             raise OutputError("pandas is not installed; try pip install 'fireworld[frames]'") from None
-        return pandas.DataFrame(self.table)
+        return pandas.json_normalize(self.table)
 
     def to_dict(self, *, gate: bool = True) -> dict[str, Any]:
         """Return the comparison as plain values (docs/comparing-policies.md).
@@ -179,7 +160,8 @@ class Comparison:
             "scenarios": [{"name": name, "digest": digest} for name, digest in self.scenarios],
             "first_seed": self.seeds[0],
             "n_seeds": len(self.seeds),
-            "comparisons": [_plain(pairing) for pairing in self.pairings],
+            **({} if _in_a_row(self.seeds) else {"seeds": list(self.seeds)}),
+            "comparisons": [pairing.to_dict() for pairing in self.pairings],
             "gate": judged if gate else None,
             "sentence": self.sentence,
             "notes": self.notes,
@@ -199,7 +181,7 @@ class Comparison:
 
         Raises:
             ArgumentError: there is no such policy.
-            OutputError: matplotlib is not installed.
+            ViewError: matplotlib is not installed.
         """
         from fireworld.evaluation.paired_figure import draw_differences
 
@@ -216,20 +198,26 @@ class Comparison:
             force: replace an existing file.
 
         Raises:
-            ArgumentError, OutputError: as for `figure`; or the file cannot be written.
+            ArgumentError, ViewError, OutputError: as for `figure`; or the file cannot be written.
         """
         from fireworld_viewer.pictures.figure_files import save_figure
 
         save_figure(self.figure(policy), Path(path), force=force)
 
     def __repr__(self) -> str:
-        parts = ["\n".join([_title(one), text_table(_HEADS, _text_rows(one), "<>>>><"), _CAPTION]) for one in self.each]
-        return "\n\n".join(parts) + "\n" + "\n".join([*self.notes, self.sentence])
+        def text(one: Comparison) -> str:
+            table = text_table(_HEADS, _text_rows(one), "<>>>><")
+            return "\n".join([_title(one), table, _CAPTION, *one.notes, one.sentence])
+
+        return "\n\n".join(map(text, self.each))
 
     def _repr_html_(self) -> str:
         """Show the comparison in a notebook."""
-        parts = [f"<p><b>{escape(_title(one))}</b></p>{html_table(_HEADS, _html_rows(one))}" for one in self.each]
-        return "".join([*parts, *(f"<p>{escape(line)}</p>" for line in (_CAPTION, *self.notes))])
+        return "".join(
+            f"<p><b>{escape(_title(one))}</b></p>{html_table(_HEADS, _html_rows(one))}"
+            f"<p>{'<br>'.join(map(escape, [_CAPTION, *one.notes]))}</p>"
+            for one in self.each
+        )
 
 
 _HEADS: Final = ("", "A", "B", "B - A", "P", "B is")
@@ -252,19 +240,12 @@ def _shown(one: Comparison) -> list[Pairing]:
     return [pairing for pairing in one.pairings if pairing.scenario is not None or len(one.scenarios) > 1]
 
 
-def _cells(pairing: Pairing) -> list[str]:
-    metric = pairing.metric
-    difference = pairing.difference.text(digits=metric.digits, sign=True)
-    sides = [_side(metric, pairing.a), _side(metric, pairing.b)]
-    return [metric.label, *sides, difference, f"{pairing.improvement.mean:.2f}", pairing.verdict]
-
-
 def _text_rows(one: Comparison) -> list[list[str]]:
     rows = []
     for pairing in _shown(one):
         if pairing.metric is METRICS[0]:
             rows.append([pairing.scenario or OVER_ALL])
-        label, *cells = _cells(pairing)
+        label, *cells = pairing.cells
         rows.append([f" {label}", *cells])
     return rows
 
@@ -272,7 +253,7 @@ def _text_rows(one: Comparison) -> list[list[str]]:
 def _html_rows(one: Comparison) -> list[list[str]]:
     rows = []
     for pairing in _shown(one):
-        label, *cells, verdict = _cells(pairing)
+        label, *cells, verdict = pairing.cells
         heading = f"{escape(pairing.scenario or OVER_ALL)}: {label}"
         rows.append([text_cell(heading), *cells, html_mark(verdict, _MARKS[verdict])])
     return rows
@@ -289,7 +270,7 @@ def _sentence(one: Comparison) -> str:
     where = f"{names}; {_seeds(one.seeds)}; fireworld {one.version}"
     if one.same_policy:
         return f"{b} against {a}: the same policy ({where})"
-    verdicts = (_verdict(over_all(one.pairings, metric.name)) for metric in METRICS)
+    verdicts = (over_all(one.pairings, metric.name).sentence for metric in METRICS)
     return f"{b} against {a}: {'; '.join(verdicts)} ({where})"
 
 
@@ -298,10 +279,9 @@ def _notes(one: Comparison) -> list[str]:
     time = over_all(one.pairings, "time")
     n_runs = len(one.seeds) * len(one.scenarios)
     if time.a.n_truncated or time.b.n_truncated:
-        b = "B" if one.policies[1:] else ""
         notes.append(
             f"the fire was not out at the last step in {time.a.n_truncated} of {n_runs} runs of A and "
-            f"{time.b.n_truncated} of {b}; their time to complete is counted as the last step"
+            f"{time.b.n_truncated} of B; their time to complete is counted as the last step"
         )
     if len(one.seeds) < N_SEEDS_ENOUGH and not one.same_policy:
         notes.append(f"intervals of fewer than {N_SEEDS_ENOUGH} seeds are too narrow; verdicts need more")
@@ -319,7 +299,7 @@ def _gate(one: Comparison) -> str:
 def _case(one: Comparison, pairing: Pairing, *, several: bool) -> Xml.Element:
     place = one_line(pairing.scenario or OVER_ALL) + (f".{one_line(one.policies[1].name)}" if several else "")
     case = Xml.Element("testcase", classname=f"fireworld.compare.{place}", name=pairing.metric.label, time="0")
-    text = _verdict(pairing)
+    text = pairing.sentence
     if pairing.scenario is None and pairing.metric.name == one.metric:
         kind = {"worse": "failure", "cannot tell": "error"}.get(one.judgement)
         if kind is not None:
@@ -329,47 +309,11 @@ def _case(one: Comparison, pairing: Pairing, *, several: bool) -> Xml.Element:
     return case
 
 
-def _verdict(pairing: Pairing) -> str:
-    metric = pairing.metric
-    reason = f", {pairing.reason}" if pairing.reason else ""
-    difference = pairing.difference.text(digits=metric.digits, sign=True)
-    return (
-        f"{metric.label} {pairing.verdict}{reason}: {difference} {metric.unit}, "
-        f"P(better) {pairing.improvement.mean:.2f}"
-    )
-
-
-def _plain(pairing: Pairing) -> dict[str, Any]:
-    sides = {
-        name: {"mean": side.mean, "interquartile_mean": side.interquartile_mean, "n_truncated": side.n_truncated}
-        for name, side in (("a", pairing.a), ("b", pairing.b))
-    }
-    return {
-        "scenario": pairing.scenario,
-        "metric": pairing.metric.name,
-        "unit": pairing.metric.unit,
-        "higher_is_better": pairing.metric.higher_is_better,
-        **sides,
-        "difference": _estimate(pairing.difference),
-        "improvement": _estimate(pairing.improvement),
-        "n_differing": pairing.n_differing,
-        "verdict": pairing.verdict,
-        "more_seeds": pairing.more_seeds,
-        "reason": pairing.reason,
-    }
-
-
-def _estimate(found: Estimate) -> dict[str, float]:
-    return {"mean": found.mean, "low": found.low, "high": found.high}
-
-
-def _side(metric: Metric, side: Side) -> str:
-    return f"{side.mean:.{metric.digits}f} ({side.interquartile_mean:.{metric.digits}f})"
-
-
 def _seeds(seeds: Sequence[int]) -> str:
-    """Return "seeds 1 to 20"; where they do not follow one on another, their number."""
     if len(seeds) == 1:
         return f"seed {seeds[0]}"
-    following = all(seed == seeds[0] + k for k, seed in enumerate(seeds))
-    return f"seeds {seeds[0]} to {seeds[-1]}" if following else f"{len(seeds)} seeds from {seeds[0]}"
+    return f"seeds {seeds[0]} to {seeds[-1]}" if _in_a_row(seeds) else f"{len(seeds)} seeds from {seeds[0]}"
+
+
+def _in_a_row(seeds: Sequence[int]) -> bool:
+    return all(seed == seeds[0] + k for k, seed in enumerate(seeds))

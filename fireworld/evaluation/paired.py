@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import reduce
 from operator import add
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -48,6 +48,10 @@ class Side:
     interquartile_mean: float
     n_truncated: int
     """Runs in which the fire was not out at the last step, which stands for their time to complete."""
+
+    def text(self, digits: int) -> str:
+        """Return the mean and the interquartile mean for people."""
+        return f"{self.mean:.{digits}f} ({self.interquartile_mean:.{digits}f})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +100,41 @@ class Pairing:
         """Ends of the interval of the difference, with the sign that makes more better."""
         low, high = self.metric.gain(self.difference.low), self.metric.gain(self.difference.high)
         return min(low, high), max(low, high)
+
+    @property
+    def sentence(self) -> str:
+        """Verdict, difference and probability in words."""
+        reason = f", {self.reason}" if self.reason else ""
+        difference = self.difference.text(digits=self.metric.digits, sign=True)
+        return (
+            f"{self.metric.label} {self.verdict}{reason}: {difference} {self.metric.unit}, "
+            f"P(better) {self.improvement.mean:.2f}"
+        )
+
+    @property
+    def cells(self) -> list[str]:
+        """Cells of a table for people: metric, A, B, B - A, P, verdict."""
+        digits = self.metric.digits
+        difference = self.difference.text(digits=digits, sign=True)
+        sides = self.a.text(digits), self.b.text(digits)
+        return [self.metric.label, *sides, difference, f"{self.improvement.mean:.2f}", self.verdict]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values (docs/comparing-policies.md)."""
+        return {
+            "scenario": self.scenario,
+            "metric": self.metric.name,
+            "unit": self.metric.unit,
+            "higher_is_better": self.metric.higher_is_better,
+            "a": asdict(self.a),
+            "b": asdict(self.b),
+            "difference": self.difference.ends(),
+            "improvement": self.improvement.ends(),
+            "n_differing": self.n_differing,
+            "verdict": self.verdict,
+            "more_seeds": self.more_seeds,
+            "reason": self.reason,
+        }
 
     def seeds_needed(self, *, margin: float = 0.0) -> int | None:
         """Estimate how many more seeds would tell B from A, or from a loss of `margin`; None: no number would do.

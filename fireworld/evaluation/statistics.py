@@ -43,6 +43,10 @@ class Estimate:
         form = f"{'+' if sign else ''}.{digits}f"
         return f"{self.mean:{form}} [{self.low:{form}}, {self.high:{form}}]"
 
+    def ends(self) -> dict[str, float]:
+        """Return the mean and the ends of its interval by name."""
+        return {"mean": self.mean, "low": self.low, "high": self.high}
+
     @property
     def above_zero(self) -> bool:
         """Whether the whole interval lies above zero."""

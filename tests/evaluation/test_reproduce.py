@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import json
+import shutil
 import signal
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
 from threading import Event
 
 import msgspec
@@ -11,13 +15,13 @@ import numpy as np
 import pytest
 from fireworld_recorder.reader import open_log
 
-from fireworld.errors import OutputError
-from fireworld.executors import Workers
+from fireworld.errors import FireworldError, OutputError, TrainingError
 from fireworld.policy.team import load_team
 from fireworld.reproduction import folder as reproduction_folder
 from fireworld.reproduction import paper
 from fireworld.reproduction.csv_files import CSV_FILES
 from fireworld.reproduction.repetitions import RepetitionTraining, random_tables, without_flags
+from fireworld.reproduction.reproduce import reproduce
 from fireworld.reproduction.study import ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import CityCache
@@ -48,16 +52,23 @@ def curriculum(tmp_path):
     return path
 
 
+TEST = paper.PaperTest("quick", 2, (90, 60), (5, 1), (3.0, 4.0), 5)
+SMALL_PAPER = {"TABLE_1": (paper.PaperTraining("quick", 50, 4.5, 5),), "TABLE_2": (TEST,), "TABLE_3": (TEST,)}
+
+
+def make_paper_small():
+    """Make a paper whose every scenario is a small town."""
+    vars(paper).update(SMALL_PAPER)
+
+
 @pytest.fixture
 def small(tmp_path, monkeypatch, curriculum):
     """A paper whose every scenario is a small town."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("fireworld.reproduction.reproduce.CURRICULUM", curriculum)
     monkeypatch.setattr("fireworld.reproduction.reproduce.PAPER", METHOD)
-    monkeypatch.setattr("fireworld.reproduction.paper.TABLE_1", (paper.PaperTraining("quick", 50, 4.5, 5),))
-    test = paper.PaperTest("quick", 2, (90, 60), (5, 1), (3.0, 4.0), 5)
-    monkeypatch.setattr("fireworld.reproduction.paper.TABLE_2", (test,))
-    monkeypatch.setattr("fireworld.reproduction.paper.TABLE_3", (test,))
+    for name, rows in SMALL_PAPER.items():
+        monkeypatch.setattr(paper, name, rows)
     return tmp_path
 
 
@@ -165,6 +176,73 @@ class Killed(BaseException):
 def undrawn(monkeypatch):
     """No images, which take most of the time."""
     monkeypatch.setattr("fireworld.reproduction.reproduce.pictures", lambda *_: {})
+
+
+def test_from_python_with_an_executor_it_is_the_same(small, undrawn, curriculum):
+    """The tables of threads and processes are equal; what is done shows itself."""
+    told, found = [], {}
+    there = ProcessPoolExecutor(2, get_context("spawn"), initializer=make_paper_small)
+    with there, ThreadPoolExecutor(2) as here:
+        for name, executor in (("threads", 1), ("here", here), ("there", there)):
+            words = {"repetitions": 2, "seeds": 2, "executor": executor}
+            found[name] = reproduce(name, on_progress=lambda *words: told.append(words), **words)
+            assert [max(n for what, n, _ in told if what == each) for each in ("training", "testing")] == [12, 16]
+            assert {(what, n) for what, _, n in told} == {
+                ("training", 12),
+                ("testing", 16),
+                ("recording", 5),
+                ("drawing", 0),
+            }
+            told.clear()
+    folders = [
+        {path: data for path, data in contents(small / name).items() if path.suffix in {".csv", ".json", ".npz"}}
+        for name in found
+    ]
+    assert all([*each.values()] == [*folders[0].values()] for each in folders)
+    one = found["there"]
+    assert one.folder == Path("there")
+    assert repr(one).startswith("paper: ours [95 % interval]\nscenario  quantity")
+    assert [finding.question in repr(one) for finding in one.findings] == [True] * len(one.findings)
+    assert one.caveat in repr(one)
+    assert one._repr_html_().startswith('<iframe srcdoc="&lt;!doctype html&gt;')
+    assert len(one.study.curves) == 12
+
+
+def test_a_folder_of_an_earlier_version_is_resumed(small, undrawn, monkeypatch):
+    monkeypatch.setattr("fireworld.reproduction.measurement.__version__", "0.1.0")
+    earlier = Path(__file__).parent / "data" / "reproduction-1"
+    for name in ("kept", "teams"):
+        shutil.copytree(earlier / name, small / "found" / name)
+    trained, call = [], RepetitionTraining.__call__
+    monkeypatch.setattr(RepetitionTraining, "__call__", lambda self: trained.append(self.number) or call(self))
+    reproduce("found", repetitions=2, seeds=2, resume=True)
+    assert trained == [2]
+    for path in (earlier / "expected").iterdir():
+        assert (small / "found" / path.name).read_bytes() == path.read_bytes(), path.name
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ({"repetitions": 0}, "repetitions: expected a whole number from 1 to 1000, got 0"),
+        ({"seeds": "many"}, "seeds: expected a whole number"),
+        ({"curriculum": "nowhere"}, "nowhere"),
+        ({"executor": "fibres"}, "executor: expected"),
+        ({"resume": True}, "resume: expected a reproduction to continue"),
+    ],
+)
+def test_wrong_arguments_take_one_line_and_leave_nothing(small, words, message):
+    with pytest.raises(FireworldError, match=message) as caught:
+        reproduce("found", **words)
+    assert "\n" not in str(caught.value)
+    assert not (small / "found").exists()
+
+
+def test_a_curriculum_without_table_1_takes_one_line(small, curriculum, monkeypatch):
+    monkeypatch.setattr("fireworld.reproduction.paper.TABLE_1", (paper.PaperTraining("train-1", 50, 4.5, 5),))
+    with pytest.raises(TrainingError, match="expected all scenarios of the paper's Table 1"):
+        reproduce("found", curriculum=curriculum)
+    assert not (small / "found").exists()
 
 
 WHOLE = {}
@@ -340,21 +418,3 @@ def test_without_matplotlib_nothing_is_begun(small, fireworld, monkeypatch):  # 
     assert (done.code, done.err.count("\n")) == (2, 1)
     assert "fireworld[figures]" in done.err
     assert not (small / "found").exists()
-
-
-def test_a_failing_task_stops_the_others():
-    workers = Workers(2, Event())
-
-    def fail():
-        raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        workers.run([fail, *[workers.stop.wait] * 3])
-    assert workers.stop.is_set()
-
-
-def test_results_come_in_order_and_none_after_a_stop():
-    workers = Workers(3, Event())
-    assert workers.run([lambda k=k: k * k for k in range(20)]) == [k * k for k in range(20)]
-    workers.stop.set()
-    assert workers.run([lambda: 1]) is None
