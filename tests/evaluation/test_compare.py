@@ -11,7 +11,7 @@ from xml.etree.ElementTree import parse
 
 import pytest
 
-from fireworld.evaluation import compare
+from fireworld.evaluation import comparison_runs
 from fireworld.evaluation.results import read_results
 from fireworld.policy.names import load_policy
 from fireworld.policy.team import Team, save_team
@@ -161,7 +161,7 @@ def test_known_runs_are_not_run_again(fireworld, here, monkeypatch):  # noqa: F8
     def no_run(*_, **__):
         raise AssertionError
 
-    monkeypatch.setattr(compare, "run_compiled", no_run)
+    monkeypatch.setattr(comparison_runs, "run_compiled", no_run)
     known = fireworld(*words, "--seeds", 5, "--json")
     assert (known.code, known.err) == (0, "10 of 10 runs are known from runs.parquet\n")
     assert json.loads(known.out) == json.loads(more.out)
@@ -180,7 +180,7 @@ def test_another_policy_scenario_seed_or_simulator_is_another_run(fireworld, her
     policies = here / "policies.py"
     policies.write_text(policies.read_text() + "\n")
     assert n_rows("policies:Near", "easiest", *QUICK) == 7, "its file has changed"
-    monkeypatch.setattr(compare, "simulator_version", lambda: "another")
+    monkeypatch.setattr(comparison_runs, "simulator_version", lambda: "another")
     assert n_rows("policies:Near", "easiest", *QUICK) == 9
 
 
@@ -208,16 +208,16 @@ def test_ctrl_c_keeps_what_is_done(fireworld, here, monkeypatch):  # noqa: F811
             signal.raise_signal(signal.SIGINT)
         return run(built, policy, seed=seed)
 
-    run = compare.run_compiled
+    run = comparison_runs.run_compiled
     monkeypatch.setattr(signal, "getsignal", lambda _: signal.default_int_handler)
-    monkeypatch.setattr(compare, "run_compiled", interrupted_run)
+    monkeypatch.setattr(comparison_runs, "run_compiled", interrupted_run)
     words = ("compare", *BAD_FIRST, *QUICK, "--seeds", 50, "--jobs", 1, "--results", "runs.parquet")
     done = fireworld(*words)
     assert (done.code, done.out) == (130, "")
     n_kept = len(read_results(here / "runs.parquet"))
     assert 0 < n_kept < 100
     assert done.err == f"interrupted; {n_kept} of 100 runs were done: they are kept in runs.parquet\n"
-    monkeypatch.setattr(compare, "run_compiled", run)
+    monkeypatch.setattr(comparison_runs, "run_compiled", run)
     again = fireworld(*words)
     assert (again.code, again.err) == (0, f"{n_kept} of 100 runs are known from runs.parquet\n")
 

@@ -11,7 +11,7 @@ import pytest
 
 from fireworld.errors import OutputError
 from fireworld.evaluation import results as results_file
-from fireworld.evaluation.compare import policy_identity
+from fireworld.evaluation.comparison_runs import policy_identity
 from fireworld.evaluation.results import KEYS, Result, Results, RunKey, open_results, read_results
 from fireworld.outcome import COLUMNS
 from fireworld.policy.kernel import always
