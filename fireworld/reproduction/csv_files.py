@@ -47,33 +47,22 @@ def csv_files(study: Study, tables: PaperTables) -> dict[str, str]:
 
 
 def _paper_file(cells: Iterable[PaperCell]) -> str:
-    head = ("scenario", "quantity", "team", "paper", *_ESTIMATE, "max", "verdict")
-    return _csv(
-        head,
-        (
-            (cell.scenario, cell.quantity, cell.team, cell.paper, *_spread(cell.ours), cell.ours_max, cell.verdict)
-            for cell in cells
-        ),
-    )
+    rows = [
+        (cell.scenario, cell.quantity, cell.team, cell.paper, *_spread(cell.ours), cell.ours_max, cell.verdict)
+        for cell in cells
+    ]
+    return _csv(("scenario", "quantity", "team", "paper", *_ESTIMATE, "max", "verdict"), rows)
 
 
 def _cooperation_file(pairs: Iterable[PaperPair]) -> str:
     """What cooperation changes: with - without."""
     words = {None: "open", True: "as the paper says", False: "the other way round"}
-    head = ("scenario", "quantity", "paper_difference", *_ESTIMATE, "direction")
-    return _csv(
-        head,
-        (
-            (
-                pair.together.scenario,
-                pair.together.quantity,
-                f"{pair.together.paper - pair.without.paper:g}",
-                *_spread(pair.difference),
-                words[pair.claim_holds],
-            )
-            for pair in pairs
-        ),
-    )
+    rows = []
+    for pair in pairs:
+        scenario, quantity = pair.together.scenario, pair.together.quantity
+        change = f"{pair.together.paper - pair.without.paper:g}"
+        rows.append((scenario, quantity, change, *_spread(pair.difference), words[pair.claim_holds]))
+    return _csv(("scenario", "quantity", "paper_difference", *_ESTIMATE, "direction"), rows)
 
 
 def _controls_file(tables: PaperTables) -> str:
@@ -97,23 +86,11 @@ def _comparisons_file(tables: PaperTables) -> str:
 
 
 def _training_file(curves: Iterable[LearningCurve]) -> str:
-    head = ("repetition", "team", "scenario", "episodes", "converged", "score", "max", "return")
-    return _csv(
-        head,
-        (
-            (
-                curve.repetition,
-                curve.team,
-                curve.scenario,
-                curve.n_episodes,
-                int(curve.converged),
-                curve.score,
-                curve.score_max,
-                float(curve.total_reward[-1]),
-            )
-            for curve in curves
-        ),
-    )
+    rows: list[tuple[object, ...]] = []
+    for curve in curves:
+        ended = int(curve.converged), curve.score, curve.score_max, float(curve.total_reward[-1])
+        rows.append((curve.repetition, curve.team, curve.scenario, curve.n_episodes, *ended))
+    return _csv(("repetition", "team", "scenario", "episodes", "converged", "score", "max", "return"), rows)
 
 
 def _episodes_file(curves: Iterable[LearningCurve]) -> str:

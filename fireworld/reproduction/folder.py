@@ -14,6 +14,7 @@ from msgspec import Struct
 from fireworld.errors import OutputError, TrainingError, expected
 from fireworld.evaluation.runs import Outcomes, outcomes
 from fireworld.files import write_file
+from fireworld.kernels.arrays import Array
 from fireworld.outcome import COLUMNS
 from fireworld.policy.team import Team, load_team, save_team
 from fireworld.reproduction.csv_files import CSV_FILES
@@ -32,20 +33,6 @@ _HINT: Final = "delete it and it is made anew"
 Content = TypeVar("Content")
 
 
-class CurveText(Struct, frozen=True, forbid_unknown_fields=True):
-    """A LearningCurve as plain values."""
-
-    repetition: int
-    team: str
-    scenario: str
-    scenario_number: int
-    converged: bool
-    score: float
-    score_max: float
-    total_reward: list[float]
-    n_changed: list[int]
-
-
 class RepetitionText(Struct, frozen=True, forbid_unknown_fields=True):
     """A Repetition as plain values; its teams are in files of their own."""
 
@@ -53,7 +40,7 @@ class RepetitionText(Struct, frozen=True, forbid_unknown_fields=True):
     """Digest of each team, by name."""
     graduates: dict[str, str]
     """Digest of each graduate, by scenario."""
-    lessons: list[CurveText]
+    lessons: list[LearningCurve]
 
 
 @dataclass(frozen=True)
@@ -123,7 +110,7 @@ class ReproductionFolder:
                 scenario: _read_team(self._graduate(scenario, number), digest, path)
                 for scenario, digest in found.graduates.items()
             },
-            curves=tuple(_curve(curve) for curve in found.lessons),
+            curves=tuple(found.lessons),
         )
 
     def write_repetition(self, number: int, repetition: Repetition) -> None:
@@ -140,7 +127,7 @@ class ReproductionFolder:
         content = RepetitionText(
             {name: team.digest for name, team in teams.items()},
             {scenario: team.digest for scenario, team in graduates.items()},
-            [_curve_text(curve) for curve in repetition.curves],
+            list(repetition.curves),
         )
         self._write(self._training(number), content)
 
@@ -232,7 +219,7 @@ class ReproductionFolder:
 
     def _read(self, path: Path, kind: type[Content]) -> Content | None:
         try:
-            return msgspec.json.decode(path.read_bytes(), type=kind)
+            return msgspec.json.decode(path.read_bytes(), type=kind, dec_hook=_array)
         except FileNotFoundError:
             return None
         except (OSError, msgspec.DecodeError, UnicodeDecodeError) as error:
@@ -240,7 +227,7 @@ class ReproductionFolder:
             raise TrainingError(expected(str(path), "", "what an earlier call has written", got, _HINT)) from None
 
     def _write(self, path: Path, content: object) -> None:
-        write_file(path, msgspec.json.encode(content))
+        write_file(path, msgspec.json.encode(content, enc_hook=np.ndarray.tolist))
 
 
 def _read_team(path: Path, digest: str, training: Path) -> Team:
@@ -252,20 +239,9 @@ def _read_team(path: Path, digest: str, training: Path) -> Team:
     return team
 
 
-def _curve_text(curve: LearningCurve) -> CurveText:
-    values = {name: getattr(curve, name) for name in CurveText.__struct_fields__}
-    return CurveText(
-        **{name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()}
-    )
-
-
-def _curve(text: CurveText) -> LearningCurve:
-    values = msgspec.structs.asdict(text)
-    arrays = {
-        "total_reward": np.array(text.total_reward, dtype=np.float64),
-        "n_changed": np.array(text.n_changed, dtype=np.int64),
-    }
-    return LearningCurve(**{**values, **arrays})
+def _array(_: type, values: object) -> Array:
+    """Return what a file has of an array."""
+    return np.array(msgspec.convert(values, list[int | float]))
 
 
 def _outcomes(columns: Mapping[str, list[bool | int | float]], seeds: Sequence[int], path: Path) -> Outcomes:
