@@ -10,6 +10,7 @@ from typing import Final
 from benchmarks.start_rows import IMPORT_NUMBA, process_row
 from benchmarks.timing import Contender, Row, compare
 from fireworld.evaluation.runs import evaluate, run_step_by_step
+from fireworld.executors import threads
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.names import BUILT_IN
 from fireworld.scenario import load_scenario
@@ -31,7 +32,7 @@ def step_by_step(built: BuiltScenario, policies: tuple[KernelPolicy, ...], seeds
 def compiled(built: BuiltScenario, policies: tuple[KernelPolicy, ...], seeds: range, _: None) -> None:
     """Run whole episodes in compiled code."""
     for policy in policies:
-        evaluate(built, policy, seeds, n_threads=N_THREADS)
+        evaluate(built, policy, seeds, workers=threads(N_THREADS))
 
 
 def rows(*, quick: bool) -> Iterator[Row]:

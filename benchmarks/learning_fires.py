@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 
-from fireworld.evaluation.runs import QUANTITIES, run_compiled, run_step_by_step
+from fireworld.evaluation.runs import run_compiled, run_step_by_step
+from fireworld.executors import threads
 from fireworld.kernels.arrays import Array
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.protocol import Policy
@@ -40,13 +41,8 @@ def _some(items: list[Scenario], n: int | None) -> list[Scenario]:
 
 def shares(stages: Sequence[BuiltScenario], policy: KernelPolicy | Policy, seeds: Sequence[int]) -> Array:
     """Return the score of every run as a share of its maximum, (fires, seeds)."""
-
-    def share(built: BuiltScenario, seed: int) -> float:
-        run = run_compiled if isinstance(policy, KernelPolicy) else run_step_by_step
-        row = dict(zip(QUANTITIES, run(built, policy, seed=seed), strict=True))  # type: ignore[arg-type]
-        return row["score"] / row["score_max"]
-
+    run = run_compiled if isinstance(policy, KernelPolicy) else run_step_by_step
     n_threads = N_THREADS if isinstance(policy, KernelPolicy) else 1  # the planner has a memory
-    with ThreadPoolExecutor(n_threads) as pool:
-        runs = [pool.submit(share, built, seed) for built in stages for seed in seeds]
-        return np.array([run.result() for run in runs]).reshape(len(stages), len(seeds))
+    tasks = [partial(run, built, policy, seed=seed) for built in stages for seed in seeds]  # type: ignore[arg-type]
+    found = threads(n_threads).run(tasks) or []
+    return np.array([outcome.score_share for outcome in found]).reshape(len(stages), len(seeds))

@@ -1,4 +1,4 @@
-"""Who does work that comes in many parts: threads, processes, or an executor that is given, with the same results."""
+"""Executors for work that comes in many parts: threads, processes, or one that is given, with the same results."""
 
 from __future__ import annotations
 
@@ -6,21 +6,37 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from threading import Event
 from typing import Final, TypeVar
 
+from fireworld.errors import FireworldError, expected
+
 Result = TypeVar("Result")
+AnyExecutor = Executor | int | str | None
+"""What an argument `executor` may be; see `workers_for`."""
 
 LOOK_EVERY_SECONDS: Final = 0.2
 """How long Ctrl-C waits at most until it is seen."""
 
 
+class ExecutorError(FireworldError):
+    """An executor that cannot do the work it was given."""
+
+
 @dataclass(frozen=True)
 class Workers:
-    """Workers that share a list of tasks and stop together. Made by `threads`, `processes` or `given`.
+    """Workers that share a list of tasks and stop together. Made by `threads`, `processes`, `given` or `workers_for`.
 
     Attributes:
         n: tasks at a time.
@@ -41,23 +57,18 @@ class Workers:
             tasks: what to do.
             on_result: called on this thread as tasks are done, with their number and result; also for those that
                 were under way when all stopped, if they got done.
+
+        Raises:
+            ExecutorError: a process died.
         """
         results: dict[int, Result] = {}
-        with self.make_pool(self.n) as pool:
-            numbers = {pool.submit(task): number for number, task in enumerate(tasks)}
-            pending: set[Future[Result]] = set(numbers)
-            try:
-                while pending and not self.stop.is_set():
-                    done, pending = wait(pending, timeout=LOOK_EVERY_SECONDS, return_when=FIRST_COMPLETED)
-                    for future in () if self.stop.is_set() else done:
-                        results[numbers[future]] = future.result()
-                        on_result(numbers[future], future.result())
-            finally:
-                if pending:
-                    self.stop.set()
-                    for future in pending:
-                        future.cancel()
-                    wait(pending)
+        try:
+            with self.make_pool(self.n) as pool:
+                numbers = {pool.submit(task): number for number, task in enumerate(tasks)}
+                self._wait(numbers, results, on_result)
+        except BrokenExecutor:
+            hint = "it crashed, or its script starts work without `if __name__ == '__main__':`; try one job"
+            raise ExecutorError(f"executor: a process that did a part of the work died; {hint}") from None
         if len(results) == len(tasks):
             return [results[number] for number in range(len(tasks))]
         for future, number in numbers.items():
@@ -65,13 +76,34 @@ class Workers:
                 on_result(number, future.result())  # was under way when all stopped, and got done
         return None
 
+    def _wait(
+        self,
+        numbers: dict[Future[Result], int],
+        results: dict[int, Result],
+        on_result: Callable[[int, Result], object],
+    ) -> None:
+        """Collect results until all are there, one failed, or all were stopped."""
+        pending = set(numbers)
+        try:
+            while pending and not self.stop.is_set():
+                done, pending = wait(pending, timeout=LOOK_EVERY_SECONDS, return_when=FIRST_COMPLETED)
+                for future in () if self.stop.is_set() else done:
+                    results[numbers[future]] = future.result()
+                    on_result(numbers[future], future.result())
+        finally:
+            if pending:
+                self.stop.set()
+                for future in pending:
+                    future.cancel()
+                wait(pending)
+
 
 def threads(n: int | None = None, *, stop: Event | None = None) -> Workers:
     """Return threads: for compiled episodes, which leave each other free to run side by side.
 
     Args:
         n: threads; None: as many as there are cores.
-        stop: asks to leave off.
+        stop: asks to stop.
     """
     return Workers(n or n_cores(), stop or Event())
 
@@ -81,7 +113,7 @@ def processes(n: int | None = None, *, stop: Event | None = None) -> Workers:
 
     Args:
         n: processes; None: as many as there are cores.
-        stop: asks to leave off.
+        stop: asks to stop.
     """
     return Workers(n or n_cores(), stop or Event(), _pool_of_processes)
 
@@ -91,9 +123,42 @@ def given(executor: Executor, *, stop: Event | None = None) -> Workers:
 
     Args:
         executor: of concurrent.futures, or one that behaves like it (Dask, loky, mpi4py).
-        stop: asks to leave off.
+        stop: asks to stop.
     """
     return Workers(1, stop or Event(), lambda _: nullcontext(executor))
+
+
+def workers_for(executor: AnyExecutor, *, stop: Event | None = None) -> Workers:
+    """Return the workers that an argument `executor` asks for.
+
+    Args:
+        executor: None, or "threads": as many threads as there are cores; a number of threads; "processes": as many
+            processes as there are cores; or an executor of the caller's.
+        stop: asks to stop.
+
+    Raises:
+        ExecutorError: it is none of these.
+    """
+    if executor is None or executor == "threads":
+        return threads(stop=stop)
+    if executor == "processes":
+        return processes(stop=stop)
+    if isinstance(executor, int) and not isinstance(executor, bool) and executor >= 1:
+        return threads(executor, stop=stop)
+    if isinstance(executor, Executor):
+        return given(executor, stop=stop)
+    wanted = '"threads", "processes", a number from 1 on, or an executor of concurrent.futures'
+    raise ExecutorError(expected("executor", "", wanted, executor))
+
+
+def in_processes(executor: AnyExecutor) -> bool:
+    """Return whether an argument `executor` asks for processes, to which tasks must be sent."""
+    return executor == "processes" or isinstance(executor, ProcessPoolExecutor)
+
+
+def in_this_process(executor: AnyExecutor) -> bool:
+    """Return whether an argument `executor` is known to do all work in this process."""
+    return executor is None or executor == "threads" or isinstance(executor, int | ThreadPoolExecutor)
 
 
 def n_cores() -> int:

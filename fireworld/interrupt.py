@@ -14,9 +14,13 @@ class Interrupted(KeyboardInterrupt):
 
 
 @contextmanager
-def gentle_interrupt() -> Iterator[Event]:
-    """Let the first Ctrl-C but set an event, so that what is under way is done and kept; a second one stops it."""
-    asked = Event()
+def gentle_interrupt(asked: Event | None = None) -> Iterator[Event]:
+    """Let the first Ctrl-C only set an event, so that what is under way is done and kept; a second one stops it.
+
+    Args:
+        asked: the event; None: a new one.
+    """
+    asked = asked or Event()
     previous = signal.getsignal(signal.SIGINT)
     in_main = threading.current_thread() is threading.main_thread()
     if not in_main or previous is not signal.default_int_handler:  # ignored, as below nohup, or handled by others

@@ -1,15 +1,21 @@
 """How a run came out: one table of quantities, which the terminal, pages, JSON, results and comparisons walk.
 
-To add a score that follows from what is recorded, add a property to `Outcome` and a row to `QUANTITIES`.
+To add a score that follows from what is recorded, add a property to `Outcome` and a row to `QUANTITIES`; to compare
+policies by it, a row to `METRICS`; and if it needs an attribute that results files do not hold yet, a row to `COLUMNS`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
-from fireworld.records import CityRecord, StepRecord
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from fireworld.records import CityRecord, StepRecord
+
+Values = TypeVar("Values", float, "NDArray[Any]")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,3 +175,57 @@ QUANTITIES: Final = (
     ),
 )
 """What is said of a run, the most important first."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Metric:
+    """What policies are compared by."""
+
+    name: str
+    """On the command line, in `fw.compare` and in JSON."""
+    label: str
+    attribute: str
+    """Of `Outcome`; it must follow from `COLUMNS`."""
+    unit: str
+    digits: int
+    """Decimals of a mean."""
+    higher_is_better: bool
+
+    def gain(self, difference: Values) -> Values:
+        """Return a difference, or an array of them, with the sign that makes more better."""
+        return difference if self.higher_is_better else -difference
+
+
+def _metric(name: str, quantity: str, *, attribute: str = "", unit: str = "") -> Metric:
+    """Return a quantity as a metric; where runs are compared by another attribute, in its unit."""
+    found = next(each for each in QUANTITIES if each.name == quantity)
+    return Metric(
+        name=name,
+        label=found.label,
+        attribute=attribute or quantity,
+        unit=unit or found.unit,
+        digits=found.digits,
+        higher_is_better=bool(found.higher_is_better),
+    )
+
+
+METRICS: Final = (
+    _metric("score", "score", attribute="score_share", unit="of the maximum"),
+    _metric("burnt-out", "n_burnt_out"),
+    _metric("time", "time_to_complete", attribute="steps"),
+    _metric("civilians", "n_civilians_alive"),
+)
+"""What policies are compared by, the default first. Time counts to the last step where something still burns."""
+
+COLUMNS: Final = {
+    "score": "score",
+    "score_max": "score_max",
+    "burnt_out": "n_burnt_out",
+    "steps": "steps",
+    "completed": "completed",
+    "civilians_alive": "n_civilians_alive",
+    "total_reward": "total_reward",
+    "water_litres": "water_used_litres",
+}
+"""Columns of results files, and the attribute of `Outcome` in each. Add new ones at the end: files without them stay
+readable, and their runs are made again where the new column is needed."""

@@ -18,7 +18,7 @@ COMMANDS: Final = {
     "reproduce": "Repeat the paper: its tables beside ours.",
     "scenarios": "List the scenarios, or draw one.",
     "info": "Say what a recording holds and how far it is good.",
-    "compare": "Compare two policies on the same luck, with a verdict.",
+    "compare": "Compare two policies run by run, with a verdict.",
     "diff": "Compare two recordings step by step.",
     "fork": "Go on otherwise from a step of a recording.",
     "explain": "Say which decisions made one run better than another.",

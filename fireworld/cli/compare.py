@@ -1,33 +1,22 @@
-"""`fireworld compare`: two policies on the same luck, with a verdict and a gate for CI."""
+"""`fireworld compare`: is a policy better than another, with a verdict and a gate for CI."""
 
 from __future__ import annotations
 
 import json
-import math
-import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import click
 
-from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.installed import check_matplotlib
 from fireworld.cli.options import SEED_MAX
-from fireworld.cli.progress import BAR, COUNT, DESCRIPTION, LEFT, bar
-from fireworld.interrupt import gentle_interrupt
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from fireworld.cli.comparison_text import Comparison
-    from fireworld.evaluation.contest import Contest
-    from fireworld.simulation.built import BuiltScenario
+from fireworld.cli.progress import BAR, COUNT, DESCRIPTION, LEFT, bars
+from fireworld.outcome import METRICS
 
 TESTS: Final = "test-1,test-2,test-3"
-METRIC_NAMES: Final = ("score", "burnt-out", "time", "civilians")
-SEEDS: Final = 100
-UNLIMITED: Final = 10_000
 EXIT_CODES: Final = {"not worse": 0, "worse": 1, "cannot tell": 3}
 
 
@@ -38,7 +27,7 @@ EXIT_CODES: Final = {"not worse": 0, "worse": 1, "cannot tell": 3}
     "--scenarios", metavar="NAMES", default=TESTS, show_default=True, help="Shipped names or YAML files, with commas."
 )
 @click.option(
-    "--seeds", "n_seeds", metavar="N", default=SEEDS, show_default=True, type=click.IntRange(1, 10_000),
+    "--seeds", "n_seeds", metavar="N", default=100, show_default=True, type=click.IntRange(1, 10_000),
     help="Runs of each policy in each scenario.",
 )  # fmt: skip
 @click.option(
@@ -48,7 +37,10 @@ EXIT_CODES: Final = {"not worse": 0, "worse": 1, "cannot tell": 3}
 @click.option("--jobs", metavar="N", type=click.IntRange(1, 1000), help="Runs at a time.  [default: cores]")
 @click.option("--set", "settings", metavar="KEY=VALUE", multiple=True, help="Set a key of all scenarios; repeatable.")
 @click.option("--gate", is_flag=True, help="Turn the verdict into the exit code.")
-@click.option("--gate-metric", type=click.Choice(METRIC_NAMES), help="What --gate and --junit judge.  [default: score]")
+@click.option(
+    "--gate-metric", type=click.Choice([metric.name for metric in METRICS]),
+    help="What --gate and --junit judge.  [default: score]",
+)  # fmt: skip
 @click.option(
     "--margin", metavar="X", type=click.FloatRange(min=0), help="A loss up to X counts as not worse.  [default: 0]"
 )
@@ -79,7 +71,7 @@ def command(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Tell whether POLICY_B, the new one, is better than POLICY_A, the reference.
+    """Compare POLICY_B, the new one, with POLICY_A, the reference: is it better?
 
     \b
     fireworld compare chief nearest-to-civilian                the three tests, 100 seeds
@@ -87,10 +79,10 @@ def command(
     fireworld compare chief my:Policy --gate --margin 0.01     for CI: exit code 1 if worse
     fireworld compare chief random --scenarios quick,own.yaml --seeds 30 --plot difference.png
 
-    Policies are named as for `fireworld run --policy`. Both run every scenario with the same seeds, so they meet the
-    same luck, and are compared run by run: score as a share of its maximum, buildings burnt out, time to complete and
-    civilians alive, each with the 95 % interval of the difference B - A and the probability P that a run of B is the
-    better one.
+    Policies are named as for `fireworld run --policy`. Both run every scenario with the same seeds, so they see the
+    same random draws (common random numbers), and are compared run by run: score as a share of its maximum, buildings
+    burnt out, time to complete and civilians alive, each with the 95 % interval of the difference B - A and the
+    probability P that a run of B is the better one.
 
     Exit code: 0; with --gate 0 not worse (the interval does not reach below -margin), 1 worse (it lies wholly below
     zero, and reaches below -margin), 3 cannot tell; 2 could not compare; 130 interrupted (--results keeps every run
@@ -98,175 +90,57 @@ def command(
     """
     if not (gate or junit) and (margin is not None or gate_metric is not None):
         raise click.UsageError("--margin and --gate-metric go with --gate or --junit.")
-    if margin is not None and not math.isfinite(margin):
-        raise click.UsageError(f"--margin: expected a finite number, got {margin}.")
     if force and not (junit or plot):
         raise click.UsageError("--force goes with --junit or --plot.")
-    if first_seed + n_seeds - 1 > SEED_MAX:
-        raise click.UsageError(f"--first-seed: seeds end at {SEED_MAX}.")
-    _check_outputs([path for path in (junit, plot) if path is not None], force=force, plot=plot is not None)
-    announce_compilation()
-    contest = _prepare(
-        (policy_a, policy_b),
-        scenarios,
-        settings,
-        seeds=range(first_seed, first_seed + n_seeds),
-        results=results,
-        jobs=jobs or os.cpu_count() or 1,
-    )
-    if not _carry_out(contest):
-        context.exit(INTERRUPTED)
-    found = _compare(contest, metric=gate_metric or METRIC_NAMES[0], margin=margin or 0.0)
-    _write(found, junit=junit, plot=plot, force=force)
-    _show(found, gate=gate, as_json=as_json)
-    context.exit(EXIT_CODES[found.gate.judgement] if gate else 0)
+    from fireworld.evaluation.compare import compare
+    from fireworld.executors import n_cores
+    from fireworld.files import check_output, check_outputs, write_file
+    from fireworld.scenario import split_settings
+    from fireworld.scenario.yaml_text import read_yaml
 
-
-def _check_outputs(paths: Sequence[Path], *, force: bool, plot: bool) -> None:
-    """See that everything can be written, before any run.
-
-    Raises:
-        OutputError: a file exists, or its folder does not.
-        ViewError: matplotlib is not installed.
-    """
-    from fireworld.errors import OutputError
-
-    for path in paths:
-        if path.exists() and not force:
-            raise OutputError(f"{path}: exists already; try --force")
-        if path.is_dir() or not path.parent.is_dir():
-            raise OutputError(f"{path}: cannot be written: {'is a folder' if path.is_dir() else 'no such folder'}")
+    check_outputs([path for path in (junit, plot) if path is not None], force=force)
     if plot:
+        check_output(plot, force=force, endings=(".png", ".svg", ".pdf"))
         check_matplotlib("--plot")
-
-
-def _prepare(
-    policies: tuple[str, str],
-    scenarios: str,
-    settings: Sequence[str],
-    *,
-    seeds: range,
-    results: Path | None,
-    jobs: int,
-) -> Contest:
-    """Find policies, scenarios and earlier results."""
-    from fireworld.evaluation.contest import Contest, enter
-    from fireworld.evaluation.results import open_archive
-    from fireworld.policy.names import note_on_team
-
-    contestants = enter(policies[0]), enter(policies[1])
-    archive = open_archive(results)
-    stages = _build_scenarios(scenarios, settings)
-    said = {
-        note_on_team(contestant.named, built.scenario.brigades.n, choices=built.scenario.choices): None
-        for contestant in contestants
-        for built in stages.values()
-    }
-    for note in filter(None, said):
-        click.echo(note, err=True)
-    return Contest(stages=stages, contestants=contestants, seeds=seeds, archive=archive, jobs=jobs)
-
-
-def _build_scenarios(names: str, settings: Sequence[str]) -> dict[str, BuiltScenario]:
-    """Build the scenarios, each once.
-
-    Raises:
-        ScenarioError: one of them cannot be read or built, or comes twice.
-    """
-    from fireworld.errors import ScenarioError, expected
-    from fireworld.scenario import load_scenario, split_settings
-    from fireworld.simulation.built import CityCache
-
-    values = split_settings(settings)
-    cities = CityCache()
-    stages: dict[str, BuiltScenario] = {}
-    seen: dict[str, str] = {}
-    for name in (part.strip() for part in names.split(",")):
-        scenario = load_scenario(name).with_settings(values)
-        if scenario.digest in seen:
-            got = f"{name} a second time" if name in stages else f"{name}, which is the same as {seen[scenario.digest]}"
-            raise ScenarioError(expected("--scenarios", "", "each scenario once", got))
-        seen[scenario.digest] = name
-        stages[name] = cities.build(scenario)
-    return stages
-
-
-def _carry_out(contest: Contest) -> bool:
-    """Make the runs that are missing, under a bar where people watch; False if interrupted."""
-    path, n_missing = contest.archive.path, sum(map(len, contest.missing()))
-    if n_missing < contest.n_runs:
-        click.echo(f"{contest.n_runs - n_missing} of {contest.n_runs} runs are known from {path}", err=True)
-    kept = f"they are kept in {path}" if path is not None else "with --results they would have been kept"
-    n_done, how = 0, "interrupted"
-    try:
-        with gentle_interrupt() as interrupted, bar("runs", n_missing, DESCRIPTION, BAR, COUNT, LEFT) as advance:
-
-            def on_run() -> None:
-                nonlocal n_done
-                n_done += 1
-                advance()
-
-            if contest.carry_out(interrupted, on_run):
-                return True
-    except KeyboardInterrupt:
-        how = "interrupted within a run"
-    click.echo(f"{how}; {n_done} of {n_missing} runs were done: {kept}", err=True)
-    return False
-
-
-def _compare(contest: Contest, *, metric: str, margin: float) -> Comparison:
-    from fireworld.cli.comparison_text import Comparison, Gate
-    from fireworld.evaluation.paired import compare_outcomes, judge, over_all
-    from fireworld.evaluation.results import simulator_version
-
-    a, b = contest.contestants
-    pairings = compare_outcomes(contest.outcomes(a), contest.outcomes(b), same_policy=contest.same_policy)
-    return Comparison(
-        policies=(a.text, b.text),
-        digests=(a.identity, b.identity),
-        scenarios=[(name, built.scenario.digest) for name, built in contest.stages.items()],
-        seeds=contest.seeds,
-        version=simulator_version(),
-        same_policy=contest.same_policy,
-        pairings=pairings,
-        gate=Gate(metric, margin, judge(over_all(pairings, metric), margin=margin)),
-    )
-
-
-def _write(found: Comparison, *, junit: Path | None, plot: Path | None, force: bool) -> None:
-    """Write the files that were asked for.
-
-    Raises:
-        OutputError: one of them cannot be written.
-    """
+    announce_compilation()
+    with _progress(results) as on_run:
+        comparison = compare(
+            [policy_a, policy_b],
+            scenarios=[name.strip() for name in scenarios.split(",")],
+            seeds=n_seeds,
+            first_seed=first_seed,
+            set={key: read_yaml(text, source=f"--set {key}") for key, text in split_settings(settings).items()},
+            executor=jobs or n_cores(),
+            results=results,
+            metric=gate_metric or METRICS[0].name,
+            margin=margin or 0.0,
+            on_run=on_run,
+        )
+    for warning in comparison.warnings:
+        click.echo(warning, err=True)
     if junit is not None:
-        from fireworld.cli.comparison_text import junit as to_junit
-        from fireworld.files import write_file
-
-        write_file(junit, to_junit(found))
+        write_file(junit, comparison.junit())
     if plot is not None:
-        from fireworld_viewer.pictures.figure_files import save_figure
-
-        from fireworld.cli.comparison_text import scopes
-        from fireworld.evaluation.figures import draw_differences
-
-        title = f"{found.policies[1]} (B) against {found.policies[0]} (A), {len(found.seeds)} seeds"
-        save_figure(draw_differences(scopes(found), title=title), plot, force=force)
+        comparison.save_figure(plot, force=force)
+    click.echo(json.dumps(comparison.to_dict(gate=gate), indent=2) if as_json else repr(comparison))
+    if gate and not as_json:
+        click.echo(comparison.gate)
+    context.exit(EXIT_CODES[comparison.judgement] if gate else 0)
 
 
-def _show(found: Comparison, *, gate: bool, as_json: bool) -> None:
-    from rich.console import Console
+@contextmanager
+def _progress(results: Path | None) -> Iterator[Callable[[int, int], None]]:
+    """Show a bar of the runs that are made, where people watch; say how many are known."""
+    with bars(DESCRIPTION, BAR, COUNT, LEFT) as progress:
+        bar = progress.add_task("runs", total=None)
+        n_known = -1
 
-    from fireworld.cli import comparison_text as text
+        def on_run(n_done: int, n_all: int) -> None:
+            nonlocal n_known
+            if n_known < 0:
+                n_known = n_done
+                if n_known:
+                    click.echo(f"{n_known} of {n_all} runs are known from {results}", err=True)
+            progress.update(bar, completed=n_done - n_known, total=n_all - n_known)
 
-    if as_json:
-        click.echo(json.dumps(text.as_json(found, gated=gate), indent=2))
-        return
-    table = text.table(found)
-    natural = Console(width=UNLIMITED).measure(table).maximum
-    Console(highlight=False, width=max(Console().width, natural)).print(table)  # no figure is ever cut off
-    for note in text.notes(found):
-        click.echo(note)
-    click.echo(text.sentence(found))
-    if gate:
-        click.echo(text.gate_line(found))
+        yield on_run

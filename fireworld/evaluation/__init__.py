@@ -1,1 +1,1 @@
-"""Evaluation: what policies achieve, compared honestly, as tables and figures."""
+"""Evaluation: what policies achieve over many seeds, compared run by run."""

@@ -1,18 +1,18 @@
 """Two policies on the same scenarios and seeds, compared run by run: differences, verdicts, and the gate made of them.
 
-B is the new policy, A the reference; every difference is B less A. Both meet the same luck, so the pairs of runs are
-what is resampled. Over all scenarios, a seed is drawn with its runs in all of them: every scenario keeps its share of
-each resample, and what the runs of one seed have in common stays together.
+B is the new policy, A the reference; every difference is B - A. Both see the same random draws (common random numbers),
+so the pairs of runs are what is resampled. Over all scenarios, a seed is drawn with its runs in all of them: every
+scenario keeps its share of each resample, and what the runs of one seed have in common stays together.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import reduce
 from operator import add
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -25,48 +25,19 @@ from fireworld.evaluation.statistics import (
     paired_difference,
 )
 from fireworld.kernels.arrays import Array
+from fireworld.outcome import METRICS, Metric
 
 Verdict = Literal["better", "worse", "cannot tell", "the same policy"]
 Judgement = Literal["not worse", "worse", "cannot tell"]
 
 N_SEEDS_MIN: Final = 6
-"""Seeds that must differ before anything is told: five all of one sign come by chance once in sixteen times."""
+"""Seeds that must differ for a verdict: five all of one sign come by chance once in sixteen times."""
 N_SEEDS_ENOUGH: Final = 20
 """Below it intervals are too narrow."""
 N_SEEDS_MAX: Final = 10_000
-"""Where more would be needed, the difference is too small to be told."""
+"""Where more would be needed, the difference is too small for a verdict."""
 _POWER: Final = 7.849
 """(1.960 + 0.842)^2: an interval of 95 % that leaves out zero four times in five."""
-
-
-@dataclass(frozen=True)
-class Metric:
-    """What policies are compared by."""
-
-    name: str
-    label: str
-    quantity: str
-    """Attribute of Outcomes."""
-    unit: str
-    digits: int
-    higher_is_better: bool
-
-    def gain(self, value: Array) -> Array:
-        """Turn values so that more is better."""
-        return value if self.higher_is_better else -value
-
-    def interval_of_gain(self, difference: Estimate) -> tuple[float, float]:
-        """Return the interval of a difference, turned so that more is better."""
-        low, high = difference.low, difference.high
-        return (low, high) if self.higher_is_better else (-high, -low)
-
-
-METRICS: Final = (
-    Metric("score", "score", "score_share", "of the maximum", 3, higher_is_better=True),
-    Metric("burnt-out", "burnt out", "burnt_out", "buildings", 1, higher_is_better=False),
-    Metric("time", "time to complete", "steps", "steps", 1, higher_is_better=False),
-    Metric("civilians", "civilians alive", "civilians_alive", "civilians", 2, higher_is_better=True),
-)
 
 
 @dataclass(frozen=True)
@@ -77,6 +48,10 @@ class Side:
     interquartile_mean: float
     n_truncated: int
     """Runs in which the fire was not out at the last step, which stands for their time to complete."""
+
+    def text(self, digits: int) -> str:
+        """Return the mean and the interquartile mean for people."""
+        return f"{self.mean:.{digits}f} ({self.interquartile_mean:.{digits}f})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,11 +64,21 @@ class Pairing:
     a: Side
     b: Side
     differences: Array
-    """(n_seeds,) B less A; over all: mean over the scenarios."""
+    """(n_seeds,) B - A; over all: mean over the scenarios."""
     difference: Estimate
     improvement: Estimate
     """Probability that a run of B is better than its pair; a tie counts as half."""
-    verdict: Verdict
+    same_policy: bool
+
+    @property
+    def verdict(self) -> Verdict:
+        """What B is: better or worse where the interval leaves out zero and enough seeds differ."""
+        if self.same_policy:
+            return "the same policy"
+        low, high = self.interval_of_gain
+        if self.n_differing < N_SEEDS_MIN:
+            return "cannot tell"
+        return "better" if low > 0.0 else "worse" if high < 0.0 else "cannot tell"
 
     @property
     def n_differing(self) -> int:
@@ -102,18 +87,59 @@ class Pairing:
 
     @property
     def more_seeds(self) -> int | None:
-        """Seeds still to be run until a verdict is likely to be found; None: it is found, or no number would do."""
-        return self.seeds_to_tell() if self.verdict == "cannot tell" else None
+        """Seeds still to be run until a verdict is likely; None: there is one, or no number would do."""
+        return self.seeds_needed() if self.verdict == "cannot tell" else None
 
     @property
     def reason(self) -> str:
-        """Say what it would take to tell; nothing where it is told."""
+        """What it would take to reach a verdict, in words; empty where there is one."""
         return self.advice() if self.verdict == "cannot tell" else ""
 
-    def seeds_to_tell(self, *, margin: float = 0.0) -> int | None:
+    @property
+    def interval_of_gain(self) -> tuple[float, float]:
+        """Ends of the interval of the difference, with the sign that makes more better."""
+        low, high = self.metric.gain(self.difference.low), self.metric.gain(self.difference.high)
+        return min(low, high), max(low, high)
+
+    @property
+    def sentence(self) -> str:
+        """Verdict, difference and probability in words."""
+        reason = f", {self.reason}" if self.reason else ""
+        difference = self.difference.text(digits=self.metric.digits, sign=True)
+        return (
+            f"{self.metric.label} {self.verdict}{reason}: {difference} {self.metric.unit}, "
+            f"P(better) {self.improvement.mean:.2f}"
+        )
+
+    @property
+    def cells(self) -> list[str]:
+        """Cells of a table for people: metric, A, B, B - A, P, verdict."""
+        digits = self.metric.digits
+        difference = self.difference.text(digits=digits, sign=True)
+        sides = self.a.text(digits), self.b.text(digits)
+        return [self.metric.label, *sides, difference, f"{self.improvement.mean:.2f}", self.verdict]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values (docs/comparing-policies.md)."""
+        return {
+            "scenario": self.scenario,
+            "metric": self.metric.name,
+            "unit": self.metric.unit,
+            "higher_is_better": self.metric.higher_is_better,
+            "a": asdict(self.a),
+            "b": asdict(self.b),
+            "difference": self.difference.ends(),
+            "improvement": self.improvement.ends(),
+            "n_differing": self.n_differing,
+            "verdict": self.verdict,
+            "more_seeds": self.more_seeds,
+            "reason": self.reason,
+        }
+
+    def seeds_needed(self, *, margin: float = 0.0) -> int | None:
         """Estimate how many more seeds would tell B from A, or from a loss of `margin`; None: no number would do.
 
-        They tell it four times in five, if the true difference is the one measured.
+        They do so four times in five, if the true difference is the one measured.
         """
         n, gain = len(self.differences), self.metric.gain(self.differences)
         middle = mean(gain)
@@ -126,8 +152,8 @@ class Pairing:
         return math.ceil(needed) - n if needed <= N_SEEDS_MAX else None
 
     def advice(self, *, margin: float = 0.0) -> str:
-        """Say in words how many more seeds would tell."""
-        more = self.seeds_to_tell(margin=margin)
+        """Return in words how many more seeds would tell."""
+        more = self.seeds_needed(margin=margin)
         if more is None:
             return f"no number of seeds up to {N_SEEDS_MAX:,} would tell" if self.n_differing else "no run differs"
         if len(self.differences) < N_SEEDS_MIN:
@@ -143,7 +169,7 @@ def compare_outcomes(
     Args:
         of_a: the reference's runs by scenario, the same seeds in each.
         of_b: the new policy's, of the same scenarios and seeds.
-        same_policy: there is nothing to be told apart.
+        same_policy: the two are one policy.
     """
     names = list(of_a)
     scopes = [(name, [name]) for name in names]
@@ -162,14 +188,14 @@ def compare_outcomes(
 
 
 def over_all(pairings: Sequence[Pairing], metric: str = METRICS[0].name) -> Pairing:
-    """Find the comparison of one metric over all scenarios."""
+    """Return the comparison of one metric over all scenarios."""
     return next(pairing for pairing in pairings if pairing.scenario is None and pairing.metric.name == metric)
 
 
 def judge(pairing: Pairing, *, margin: float = 0.0) -> Judgement:
-    """Tell whether B is not worse than A.
+    """Judge whether B is not worse than A.
 
-    Not worse: the interval of the gain does not reach below -margin. Worse: otherwise, and it lies wholly below zero.
+    Not worse: the interval of the gain does not reach below -margin. Worse: it does, and lies wholly below zero.
 
     Args:
         pairing: what was measured.
@@ -177,7 +203,7 @@ def judge(pairing: Pairing, *, margin: float = 0.0) -> Judgement:
     """
     if pairing.verdict == "the same policy":
         return "not worse"
-    low, _ = pairing.metric.interval_of_gain(pairing.difference)
+    low, _ = pairing.interval_of_gain
     if len(pairing.differences) >= N_SEEDS_MIN and low >= -margin:
         return "not worse"
     return "worse" if pairing.verdict == "worse" else "cannot tell"
@@ -187,28 +213,19 @@ def _pair(
     scenario: str | None, metric: Metric, of_a: Sequence[Outcomes], of_b: Sequence[Outcomes], *, same_policy: bool
 ) -> Pairing:
     values_a, values_b = (
-        [getattr(outcomes, metric.quantity).astype(np.float64) for outcomes in side] for side in (of_a, of_b)
+        [getattr(outcomes, metric.attribute).astype(np.float64) for outcomes in side] for side in (of_a, of_b)
     )
     mean_a, mean_b = _over_scenarios(values_a), _over_scenarios(values_b)
-    difference = paired_difference(mean_b, mean_a)
-    differences = (mean_b - mean_a)[0]
     return Pairing(
         scenario=scenario,
         metric=metric,
         a=_side(of_a, values_a),
         b=_side(of_b, values_b),
-        differences=differences,
-        difference=difference,
+        differences=(mean_b - mean_a)[0],
+        difference=paired_difference(mean_b, mean_a),
         improvement=_improvement(metric, values_a, values_b),
-        verdict="the same policy" if same_policy else _verdict(metric, differences, difference),
+        same_policy=same_policy,
     )
-
-
-def _verdict(metric: Metric, differences: Array, difference: Estimate) -> Verdict:
-    low, high = metric.interval_of_gain(difference)
-    if np.count_nonzero(differences) < N_SEEDS_MIN:
-        return "cannot tell"
-    return "better" if low > 0.0 else "worse" if high < 0.0 else "cannot tell"
 
 
 def _improvement(metric: Metric, values_a: Sequence[Array], values_b: Sequence[Array]) -> Estimate:

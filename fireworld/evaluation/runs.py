@@ -1,80 +1,84 @@
-"""Runs of one policy on one scenario under many seeds: the one way in which teams are measured."""
+"""Runs of one policy in one scenario under many seeds: the one way in which policies are measured."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from functools import partial
+from types import SimpleNamespace
+from typing import Any, Final, get_type_hints
 
 import numpy as np
 
+from fireworld.executors import Workers
+from fireworld.interrupt import Interrupted
 from fireworld.kernels.arrays import Array
+from fireworld.outcome import COLUMNS, Outcome
 from fireworld.policy.asking import begin
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.protocol import Policy
 from fireworld.simulation.built import BuiltScenario
 from fireworld.simulation.world import World
 
+Row = tuple[Any, ...]
+"""How one run came out: COLUMNS in their order."""
+KINDS: Final[dict[str, type]] = {name: get_type_hints(Outcome)[attribute] for name, attribute in COLUMNS.items()}
+"""The Python type of each column: int, float or bool."""
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, eq=False)
 class Outcomes:
-    """How the runs ended, one entry for each seed; arrays of shape (n_seeds,)."""
+    """How runs came out, one for each seed.
 
-    seed: Array  # int64
-    score: Array  # float64
-    score_max: Array  # float64, civilians + 1
-    burnt_out: Array  # int64, buildings
-    steps: Array  # int64, last step: the time to complete where the fire is out
-    completed: Array  # bool, nothing burns any more
-    civilians_alive: Array  # int64
-    total_reward: Array  # float64, undiscounted return
-    water_litres: Array  # float64, sprayed by all brigades
+    Every attribute of `Outcome` that follows from COLUMNS is an attribute here too: an array of shape (n_seeds,), with
+    nan where the run has none.
+    """
 
-    @property
-    def score_share(self) -> Array:
-        """(n_seeds,) score as a share of its maximum."""
-        share: Array = self.score / self.score_max
-        return share
+    seed: Array  # (n_seeds,) int64
+    rows: Sequence[Row]
 
-
-QUANTITIES = tuple(item.name for item in fields(Outcomes) if item.name != "seed")
-"""What is measured of a run."""
+    def __getattr__(self, name: str) -> Array:
+        """Return an attribute of all runs' outcomes."""
+        for place, (column, attribute) in enumerate(COLUMNS.items()):
+            if attribute == name:
+                return np.array([row[place] for row in self.rows], dtype=KINDS[column])
+        derived = getattr(Outcome, name, None)
+        if not isinstance(derived, property) or derived.fget is None:
+            raise AttributeError(name)
+        runs = (SimpleNamespace(**dict(zip(COLUMNS.values(), row, strict=True))) for row in self.rows)
+        return np.array([derived.fget(run) for run in runs], dtype=np.float64)
 
 
-Row = tuple[float, ...]
-"""How one run ended: QUANTITIES in their order."""
-
-
-def evaluate(built: BuiltScenario, policy: KernelPolicy, seeds: Sequence[int], *, n_threads: int = 1) -> Outcomes:
-    """Run a policy once under every seed; policies measured on the same seeds meet the same luck.
+def evaluate(
+    built: BuiltScenario, policy: KernelPolicy, seeds: Sequence[int], *, workers: Workers | None = None
+) -> Outcomes:
+    """Run a policy once under every seed; policies measured on the same seeds see the same random draws.
 
     Args:
         built: the scenario, built.
         policy: what the brigades follow.
-        seeds: of the runs' luck.
-        n_threads: runs at a time; the outcome does not depend on it.
+        seeds: of the runs.
+        workers: who runs them; None: this thread. The outcome does not depend on it.
+
+    Raises:
+        Interrupted: the workers were asked to stop.
     """
-
-    def run(seed: int) -> Row:
-        return run_compiled(built, policy, seed=seed)
-
-    if n_threads == 1:
-        rows = [run(seed) for seed in seeds]
-    else:
-        with ThreadPoolExecutor(n_threads) as pool:
-            rows = list(pool.map(run, seeds))
-    return outcomes(seeds, rows)
+    tasks = [partial(run_compiled, built, policy, seed=seed) for seed in seeds]
+    found = [task() for task in tasks] if workers is None else workers.run(tasks)
+    if found is None:
+        raise Interrupted("interrupted")
+    return outcomes(seeds, [row_of(outcome) for outcome in found])
 
 
-def run_compiled(built: BuiltScenario, policy: KernelPolicy, *, seed: int) -> Row:
-    """Run a policy that the kernels follow by themselves, as one compiled episode."""
+def run_compiled(built: BuiltScenario, policy: KernelPolicy, *, seed: int) -> Outcome:
+    """Run a policy that the kernels can follow as one compiled episode."""
     world = built.world(seed=seed)
     world.run(policy.for_brigades(world.n_brigades))
-    return _ending(world)
+    return _outcome(world)
 
 
-def run_step_by_step(built: BuiltScenario, policy: Policy, *, seed: int) -> Row:
-    """Run any policy: it is asked in every step.
+def run_step_by_step(built: BuiltScenario, policy: Policy, *, seed: int) -> Outcome:
+    """Run any policy by asking it in every step.
 
     Raises:
         PolicyError: the policy failed.
@@ -83,28 +87,35 @@ def run_step_by_step(built: BuiltScenario, policy: Policy, *, seed: int) -> Row:
     begin(policy, world.city_arrays, n_brigades=world.n_brigades, seed=seed)
     while not (world.terminated or world.truncated):
         world.step(policy)
-    return _ending(world)
+    return _outcome(world)
+
+
+def row_of(outcome: Outcome) -> Row:
+    """Return what is stored of an outcome."""
+    return tuple(getattr(outcome, attribute) for attribute in COLUMNS.values())
 
 
 def outcomes(seeds: Sequence[int], rows: Sequence[Row]) -> Outcomes:
     """Put runs together, one for each seed."""
-    score, score_max, burnt_out, steps, completed, alive, total_reward, water = zip(*rows, strict=True)
-    return Outcomes(
-        seed=np.array(seeds, dtype=np.int64),
-        score=np.array(score, dtype=np.float64),
-        score_max=np.array(score_max, dtype=np.float64),
-        burnt_out=np.array(burnt_out, dtype=np.int64),
-        steps=np.array(steps, dtype=np.int64),
-        completed=np.array(completed, dtype=np.bool_),
-        civilians_alive=np.array(alive, dtype=np.int64),
-        total_reward=np.array(total_reward, dtype=np.float64),
-        water_litres=np.array(water, dtype=np.float64),
+    return Outcomes(np.array(seeds, dtype=np.int64), rows)
+
+
+def _outcome(world: World) -> Outcome:
+    state = world.state
+    n_burning, n_water_damaged, n_burnt_out, n_civilians_alive = state.outcome.counts.tolist()
+    score, score_max, score_now = state.outcome.score.tolist()
+    return Outcome(
+        steps=world.step_number,
+        completed=world.terminated,
+        score=score,
+        score_max=score_max,
+        score_now=score_now,
+        n_buildings=len(state.fire.fieryness),
+        n_burning=n_burning,
+        n_water_damaged=n_water_damaged,
+        n_burnt_out=n_burnt_out,
+        n_civilians=len(state.civilians.hp),
+        n_civilians_alive=n_civilians_alive,
+        total_reward=float(state.outcome.reward[5]),
+        water_used_litres=float(state.outcome.water[0]),
     )
-
-
-def _ending(world: World) -> Row:
-    outcome = world.state.outcome
-    score, score_max = outcome.score[:2].tolist()
-    _, _, burnt_out, alive = outcome.counts.tolist()
-    steps, total_reward, water = world.step_number, float(outcome.reward[5]), float(outcome.water[0])
-    return score, score_max, burnt_out, steps, world.terminated, alive, total_reward, water

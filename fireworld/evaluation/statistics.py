@@ -1,7 +1,7 @@
 """Means and 95 % intervals over repetitions of a training and seeds of a test: the same numbers on every machine.
 
 A team that learned differs from repetition to repetition, and a run from seed to seed. Both are drawn anew in every
-resample of the bootstrap, repetitions and seeds apart from each other, because all repetitions meet the same seeds.
+resample of the bootstrap, repetitions and seeds apart from each other, because all repetitions have the same seeds.
 """
 
 from __future__ import annotations
@@ -37,6 +37,15 @@ class Estimate:
     """Mean of the middle half of all values: what a typical run comes to."""
     n_repetitions: int
     n_seeds: int
+
+    def text(self, *, digits: int = 2, sign: bool = False) -> str:
+        """Return the mean and its interval for people: "0.52 [0.41, 0.63]"."""
+        form = f"{'+' if sign else ''}.{digits}f"
+        return f"{self.mean:{form}} [{self.low:{form}}, {self.high:{form}}]"
+
+    def ends(self) -> dict[str, float]:
+        """Return the mean and the ends of its interval by name."""
+        return {"mean": self.mean, "low": self.low, "high": self.high}
 
     @property
     def above_zero(self) -> bool:

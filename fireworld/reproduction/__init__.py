@@ -1,1 +1,1 @@
-"""The paper: its tables, its readings, its report."""
+"""The paper's experiment repeated: trainings, tests, tables beside the paper's, findings, and a report."""

@@ -9,10 +9,19 @@ from typing import Final, Literal
 
 from fireworld.evaluation.statistics import Estimate, mean
 from fireworld.reproduction import paper
-from fireworld.reproduction.paper_tables import APART, NEAR, WITHIN, Cell, Comparison, Pair, Tables
+from fireworld.reproduction.paper_tables import (
+    APART,
+    NEAR,
+    WITHIN,
+    PaperCell,
+    PaperPair,
+    PaperTables,
+    TeamComparison,
+    cells_of,
+)
 from fireworld.reproduction.study import NO_WATER, Study
 
-Verdict = Literal["reproduced", "partly", "not reproduced", "open", "yes", "no"]
+Answer = Literal["reproduced", "partly", "not reproduced", "open", "yes", "no"]
 N_ENOUGH: Final = 20
 """Repetitions and seeds below which a claim about learning is not to be made."""
 
@@ -22,11 +31,11 @@ class Finding:
     """A question, its answer in a word, and the numbers it rests on."""
 
     question: str
-    verdict: Verdict
+    verdict: Answer
     text: str
 
 
-def findings(study: Study, tables: Tables) -> list[Finding]:
+def findings(study: Study, tables: PaperTables) -> list[Finding]:
     """Return what a study found, the paper's main claim first."""
     return [
         _cooperation(tables),
@@ -39,7 +48,7 @@ def findings(study: Study, tables: Tables) -> list[Finding]:
 
 
 def caveat(study: Study) -> str | None:
-    """Say so where a study is too small for claims about learning."""
+    """Return a warning where a study is too small for claims about learning."""
     if study.n_repetitions >= N_ENOUGH and len(study.seeds) >= N_ENOUGH:
         return None
     return (
@@ -48,22 +57,16 @@ def caveat(study: Study) -> str | None:
     )
 
 
-def tally(cells: Sequence[Cell]) -> str:
+def tally(cells: Sequence[PaperCell]) -> str:
     """Count the verdicts of cells in words."""
     counts = {verdict: sum(cell.verdict == verdict for cell in cells) for verdict in (WITHIN, NEAR, APART)}
     return (
-        f"of the paper's {len(cells)} figures {counts[WITHIN]} lie within our 95 % interval, to {counts[NEAR]} more "
+        f"of the paper's {len(cells)} values {counts[WITHIN]} lie within our 95 % interval, to {counts[NEAR]} more "
         f"our mean is within 25 %, and to {counts[APART]} it is not"
     )
 
 
-def spread(found: Estimate, *, digits: int = 2, sign: bool = False) -> str:
-    """Write a mean and its interval: "0.52 [0.41, 0.63]"."""
-    form = f"{'+' if sign else ''}.{digits}f"
-    return f"{found.mean:{form}} [{found.low:{form}}, {found.high:{form}}]"
-
-
-def _cooperation(tables: Tables) -> Finding:
+def _cooperation(tables: PaperTables) -> Finding:
     main = tables.comparisons[0]
     theirs = fmean((row.score[1] - row.score[0]) / row.score_max for row in paper.TABLE_2)
     unsure = main.difference.low <= theirs <= main.difference.high
@@ -71,20 +74,20 @@ def _cooperation(tables: Tables) -> Finding:
         "Is the cooperative team better than the non-cooperative one (Table 2)?",
         "reproduced" if main.difference.above_zero else "open" if unsure else "not reproduced",
         f"Share of the greatest score, mean over the three tests: {_difference(main)}; in the paper it is "
-        f"{theirs:+.2f}. {_directions(tables.tests)} {_sentence(tally(_cells(tables.tests)))}",
+        f"{theirs:+.2f}. {_directions(tables.tests)} {_sentence(tally(cells_of(tables.tests)))}",
     )
 
 
-def _control(row: Comparison) -> Finding:
+def _control(row: TeamComparison) -> Finding:
     return Finding(
         _sentence(row.question).rstrip("."), _answer(row.difference, "yes", "no"), f"{_sentence(_difference(row))}"
     )
 
 
-def _uncontrolled(study: Study, tables: Tables) -> Finding:
+def _uncontrolled(study: Study, tables: PaperTables) -> Finding:
     names = [row.scenario for row in paper.TABLE_2]
     burnt, steps = (
-        [mean(study.values(name, NO_WATER, quantity)) for name in names] for quantity in ("burnt_out", "steps")
+        [mean(study.values(name, NO_WATER, quantity)) for name in names] for quantity in ("n_burnt_out", "steps")
     )
     cells = [pair.without for pair in tables.tests if pair.without.quantity != "score"]
     n_near = sum(cell.is_near for cell in cells)
@@ -98,18 +101,18 @@ def _uncontrolled(study: Study, tables: Tables) -> Finding:
     )
 
 
-def _more_brigades(tables: Tables) -> Finding:
-    cells = _cells(tables.more_brigades)
+def _more_brigades(tables: PaperTables) -> Finding:
+    cells = cells_of(tables.more_brigades)
     n_near = sum(cell.is_near for cell in cells)
     return Finding(
-        "Do the figures with seven and eight brigades agree (Table 3)?",
+        "Do the values with seven and eight brigades agree (Table 3)?",
         _degree(n_near, len(cells)),
         f"Our mean lies within 25 % of {n_near} of {len(cells)}; {tally(cells)}. {_directions(tables.more_brigades)}",
     )
 
 
-def _convergence(tables: Tables) -> Finding:
-    episodes = [cell for cell in tables.lessons if cell.quantity == "convergence episode"]
+def _convergence(tables: PaperTables) -> Finding:
+    episodes = [cell for cell in tables.trainings if cell.quantity == "convergence episode"]
     n_near = sum(cell.is_near for cell in episodes)
     shares = ", ".join(f"{100 * share.mean:.0f} %" for share in tables.converged)
     return Finding(
@@ -117,11 +120,11 @@ def _convergence(tables: Tables) -> Finding:
         _degree(n_near, len(episodes)),
         f"The policy settled (20 episodes without a change, within 130) in {shares} of the repetitions, "
         f"scenario by scenario; {n_near} of {len(episodes)} mean episodes lie within 25 % of the paper's. Of all "
-        f"figures of Table 1, scores included: {tally(tables.lessons)}.",
+        f"values of Table 1, scores included: {tally(tables.trainings)}.",
     )
 
 
-def _same_tables(tables: Tables) -> Finding:
+def _same_tables(tables: PaperTables) -> Finding:
     return Finding(
         "Do all brigades end with the same table, as the paper saw?",
         "reproduced" if tables.agreement.low > 0.99 else "not reproduced",
@@ -130,34 +133,29 @@ def _same_tables(tables: Tables) -> Finding:
     )
 
 
-def _answer(difference: Estimate, yes: Verdict, no: Verdict) -> Verdict:
+def _answer(difference: Estimate, yes: Answer, no: Answer) -> Answer:
     if difference.above_zero:
         return yes
     return no if difference.below_zero else "open"
 
 
-def _degree(n_met: int, n_all: int) -> Verdict:
+def _degree(n_met: int, n_all: int) -> Answer:
     return "reproduced" if n_met == n_all else "partly" if n_met else "not reproduced"
 
 
-def _difference(row: Comparison) -> str:
-    chance = spread(row.improvement)
+def _difference(row: TeamComparison) -> str:
     return (
-        f"{row.team} less {row.other} is {spread(row.difference, sign=True)}, and a run of the first is the better one "
-        f"with probability {chance}"
+        f"{row.team} - {row.other} is {row.difference.text(sign=True)}, and a run of the first is the better one "
+        f"with probability {row.improvement.text()}"
     )
 
 
-def _directions(pairs: Sequence[Pair]) -> str:
+def _directions(pairs: Sequence[PaperPair]) -> str:
     held, reversed_, unsure = (sum(pair.claim_holds is answer for pair in pairs) for answer in (True, False, None))
     return (
-        f"Figure by figure, cooperation changes {held} of {len(pairs)} the way the paper says, {reversed_} the other "
+        f"Value by value, cooperation changes {held} of {len(pairs)} the way the paper says, {reversed_} the other "
         f"way, and for {unsure} the interval of the paired difference holds zero."
     )
-
-
-def _cells(pairs: Sequence[Pair]) -> list[Cell]:
-    return [cell for pair in pairs for cell in (pair.without, pair.together)]
 
 
 def _list(values: Iterable[float]) -> str:

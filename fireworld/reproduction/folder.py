@@ -1,60 +1,251 @@
-"""The folder of a reproduction: made, cleared of an earlier one, and written to file by file."""
+"""The folder of a reproduction: a file for each part of the work once it is done, for a later call to find."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, TypeVar
 
-from fireworld.errors import OutputError, expected
+import msgspec
+import numpy as np
+from msgspec import Struct
 
+from fireworld.errors import OutputError, TrainingError, expected
+from fireworld.evaluation.runs import Outcomes, outcomes
+from fireworld.files import write_file
+from fireworld.kernels.arrays import Array
+from fireworld.outcome import COLUMNS
+from fireworld.policy.team import Team, load_team, save_team
+from fireworld.reproduction.csv_files import CSV_FILES
+from fireworld.reproduction.repetitions import Repetition
+from fireworld.reproduction.study import TEAMS, TOGETHER, LearningCurve
+from fireworld.reproduction.team_tests import Tested
+from fireworld.training.checkpoint import check_same
+
+FORMAT: Final = "fireworld-reproduction/1"
+REPORT: Final = "report.html"
 SETTINGS: Final = "kept/settings.json"
 """What the work in a folder was begun with."""
-FOLDERS: Final = ("kept", "teams", "recordings", "figures")
+SUBFOLDERS: Final = ("kept", "teams", "recordings", "figures")
+_HINT: Final = "delete it and it is made anew"
+
+Content = TypeVar("Content")
 
 
-def make_folder(folder: Path, *, force: bool) -> None:
-    """Make the folder, with room for everything in it.
+class RepetitionText(Struct, frozen=True, forbid_unknown_fields=True):
+    """A Repetition as plain values; its teams are in files of their own."""
 
-    Raises:
-        OutputError: it cannot be made, or something is in it already.
-    """
-    try:
-        if not force and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            begun = "--resume goes on with it, " if (folder / SETTINGS).is_file() else ""
-            hint = f"{begun}--force replaces what is there"
-            raise OutputError(expected("--out", "", "a free name or an empty folder", str(folder), hint))
-        folder.mkdir(exist_ok=True)
-        for name in FOLDERS:
-            (folder / name).mkdir(exist_ok=True)
-        (folder / SETTINGS).unlink(missing_ok=True)  # the first to go: half a clearance is nothing to go on from
-        for path in _products(folder):
-            path.unlink(missing_ok=True)
-    except OSError as error:
-        raise OutputError(f"--out: {folder}: cannot be made: {error.strerror or error}") from None
+    teams: dict[str, str]
+    """Digest of each team, by name."""
+    graduates: dict[str, str]
+    """Digest of each graduate, by scenario."""
+    lessons: list[LearningCurve]
 
 
-def find_folder(folder: Path) -> None:
-    """See that there is a reproduction in a folder to go on with.
+@dataclass(frozen=True)
+class ReproductionFolder:
+    """The folder of a reproduction."""
 
-    Raises:
-        OutputError: there is none.
-    """
-    if not (folder / SETTINGS).is_file():
-        got = f"no {folder / SETTINGS}"
-        raise OutputError(expected("--resume", "", "a reproduction to go on with", got, "leave out --resume"))
-    try:
-        for name in FOLDERS:
-            (folder / name).mkdir(exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"--out: {folder}: cannot be made: {error.strerror or error}") from None
+    path: Path
+
+    def make(self, *, force: bool) -> None:
+        """Make the folder, with room for everything in it.
+
+        Args:
+            force: delete what an earlier reproduction left in it.
+
+        Raises:
+            OutputError: it cannot be made, or something is in it already.
+        """
+        path = self.path
+        try:
+            if not force and path.exists() and (not path.is_dir() or any(path.iterdir())):
+                begun = "--resume continues it, " if (path / SETTINGS).is_file() else ""
+                hint = f"{begun}--force replaces what is there"
+                raise OutputError(expected(str(path), "", "a free name or an empty folder", "what is there", hint))
+            path.mkdir(exist_ok=True)
+            self._make_subfolders()
+            (path / SETTINGS).unlink(missing_ok=True)  # the first to go: nothing can continue from half of the files
+            for product in self._products():
+                product.unlink(missing_ok=True)
+        except OSError as error:
+            raise OutputError(f"{path}: cannot be made: {error.strerror or error}") from None
+
+    def find(self) -> None:
+        """Check that there is a reproduction to continue.
+
+        Raises:
+            OutputError: there is none.
+        """
+        if not (self.path / SETTINGS).is_file():
+            got = f"no {self.path / SETTINGS}"
+            raise OutputError(expected("resume", "", "a reproduction to continue", got, "leave out --resume"))
+        try:
+            self._make_subfolders()
+        except OSError as error:
+            raise OutputError(f"{self.path}: cannot be made: {error.strerror or error}") from None
+
+    def write(self, name: str, content: bytes | str) -> None:
+        """Write a file of the folder.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        write_file(self.path / name, content.encode() if isinstance(content, str) else content)
+
+    def repetition(self, number: int) -> Repetition | None:
+        """Return a repetition that was trained before; None if it has not been.
+
+        Raises:
+            TrainingError: a file is damaged, or gone.
+        """
+        path = self._training(number)
+        found = self._read(path, RepetitionText)
+        if found is None:
+            return None
+        return Repetition(
+            teams={name: _read_team(self._team(name, number), digest, path) for name, digest in found.teams.items()},
+            graduates={
+                scenario: _read_team(self._graduate(scenario, number), digest, path)
+                for scenario, digest in found.graduates.items()
+            },
+            curves=tuple(found.lessons),
+        )
+
+    def write_repetition(self, number: int, repetition: Repetition) -> None:
+        """Write the teams of a repetition, and then how they learned: with that it counts as done.
+
+        Raises:
+            OutputError: a file cannot be written.
+        """
+        teams, graduates = repetition.teams, repetition.graduates
+        for name, team in teams.items():
+            save_team(team, self._team(name, number), force=True)
+        for scenario, team in graduates.items():
+            save_team(team, self._graduate(scenario, number), force=True)
+        content = RepetitionText(
+            {name: team.digest for name, team in teams.items()},
+            {scenario: team.digest for scenario, team in graduates.items()},
+            list(repetition.curves),
+        )
+        self._write(self._training(number), content)
+
+    def n_trained(self, n_repetitions: int) -> int:
+        """Return how many repetitions are trained."""
+        return sum(self._training(number).is_file() for number in range(1, n_repetitions + 1))
+
+    def tested(
+        self, name: str, *, scenarios: Iterable[str], teams: Iterable[str], seeds: Sequence[int]
+    ) -> Tested | None:
+        """Return the outcomes of a repetition's tests, or of the rules'; None if there are none.
+
+        Args:
+            name: of the repetition, or "rules".
+            scenarios: the tests.
+            teams: who was tested.
+            seeds: of the runs.
+
+        Raises:
+            TrainingError: the file is damaged.
+        """
+        path = self._tests(name)
+        found = self._read(path, dict[str, dict[str, dict[str, list[bool | int | float]]]])
+        if found is None:
+            return None
+        wanted = {(scenario, team) for scenario in scenarios for team in teams}
+        if {(scenario, team) for scenario, tested in found.items() for team in tested} != wanted:
+            raise TrainingError(expected(str(path), "", "the tests of this reproduction", "others", _HINT))
+        return {
+            scenario: {team: _outcomes(columns, seeds, path) for team, columns in teams.items()}
+            for scenario, teams in found.items()
+        }
+
+    def write_tested(self, name: str, tested: Tested) -> None:
+        """Write the outcomes of a repetition's tests, or of the rules'.
+
+        Raises:
+            OutputError: the file cannot be written.
+        """
+        content = {
+            scenario: {
+                team: dict(zip(COLUMNS, map(list, zip(*found.rows, strict=True)), strict=True))
+                for team, found in teams.items()
+            }
+            for scenario, teams in tested.items()
+        }
+        self._write(self._tests(name), content)
+
+    def write_settings(self, identity: Mapping[str, Any]) -> None:
+        """Write what the work is begun with.
+
+        Raises:
+            OutputError: the file cannot be written.
+        """
+        self._write(self.path / SETTINGS, {"format": FORMAT, **identity})
+
+    def check_settings(self, identity: Mapping[str, Any]) -> None:
+        """Check that the work in the folder was begun with the same settings.
+
+        Raises:
+            TrainingError: it was not, or the file of settings is damaged.
+        """
+        path = self.path / SETTINGS
+        check_same(self._read(path, dict[str, Any]) or {}, {"format": FORMAT, **identity}, path)
+
+    def _training(self, number: int) -> Path:
+        return self.path / "kept" / f"training-{number}.json"
+
+    def _tests(self, name: str) -> Path:
+        return self.path / "kept" / f"tests-{name}.json"
+
+    def _team(self, name: str, number: int) -> Path:
+        return self.path / "teams" / f"{name}-{number}.npz"
+
+    def _graduate(self, scenario: str, number: int) -> Path:
+        return self.path / "teams" / f"{TOGETHER}-{number}-after-{scenario}.npz"
+
+    def _make_subfolders(self) -> None:
+        for name in SUBFOLDERS:
+            (self.path / name).mkdir(exist_ok=True)
+
+    def _products(self) -> list[Path]:
+        """List what an earlier reproduction may have left, and nothing else."""
+        path = self.path
+        scattered = [found for name in ("training", "tests") for found in path.glob(f"kept/{name}-*.json*")]
+        scattered += [found for team in TEAMS for found in path.glob(f"teams/{team}-*.npz*")]
+        scattered += [found for team in TEAMS for found in path.glob(f"recordings/*-{team}.mcap*")]
+        return [*scattered, *path.glob("figures/*.png"), *(path / name for name in (*CSV_FILES, REPORT))]
+
+    def _read(self, path: Path, kind: type[Content]) -> Content | None:
+        try:
+            return msgspec.json.decode(path.read_bytes(), type=kind, dec_hook=_array)
+        except FileNotFoundError:
+            return None
+        except (OSError, msgspec.DecodeError, UnicodeDecodeError) as error:
+            got = f"{type(error).__name__}: {error}"
+            raise TrainingError(expected(str(path), "", "what an earlier call has written", got, _HINT)) from None
+
+    def _write(self, path: Path, content: object) -> None:
+        write_file(path, msgspec.json.encode(content, enc_hook=np.ndarray.tolist))
 
 
-def _products(folder: Path) -> list[Path]:
-    """List what an earlier reproduction may have left in a folder, and nothing else."""
-    from fireworld.reproduction.sheets import SHEETS
-    from fireworld.reproduction.study import TEAMS
+def _read_team(path: Path, digest: str, training: Path) -> Team:
+    """Read a team, and check that it is the one that was written."""
+    team = load_team(path)
+    if team.digest != digest:
+        hint = f"delete {training} and it is trained anew"
+        raise TrainingError(expected(str(path), "", f"the team {digest[:12]} that was written", team.digest[:12], hint))
+    return team
 
-    scattered = [path for name in ("training", "tests") for path in folder.glob(f"kept/{name}-*.json*")]
-    scattered += [path for team in TEAMS for path in folder.glob(f"teams/{team}-*.npz*")]
-    scattered += [path for team in TEAMS for path in folder.glob(f"recordings/*-{team}.mcap*")]
-    return [*scattered, *folder.glob("figures/*.png"), *(folder / name for name in (*SHEETS, "report.html"))]
+
+def _array(_: type, values: object) -> Array:
+    """Return what a file has of an array."""
+    return np.array(msgspec.convert(values, list[int | float]))
+
+
+def _outcomes(columns: Mapping[str, list[bool | int | float]], seeds: Sequence[int], path: Path) -> Outcomes:
+    if set(columns) != set(COLUMNS) or any(len(column) != len(seeds) for column in columns.values()):
+        wanted = f"{', '.join(COLUMNS)} of {len(seeds)} runs"
+        raise TrainingError(expected(str(path), "", wanted, "others", _HINT))
+    return outcomes(seeds, [*zip(*(columns[name] for name in COLUMNS), strict=True)])

@@ -11,7 +11,7 @@ from typing import Final
 
 
 @dataclass(frozen=True)
-class Lesson:
+class PaperTraining:
     """A row of Table 1: a training scenario with four brigades."""
 
     scenario: str
@@ -21,7 +21,7 @@ class Lesson:
 
 
 @dataclass(frozen=True)
-class Test:
+class PaperTest:
     """A row of Table 2 or 3; pairs are without and with cooperation."""
 
     scenario: str
@@ -33,22 +33,22 @@ class Test:
 
 
 TABLE_1: Final = (
-    Lesson("train-1", 55, 9.977, 10),
-    Lesson("train-2", 101, 8.795, 10),
-    Lesson("train-3", 116, 10.787, 11),
-    Lesson("train-4", 128, 8.611, 9),
-    Lesson("train-5", 41, 9.891, 10),
-    Lesson("train-6", 74, 9.629, 10),
-    Lesson("train-7", 73, 8.973, 10),
-    Lesson("train-8", 59, 11.31, 12),
+    PaperTraining("train-1", 55, 9.977, 10),
+    PaperTraining("train-2", 101, 8.795, 10),
+    PaperTraining("train-3", 116, 10.787, 11),
+    PaperTraining("train-4", 128, 8.611, 9),
+    PaperTraining("train-5", 41, 9.891, 10),
+    PaperTraining("train-6", 74, 9.629, 10),
+    PaperTraining("train-7", 73, 8.973, 10),
+    PaperTraining("train-8", 59, 11.31, 12),
 )
 TABLE_2: Final = (
-    Test("test-1", 4, (436, 290), (410, 278), (2.017, 9.15), 12),
-    Test("test-2", 4, (490, 203), (541, 115), (2.564, 10.808), 12),
-    Test("test-3", 4, (473, 410), (570, 337), (0.27, 5.582), 10),
+    PaperTest("test-1", 4, (436, 290), (410, 278), (2.017, 9.15), 12),
+    PaperTest("test-2", 4, (490, 203), (541, 115), (2.564, 10.808), 12),
+    PaperTest("test-3", 4, (473, 410), (570, 337), (0.27, 5.582), 10),
 )
 TABLE_3: Final = (
-    Test("test-1-brigades-7", 7, (361, 246), (268, 167), (8.221, 10.257), 12),
-    Test("test-2-brigades-8", 8, (292, 113), (160, 77), (10.34, 11.198), 12),
-    Test("test-3-brigades-8", 8, (456, 294), (318, 112), (6.76, 8.788), 10),
+    PaperTest("test-1-brigades-7", 7, (361, 246), (268, 167), (8.221, 10.257), 12),
+    PaperTest("test-2-brigades-8", 8, (292, 113), (160, 77), (10.34, 11.198), 12),
+    PaperTest("test-3-brigades-8", 8, (456, 294), (318, 112), (6.76, 8.788), 10),
 )

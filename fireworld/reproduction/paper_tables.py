@@ -1,4 +1,4 @@
-"""Tables of a reproduction: the paper's figures beside ours, with a plain verdict for every cell."""
+"""Tables of a reproduction: the paper's values beside ours, with a plain verdict for every cell."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ _NEAR_SHARE: Final = 0.25
 
 
 @dataclass(frozen=True)
-class Cell:
-    """One figure of the paper, and what we measured."""
+class PaperCell:
+    """One value of the paper, and what we measured."""
 
     table: int
     scenario: str
@@ -34,29 +34,29 @@ class Cell:
 
     @property
     def verdict(self) -> str:
-        """Whether the paper's figure lies within our interval, our mean within 25 % of it, or neither."""
+        """Whether the paper's value lies within our interval, our mean within 25 % of it, or neither."""
         if self.ours.low <= self.paper <= self.ours.high:
             return WITHIN
         return NEAR if self.is_near else APART
 
     @property
     def is_near(self) -> bool:
-        """Whether our mean lies within 25 % of the paper's figure: says more than an interval that is wide."""
+        """Whether our mean lies within 25 % of the paper's value: says more than an interval that is wide."""
         return abs(self.ours.mean - self.paper) <= _NEAR_SHARE * self.paper
 
 
 @dataclass(frozen=True)
-class Pair:
-    """A figure of Table 2 or 3 without and with cooperation, and what cooperation changes."""
+class PaperPair:
+    """A value of Table 2 or 3 without and with cooperation, and what cooperation changes."""
 
-    without: Cell
-    together: Cell
+    without: PaperCell
+    together: PaperCell
     difference: Estimate
-    """With less without, run by run."""
+    """With - without, run by run."""
 
     @property
     def claim_holds(self) -> bool | None:
-        """Whether cooperation changes the figure the way the paper says; None: the interval spans zero."""
+        """Whether cooperation changes the value the way the paper says; None: the interval spans zero."""
         change = self.difference
         if not (change.above_zero or change.below_zero):
             return None
@@ -64,7 +64,7 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class Standing:
+class TeamShare:
     """How a team does, as a share of the greatest score."""
 
     team: str
@@ -73,7 +73,7 @@ class Standing:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class TeamComparison:
     """Two teams on the same repetitions and seeds; share of the greatest score, mean over tests."""
 
     team: str
@@ -85,47 +85,51 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class Tables:
+class PaperTables:
     """All tables of a reproduction."""
 
-    lessons: Sequence[Cell]
+    trainings: Sequence[PaperCell]
     converged: Sequence[Estimate]
     """Share of the repetitions in which the policy settled, by rows of Table 1."""
-    tests: Sequence[Pair]
-    more_brigades: Sequence[Pair]
-    standings: Sequence[Standing]
+    tests: Sequence[PaperPair]
+    more_brigades: Sequence[PaperPair]
+    shares: Sequence[TeamShare]
     """Over the tests of Table 2."""
-    standings_more_brigades: Sequence[Standing]
+    shares_more_brigades: Sequence[TeamShare]
     """Over the tests of Table 3."""
-    comparisons: Sequence[Comparison]
+    comparisons: Sequence[TeamComparison]
     """Over the tests of Table 2."""
     agreement: Estimate
     """Share of the states met in which all brigades of the cooperative team prefer the same action."""
 
     @property
-    def cells(self) -> list[Cell]:
-        """Every figure of the paper."""
-        pairs = [*self.tests, *self.more_brigades]
-        return [*self.lessons, *(cell for pair in pairs for cell in (pair.without, pair.together))]
+    def cells(self) -> list[PaperCell]:
+        """Every value of the paper."""
+        return [*self.trainings, *cells_of([*self.tests, *self.more_brigades])]
 
 
-def make_tables(study: Study) -> Tables:
+def make_tables(study: Study) -> PaperTables:
     """Judge a study."""
     names_2, names_3 = [row.scenario for row in paper.TABLE_2], [row.scenario for row in paper.TABLE_3]
-    standings = _standings(study, names_2)
-    return Tables(
-        lessons=[cell for row in paper.TABLE_1 for cell in _lesson_cells(study, row)],
+    shares = _shares(study, names_2)
+    return PaperTables(
+        trainings=[cell for row in paper.TABLE_1 for cell in _training_cells(study, row)],
         converged=[
-            estimate(_column(lesson.converged for lesson in study.lessons_of(TOGETHER, row.scenario)))
+            estimate(_column(curve.converged for curve in study.curves_of(TOGETHER, row.scenario)))
             for row in paper.TABLE_1
         ],
         tests=[pair for row in paper.TABLE_2 for pair in _pairs(study, row, table=2)],
         more_brigades=[pair for row in paper.TABLE_3 for pair in _pairs(study, row, table=3)],
-        standings=standings,
-        standings_more_brigades=_standings(study, names_3),
-        comparisons=_comparisons(study, names_2, standings),
+        shares=shares,
+        shares_more_brigades=_shares(study, names_3),
+        comparisons=_comparisons(study, names_2, shares),
         agreement=estimate(_column(study.agreement)),
     )
+
+
+def cells_of(pairs: Iterable[PaperPair]) -> list[PaperCell]:
+    """Return the cells of pairs, one after another."""
+    return [cell for pair in pairs for cell in (pair.without, pair.together)]
 
 
 def _column(values: Iterable[float]) -> Array:
@@ -133,38 +137,38 @@ def _column(values: Iterable[float]) -> Array:
     return np.array([[value] for value in values], dtype=np.float64)
 
 
-def _lesson_cells(study: Study, row: paper.Lesson) -> list[Cell]:
-    lessons = study.lessons_of(TOGETHER, row.scenario)
-    episodes = estimate(_column(lesson.n_episodes for lesson in lessons))
-    score = estimate(_column(lesson.score for lesson in lessons))
+def _training_cells(study: Study, row: paper.PaperTraining) -> list[PaperCell]:
+    curves = study.curves_of(TOGETHER, row.scenario)
+    episodes = estimate(_column(curve.n_episodes for curve in curves))
+    score = estimate(_column(curve.score for curve in curves))
     return [
-        Cell(1, row.scenario, "convergence episode", TOGETHER, row.convergence_episode, episodes),
-        Cell(1, row.scenario, "score", TOGETHER, row.score, score, lessons[0].score_max),
+        PaperCell(1, row.scenario, "convergence episode", TOGETHER, row.convergence_episode, episodes),
+        PaperCell(1, row.scenario, "score", TOGETHER, row.score, score, curves[0].score_max),
     ]
 
 
-def _pairs(study: Study, row: paper.Test, *, table: int) -> list[Pair]:
+def _pairs(study: Study, row: paper.PaperTest, *, table: int) -> list[PaperPair]:
     made = []
-    for quantity, key, figures in (
+    for quantity, key, values in (
         ("time to complete", "steps", row.steps),
-        ("burnt out", "burnt_out", row.burnt_out),
+        ("burnt out", "n_burnt_out", row.burnt_out),
         ("score", "score", row.score),
     ):
         without, together = study.values(row.scenario, ALONE, key), study.values(row.scenario, TOGETHER, key)
         best = float(study.values(row.scenario, ALONE, "score_max")[0, 0]) if key == "score" else None
         made.append(
-            Pair(
-                Cell(table, row.scenario, quantity, ALONE, figures[0], estimate(without), best),
-                Cell(table, row.scenario, quantity, TOGETHER, figures[1], estimate(together), best),
+            PaperPair(
+                PaperCell(table, row.scenario, quantity, ALONE, values[0], estimate(without), best),
+                PaperCell(table, row.scenario, quantity, TOGETHER, values[1], estimate(together), best),
                 paired_difference(together, without),
             )
         )
     return made
 
 
-def _standings(study: Study, scenarios: Sequence[str]) -> list[Standing]:
+def _shares(study: Study, scenarios: Sequence[str]) -> list[TeamShare]:
     return [
-        Standing(
+        TeamShare(
             team=team,
             by_scenario=[estimate(study.values(scenario, team, "score_share")) for scenario in scenarios],
             mean=estimate(study.mean_share(scenarios, team)),
@@ -173,8 +177,8 @@ def _standings(study: Study, scenarios: Sequence[str]) -> list[Standing]:
     ]
 
 
-def _comparisons(study: Study, scenarios: Sequence[str], standings: Sequence[Standing]) -> list[Comparison]:
-    best_rule = max((row for row in standings if row.team in FIXED), key=lambda row: row.mean.mean).team
+def _comparisons(study: Study, scenarios: Sequence[str], shares: Sequence[TeamShare]) -> list[TeamComparison]:
+    best_rule = max((row for row in shares if row.team in FIXED), key=lambda row: row.mean.mean).team
     asked = [
         (TOGETHER, ALONE, "is the paper's cooperative team better than its non-cooperative one?"),
         (TOGETHER, TOGETHER_WITHOUT_FLAGS, "do the flags that tell what the others do help?"),
@@ -184,7 +188,7 @@ def _comparisons(study: Study, scenarios: Sequence[str], standings: Sequence[Sta
         (TOGETHER, best_rule, "is it better than the best of the rules that learn nothing (chosen on these tests)?"),
     ]
     return [
-        Comparison(
+        TeamComparison(
             team,
             other,
             question,

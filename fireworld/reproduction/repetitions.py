@@ -1,4 +1,4 @@
-"""Repetitions of the paper's training, with the control that shares its first stage, for `fireworld reproduce`."""
+"""Repetitions of the paper's training, with the control that shares its first stage: all that is trained here."""
 
 from __future__ import annotations
 
@@ -10,29 +10,26 @@ from threading import Event
 import numpy as np
 
 from fireworld.draws import TABLE, below
+from fireworld.interrupt import Interrupted
 from fireworld.kernels.arrays import Array
 from fireworld.policy.team import Team
 from fireworld.policy.words import N_FLAG_VALUES, N_STATES
 from fireworld.records import ACTIONS
-from fireworld.reproduction.study import ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS, Lesson
+from fireworld.reproduction.study import ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS, LearningCurve
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import Curriculum
 from fireworld.training.method import Method
-from fireworld.training.trainer import (
-    EpisodeReport,
-    Progress,
-    Trainer,
-)
+from fireworld.training.trainer import EpisodeReport, Progress, Trainer
 
 
 @dataclass(frozen=True)
 class Repetition:
-    """The teams of one repetition, by name, and how they came to be."""
+    """The teams of one repetition, by name, and how they learned."""
 
     teams: Mapping[str, Team]
     graduates: Mapping[str, Team]
     """The cooperative team as it was at the end of each of the scenarios together, by scenario; may be left out."""
-    lessons: tuple[Lesson, ...]
+    curves: tuple[LearningCurve, ...]
 
     @property
     def agreement(self) -> float:
@@ -43,13 +40,9 @@ class Repetition:
         return int((choice == choice[0]).all(axis=0).sum()) / max(1, int(met.sum()))
 
 
-class InterruptedTraining(Exception):  # noqa: N818 - somebody asked for it
-    """A training was asked to stop."""
-
-
 @dataclass(frozen=True, kw_only=True)
-class Training:
-    """One repetition to come: seed and number are the same, so that a repetition can be had again by itself.
+class RepetitionTraining:
+    """One repetition to be trained; its number is its seed, so that it can be repeated by itself.
 
     The paper's cooperative team and its control (270 states, trained in the team) begin with the same stage alone; it
     is done once. What it leaves is the paper's non-cooperative team.
@@ -69,12 +62,12 @@ class Training:
         """Train.
 
         Raises:
-            InterruptedTraining: `stop` was set.
+            Interrupted: `stop` was set.
         """
         control = self._trainer(without_flags(self.curriculum))
         alone = [*takewhile(lambda stage: not stage.cooperation, self.curriculum.stages)]
         n_alone = sum(len(stage.scenarios) for stage in alone)
-        lessons = self._follow(control, ALONE, until=n_alone)
+        curves = self._follow(control, ALONE, until=n_alone)
         # By now all brigades hold the table of stage alone; the same for every value of the flags starts the others.
         begun = control.progress.tables
         flagged = np.repeat(begun, N_FLAG_VALUES, axis=1)
@@ -82,36 +75,36 @@ class Training:
         team_alone = replace(control.team(), tables=begun[:1].copy(), visits=control.progress.visits[:1].copy())
         together = self._trainer(self.curriculum, progress)
         graduates: dict[str, Team] = {}
-        lessons += self._follow(together, TOGETHER, until=self.curriculum.n_scenarios, graduates=graduates)
-        lessons += self._follow(control, TOGETHER_WITHOUT_FLAGS, until=self.curriculum.n_scenarios)
+        curves += self._follow(together, TOGETHER, until=self.curriculum.n_scenarios, graduates=graduates)
+        curves += self._follow(control, TOGETHER_WITHOUT_FLAGS, until=self.curriculum.n_scenarios)
         teams = {ALONE: team_alone, TOGETHER: together.team(), TOGETHER_WITHOUT_FLAGS: control.team()}
-        return Repetition(teams=teams, graduates=graduates if self.with_graduates else {}, lessons=tuple(lessons))
+        return Repetition(teams=teams, graduates=graduates if self.with_graduates else {}, curves=tuple(curves))
 
     def _trainer(self, curriculum: Curriculum, progress: Progress | None = None) -> Trainer:
         return Trainer(curriculum, self.method, seed=self.number, progress=progress, cities=self.cities)
 
     def _follow(
         self, trainer: Trainer, team: str, *, until: int, graduates: dict[str, Team] | None = None
-    ) -> list[Lesson]:
-        """Train up to a scenario; note the team at the end of each in `graduates`."""
-        lessons = []
+    ) -> list[LearningCurve]:
+        """Train up to a scenario; add the team at the end of each to `graduates`."""
+        curves = []
         while trainer.progress.scenario_number < until:
             number, reports = trainer.progress.scenario_number, []
             for report in trainer:
                 reports.append(report)
                 if self.stop.is_set():
-                    raise InterruptedTraining
+                    raise Interrupted("interrupted")
                 if trainer.progress.scenario_number != number:
                     break
-            lessons.append(_lesson(reports, repetition=self.number, team=team))
+            curves.append(_learning_curve(reports, repetition=self.number, team=team))
             if graduates is not None and trainer.graduate is not None:
                 graduates[reports[-1].scenario] = trainer.graduate
             self.on_scenario()
-        return lessons
+        return curves
 
 
 def n_scenarios(curriculum: Curriculum) -> int:
-    """Count the scenarios of one repetition: those with cooperation come twice."""
+    """Return the number of scenarios of one repetition: those with cooperation come twice."""
     return sum(len(stage.scenarios) * (2 if stage.cooperation else 1) for stage in curriculum.stages)
 
 
@@ -139,9 +132,9 @@ def random_tables(number: int, *, n_brigades: int) -> Array:
     return tables
 
 
-def _lesson(reports: list[EpisodeReport], *, repetition: int, team: str) -> Lesson:
+def _learning_curve(reports: list[EpisodeReport], *, repetition: int, team: str) -> LearningCurve:
     last = reports[-1]
-    return Lesson(
+    return LearningCurve(
         repetition=repetition,
         team=team,
         scenario=last.scenario,

@@ -9,8 +9,17 @@ from typing import Final
 from fireworld.evaluation.statistics import Estimate
 from fireworld.html_page import html_figure, html_mark, html_page, html_table, text_cell
 from fireworld.reproduction import paper
-from fireworld.reproduction.findings import caveat, findings, spread, tally
-from fireworld.reproduction.paper_tables import APART, NEAR, WITHIN, Cell, Pair, Standing, Tables
+from fireworld.reproduction.findings import caveat, findings, tally
+from fireworld.reproduction.paper_tables import (
+    APART,
+    NEAR,
+    WITHIN,
+    PaperCell,
+    PaperPair,
+    PaperTables,
+    TeamShare,
+    cells_of,
+)
 from fireworld.reproduction.study import ALONE, TEAMS, TOGETHER, Study
 
 _MARKS: Final = {
@@ -20,7 +29,7 @@ _MARKS: Final = {
 _CLAIMS: Final = {True: ("as the paper says", "good"), False: ("the other way", "bad"), None: ("open", "open")}
 
 
-def report_page(study: Study, tables: Tables, images: Mapping[str, bytes]) -> str:
+def report_page(study: Study, tables: PaperTables, images: Mapping[str, bytes]) -> str:
     """Write the page.
 
     Args:
@@ -36,7 +45,7 @@ def report_page(study: Study, tables: Tables, images: Mapping[str, bytes]) -> st
         "<h2>Findings</h2>",
         _findings(study, tables),
         "<h2>Table 1: training scenarios with four brigades</h2>",
-        _lessons(tables),
+        _trainings(tables),
         "<h2>Table 2: three tests, four brigades</h2>",
         _pairs(tables.tests),
         "<h2>Table 3: the tests with other numbers of brigades</h2>",
@@ -64,7 +73,7 @@ def _introduction(study: Study) -> str:
     )
 
 
-def _findings(study: Study, tables: Tables) -> str:
+def _findings(study: Study, tables: PaperTables) -> str:
     rows = [
         [
             text_cell(finding.question),
@@ -76,20 +85,22 @@ def _findings(study: Study, tables: Tables) -> str:
     return html_table(["question", "answer", "numbers"], rows, n_text=3)
 
 
-def _lessons(tables: Tables) -> str:
+def _trainings(tables: PaperTables) -> str:
     rows = []
     for place, converged in enumerate(tables.converged):
-        episode, score = tables.lessons[2 * place : 2 * place + 2]
+        episode, score = tables.trainings[2 * place : 2 * place + 2]
         rows.append([
             text_cell(episode.scenario), *_compared(episode, digits=0), f"{100 * converged.mean:.0f} %",
             *_compared(score, digits=2), _maximum(score),
         ])  # fmt: skip
     heads = ["scenario", "convergence episode: paper", "ours", "", "settled", "score: paper", "ours", "", "of"]
-    note = f"{tally(tables.lessons)}. The score is that of the last episode; the episode is 130 where nothing settled."
+    note = (
+        f"{tally(tables.trainings)}. The score is that of the last episode; the episode is 130 where nothing settled."
+    )
     return html_table(heads, rows) + f"<p>{escape(note[0].upper() + note[1:])}</p>"
 
 
-def _pairs(pairs: Sequence[Pair]) -> str:
+def _pairs(pairs: Sequence[PaperPair]) -> str:
     rows = []
     for pair in pairs:
         digits = 2 if pair.without.quantity == "score" else 0
@@ -100,22 +111,21 @@ def _pairs(pairs: Sequence[Pair]) -> str:
             html_mark(claim, mark), _maximum(pair.without),
         ])  # fmt: skip
     heads = [
-        "scenario", "", "without: paper", "ours", "", "with: paper", "ours", "", "with less without", "", "of",
+        "scenario", "", "without: paper", "ours", "", "with: paper", "ours", "", "with - without", "", "of",
     ]  # fmt: skip
-    cells = [cell for pair in pairs for cell in (pair.without, pair.together)]
-    counted = tally(cells)
+    counted = tally(cells_of(pairs))
     return html_table(heads, rows, n_text=2) + f"<p>{escape(counted[0].upper() + counted[1:])}.</p>"
 
 
-def _controls(tables: Tables) -> str:
+def _controls(tables: PaperTables) -> str:
     parts = ["<p>Share of the greatest score.</p>"]
-    for table, standings in ((paper.TABLE_2, tables.standings), (paper.TABLE_3, tables.standings_more_brigades)):
+    for table, shares in ((paper.TABLE_2, tables.shares), (paper.TABLE_3, tables.shares_more_brigades)):
         heads = ["team", "", *(row.scenario for row in table), "mean", "typical run"]
-        parts.append(html_table(heads, [_standing(row) for row in standings], n_text=2))
+        parts.append(html_table(heads, [_share(row) for row in shares], n_text=2))
     return "\n".join([*parts, "<p>A typical run is the mean of the middle half of all runs.</p>"])
 
 
-def _standing(row: Standing) -> list[str]:
+def _share(row: TeamShare) -> list[str]:
     name = f"<b>{row.team}</b>" if row.team in {ALONE, TOGETHER} else row.team
     shares = [_spread(found, digits=2) for found in (*row.by_scenario, row.mean)]
     return [text_cell(name), text_cell(escape(TEAMS[row.team])), *shares, f"{row.mean.interquartile_mean:.2f}"]
@@ -132,9 +142,9 @@ def _maps(images: Mapping[str, bytes], scenario: str) -> str:
 
 def _method() -> str:
     return (
-        "<p>Tabular SARSA with the paper's figures (learning rate 0.7, discount 0.5, exploration 0.9 to the power of "
-        "the episode), 24 scenarios alone and eight together, at most 130 episodes each. The paper's figures count as "
-        "met where they lie within our interval, however wide that is. Intervals come from a bootstrap "
+        "<p>Tabular SARSA with the paper's hyperparameters (learning rate 0.7, discount 0.5, exploration 0.9 to the "
+        "power of the episode), 24 scenarios alone and eight together, at most 130 episodes each. The paper's values "
+        "count as met where they lie within our interval, however wide that is. Intervals come from a bootstrap "
         "that draws repetitions and seeds anew, "
         "apart from each other; differences are taken run by run on the same repetition and seed. The size of the "
         "fires at the start is not in the paper: it was set once with rules that learn nothing, so scores are not to "
@@ -142,17 +152,17 @@ def _method() -> str:
     )
 
 
-def _compared(cell: Cell, *, digits: int) -> list[str]:
-    """Three cells: the paper's figure, ours, the verdict."""
+def _compared(cell: PaperCell, *, digits: int) -> list[str]:
+    """Three cells: the paper's value, ours, the verdict."""
     return [f"{cell.paper:g}", _spread(cell.ours, digits=digits), html_mark(cell.verdict, _MARKS[cell.verdict])]
 
 
 def _spread(found: Estimate, *, digits: int, sign: bool = False) -> str:
-    value, _, interval = spread(found, digits=digits, sign=sign).partition(" ")
+    value, _, interval = found.text(digits=digits, sign=sign).partition(" ")
     return f'{value} <span class="interval">{interval}</span>'
 
 
-def _maximum(cell: Cell) -> str:
+def _maximum(cell: PaperCell) -> str:
     return "" if cell.ours_max is None else f"{cell.ours_max:.0f}"
 
 

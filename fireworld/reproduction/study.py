@@ -17,7 +17,7 @@ TOGETHER_WITHOUT_FLAGS: Final = "270-states-in-team"
 RANDOM_TABLES: Final = "random-tables"
 NO_WATER: Final = "no-water"
 FIXED: Final = ("easiest", "nearest-to-civilian", "nearest-to-center", "nearest-to-me", "each-another", "chief")
-"""Policies that are rules, not learned and not drawn."""
+"""Policies that are rules, neither learned nor random."""
 
 TEAMS: Final[Mapping[str, str]] = {
     TOGETHER: "the paper's cooperative team: 4320 states, trained alone, then together",
@@ -34,12 +34,12 @@ TEAMS: Final[Mapping[str, str]] = {
 
 
 @dataclass(frozen=True)
-class Lesson:
-    """What one team went through in one scenario of its training."""
+class LearningCurve:
+    """How one team learned in one scenario of its training."""
 
     repetition: int
     team: str
-    """TOGETHER or TOGETHER_WITHOUT_FLAGS; both begin with the same stage alone, told once, as ALONE."""
+    """TOGETHER or TOGETHER_WITHOUT_FLAGS; both begin with the same stage alone, listed once, as ALONE."""
     scenario: str
     scenario_number: int
     """Counted through the curriculum, from 0."""
@@ -63,7 +63,7 @@ class Study:
     Attributes:
         n_repetitions: trainings.
         seeds: of the test runs.
-        lessons: of all repetitions.
+        curves: of all repetitions.
         outcomes: by scenario and team: one Outcomes a repetition, one in all for what does not differ between them.
         agreement: (repetitions,) share of the states in which all brigades of the cooperative team, at the end of their
             training, prefer the same action, among states that one of them has met.
@@ -71,7 +71,7 @@ class Study:
 
     n_repetitions: int
     seeds: Sequence[int]
-    lessons: Sequence[Lesson]
+    curves: Sequence[LearningCurve]
     outcomes: Mapping[str, Mapping[str, Sequence[Outcomes]]]
     agreement: Sequence[float]
 
@@ -93,6 +93,6 @@ class Study:
             total = total + self.values(scenario, team, "score_share")
         return total / len(scenarios)
 
-    def lessons_of(self, team: str, scenario: str) -> list[Lesson]:
-        """Return what the repetitions of a team went through in one scenario."""
-        return [lesson for lesson in self.lessons if (lesson.team, lesson.scenario) == (team, scenario)]
+    def curves_of(self, team: str, scenario: str) -> list[LearningCurve]:
+        """Return how the repetitions of a team learned in one scenario."""
+        return [curve for curve in self.curves if (curve.team, curve.scenario) == (team, scenario)]

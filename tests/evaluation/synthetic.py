@@ -1,4 +1,4 @@
-"""A study made up: every figure is known."""
+"""A study made up: every value is known."""
 
 from __future__ import annotations
 
@@ -6,24 +6,18 @@ import numpy as np
 
 from fireworld.evaluation.runs import Outcomes
 from fireworld.reproduction import paper
-from fireworld.reproduction.study import ALONE, TEAMS, TOGETHER, TOGETHER_WITHOUT_FLAGS, Lesson, Study
+from fireworld.reproduction.study import ALONE, TEAMS, TOGETHER, TOGETHER_WITHOUT_FLAGS, LearningCurve, Study
 
 LEARNED = (ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS, "random-tables")
 
 
-def outcomes(seeds, *, score, score_max, burnt_out=100, steps=200):
+def outcomes(seeds, *, score, score_max, burnt_out=100, steps=200, completed=True):
+    """Every quantity is one value for all seeds, or a list of values."""
     n = len(seeds)
-    return Outcomes(
-        seed=np.array(seeds),
-        score=np.full(n, float(score)),
-        score_max=np.full(n, float(score_max)),
-        burnt_out=np.full(n, burnt_out),
-        steps=np.full(n, steps),
-        completed=np.ones(n, dtype=bool),
-        civilians_alive=np.zeros(n, dtype=np.int64),
-        total_reward=np.full(n, -1.0),
-        water_litres=np.zeros(n),
-    )
+    kinds = (float, float, int, int, bool, int, float, float)
+    values = (score, score_max, burnt_out, steps, completed, 0, -1.0, 0.0)
+    columns = [np.broadcast_to(value, n).astype(kind).tolist() for value, kind in zip(values, kinds, strict=True)]
+    return Outcomes(np.array(seeds), [*zip(*columns, strict=True)])
 
 
 def study(*, together=0.75, alone=0.5, n_repetitions=2, n_seeds=3):
@@ -45,8 +39,8 @@ def study(*, together=0.75, alone=0.5, n_repetitions=2, n_seeds=3):
             ]
             for team in TEAMS
         }
-    lessons = [
-        Lesson(
+    curves = [
+        LearningCurve(
             repetition=repetition,
             team=team,
             scenario=row.scenario,
@@ -64,7 +58,7 @@ def study(*, together=0.75, alone=0.5, n_repetitions=2, n_seeds=3):
     return Study(
         n_repetitions=n_repetitions,
         seeds=seeds,
-        lessons=lessons,
+        curves=curves,
         outcomes=found,
         agreement=[0.25] * n_repetitions,
     )

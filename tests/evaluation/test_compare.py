@@ -11,7 +11,7 @@ from xml.etree.ElementTree import parse
 
 import pytest
 
-from fireworld.evaluation import contest
+from fireworld.evaluation import comparison_runs
 from fireworld.evaluation.results import read_results
 from fireworld.policy.names import load_policy
 from fireworld.policy.team import Team, save_team
@@ -140,7 +140,11 @@ def test_a_plot_is_drawn_and_not_drawn_over(fireworld, here):  # noqa: F811
     first = (here / "out.png").read_bytes()
     assert first.startswith(b"\x89PNG")
     again = fireworld(*words)
-    assert (again.code, again.out, again.err) == (2, "", "fireworld: out.png: exists already; try --force\n")
+    assert (again.code, again.out, again.err) == (
+        2,
+        "",
+        "fireworld: out.png: expected a name that is free, got an existing file; use --force to replace it\n",
+    )
     assert fireworld(*words, "--force").code == 0
     assert (here / "out.png").read_bytes() == first
 
@@ -157,7 +161,7 @@ def test_known_runs_are_not_run_again(fireworld, here, monkeypatch):  # noqa: F8
     def no_run(*_, **__):
         raise AssertionError
 
-    monkeypatch.setattr(contest, "run_compiled", no_run)
+    monkeypatch.setattr(comparison_runs, "run_compiled", no_run)
     known = fireworld(*words, "--seeds", 5, "--json")
     assert (known.code, known.err) == (0, "10 of 10 runs are known from runs.parquet\n")
     assert json.loads(known.out) == json.loads(more.out)
@@ -176,7 +180,7 @@ def test_another_policy_scenario_seed_or_simulator_is_another_run(fireworld, her
     policies = here / "policies.py"
     policies.write_text(policies.read_text() + "\n")
     assert n_rows("policies:Near", "easiest", *QUICK) == 7, "its file has changed"
-    monkeypatch.setattr(contest, "simulator_version", lambda: "another")
+    monkeypatch.setattr(comparison_runs, "simulator_version", lambda: "another")
     assert n_rows("policies:Near", "easiest", *QUICK) == 9
 
 
@@ -204,16 +208,16 @@ def test_ctrl_c_keeps_what_is_done(fireworld, here, monkeypatch):  # noqa: F811
             signal.raise_signal(signal.SIGINT)
         return run(built, policy, seed=seed)
 
-    run = contest.run_compiled
+    run = comparison_runs.run_compiled
     monkeypatch.setattr(signal, "getsignal", lambda _: signal.default_int_handler)
-    monkeypatch.setattr(contest, "run_compiled", interrupted_run)
+    monkeypatch.setattr(comparison_runs, "run_compiled", interrupted_run)
     words = ("compare", *BAD_FIRST, *QUICK, "--seeds", 50, "--jobs", 1, "--results", "runs.parquet")
     done = fireworld(*words)
     assert (done.code, done.out) == (130, "")
     n_kept = len(read_results(here / "runs.parquet"))
     assert 0 < n_kept < 100
     assert done.err == f"interrupted; {n_kept} of 100 runs were done: they are kept in runs.parquet\n"
-    monkeypatch.setattr(contest, "run_compiled", run)
+    monkeypatch.setattr(comparison_runs, "run_compiled", run)
     again = fireworld(*words)
     assert (again.code, again.err) == (0, f"{n_kept} of 100 runs are known from runs.parquet\n")
 
@@ -234,15 +238,15 @@ def test_a_failing_policy_says_where_and_loses_no_run(fireworld, here):  # noqa:
         (("chief", "boss"), "--policy: expected one of"),
         (("chief", "random", "--scenarios", "quick,nowhere"), "nowhere"),
         (("chief", "random", "--scenarios", ""), "expected"),
-        (("chief", "random", "--scenarios", "quick,quick"), "--scenarios: expected each scenario once"),
+        (("chief", "random", "--scenarios", "quick,quick"), "scenarios: expected each scenario once"),
         (("chief", "random", "--scenarios", "quick", "--set", "bogus=1"), "bogus"),
         (("chief", "random", "--seeds", "0"), "Invalid value for '--seeds'"),
-        (("chief", "random", "--first-seed", "4294967295", "--seeds", "2"), "seeds end at 4294967295"),
+        (("chief", "random", "--first-seed", "4294967295", "--seeds", "2"), "expected 2 seeds up to 4294967295"),
         (("chief", "random", "--margin", "0.1"), "--margin and --gate-metric go with --gate or --junit"),
         (("chief", "random", "--gate", "--margin", "-1"), "Invalid value for '--margin'"),
-        (("chief", "random", "--gate", "--margin", "nan"), "--margin: expected a finite number"),
+        (("chief", "random", "--gate", "--margin", "nan"), "margin: expected a number from 0 on"),
         (("chief", "random", "--force"), "--force goes with --junit or --plot"),
-        (("chief", "random", "--junit", "no/such/place.xml"), "no such folder"),
+        (("chief", "random", "--junit", "no/such/place.xml"), "expected an existing folder no/such"),
         (("chief", "random", "--plot", "."), "."),
         (("chief", "random", "--results", "no/such/place.parquet"), "no folder no/such"),
         (("chief", "random", "--results", "policies.py"), "policies.py: expected a results file"),

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import json
+import shutil
 import signal
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
 from threading import Event
 
 import msgspec
@@ -11,13 +15,13 @@ import numpy as np
 import pytest
 from fireworld_recorder.reader import open_log
 
-from fireworld.cli import reproduce
-from fireworld.errors import OutputError
-from fireworld.executors import Workers
+from fireworld.errors import FireworldError, OutputError, TrainingError
 from fireworld.policy.team import load_team
-from fireworld.reproduction import kept, paper
-from fireworld.reproduction.repetitions import Training, random_tables, without_flags
-from fireworld.reproduction.sheets import SHEETS
+from fireworld.reproduction import folder as reproduction_folder
+from fireworld.reproduction import paper
+from fireworld.reproduction.csv_files import CSV_FILES
+from fireworld.reproduction.repetitions import RepetitionTraining, random_tables, without_flags
+from fireworld.reproduction.reproduce import reproduce
 from fireworld.reproduction.study import ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import CityCache
@@ -48,22 +52,29 @@ def curriculum(tmp_path):
     return path
 
 
+TEST = paper.PaperTest("quick", 2, (90, 60), (5, 1), (3.0, 4.0), 5)
+SMALL_PAPER = {"TABLE_1": (paper.PaperTraining("quick", 50, 4.5, 5),), "TABLE_2": (TEST,), "TABLE_3": (TEST,)}
+
+
+def make_paper_small():
+    """Make a paper whose every scenario is a small town."""
+    vars(paper).update(SMALL_PAPER)
+
+
 @pytest.fixture
 def small(tmp_path, monkeypatch, curriculum):
     """A paper whose every scenario is a small town."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(reproduce, "CURRICULUM", curriculum)
-    monkeypatch.setattr("fireworld.training.method.PAPER", METHOD)
-    monkeypatch.setattr("fireworld.reproduction.paper.TABLE_1", (paper.Lesson("quick", 50, 4.5, 5),))
-    test = paper.Test("quick", 2, (90, 60), (5, 1), (3.0, 4.0), 5)
-    monkeypatch.setattr("fireworld.reproduction.paper.TABLE_2", (test,))
-    monkeypatch.setattr("fireworld.reproduction.paper.TABLE_3", (test,))
+    monkeypatch.setattr("fireworld.reproduction.reproduce.CURRICULUM", curriculum)
+    monkeypatch.setattr("fireworld.reproduction.reproduce.PAPER", METHOD)
+    for name, rows in SMALL_PAPER.items():
+        monkeypatch.setattr(paper, name, rows)
     return tmp_path
 
 
 def train(curriculum, number=1, **more):
     stop, seen = Event(), []
-    training = Training(
+    training = RepetitionTraining(
         curriculum=curriculum,
         method=METHOD,
         number=number,
@@ -89,7 +100,7 @@ def test_a_repetition_equals_trainings_from_end_to_end(curriculum):
         reports = [*trainer]
         assert found.teams[name].digest == trainer.team().digest, name
         assert (found.teams[name].visits == trainer.team().visits).all()
-        rewards = [reward for lesson in found.lessons if lesson.team == name for reward in lesson.total_reward]
+        rewards = [reward for curve in found.curves if curve.team == name for reward in curve.total_reward]
         assert rewards == [report.total_reward for report in reports][-len(rewards) :]
     assert found.teams[TOGETHER].digest != train(chosen, number=2)[0].teams[TOGETHER].digest
     assert 0.0 <= found.agreement <= 1.0
@@ -134,7 +145,7 @@ def test_everything_is_written_and_twice_the_same(small, fireworld):  # noqa: F8
     assert "a claim about" in done.out
     folder = small / "found"
     first = {path.name: path.read_bytes() for path in folder.glob("*.csv")}
-    assert sorted(first) == sorted(SHEETS)
+    assert sorted(first) == sorted(CSV_FILES)
     assert sorted(path.name for path in (folder / "teams").iterdir()) == sorted([
         *(f"{name}-{number}.npz" for name in (ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS) for number in (1, 2)),
         f"{TOGETHER}-1-after-quick.npz",
@@ -154,7 +165,7 @@ def test_everything_is_written_and_twice_the_same(small, fireworld):  # noqa: F8
     (folder / "own.csv").write_text("mine")
     assert fireworld(*FEW, "--force", "--jobs", 1).code == 0
     assert (folder / "own.csv").read_text() == "mine"
-    assert first == {name: (folder / name).read_bytes() for name in SHEETS}
+    assert first == {name: (folder / name).read_bytes() for name in CSV_FILES}
 
 
 class Killed(BaseException):
@@ -164,7 +175,74 @@ class Killed(BaseException):
 @pytest.fixture
 def undrawn(monkeypatch):
     """No images, which take most of the time."""
-    monkeypatch.setattr("fireworld.reproduction.pictures.draw_all", lambda *_: iter(()))
+    monkeypatch.setattr("fireworld.reproduction.reproduce.pictures", lambda *_: {})
+
+
+def test_from_python_with_an_executor_it_is_the_same(small, undrawn, curriculum):
+    """The tables of threads and processes are equal; what is done shows itself."""
+    told, found = [], {}
+    there = ProcessPoolExecutor(2, get_context("spawn"), initializer=make_paper_small)
+    with there, ThreadPoolExecutor(2) as here:
+        for name, executor in (("threads", 1), ("here", here), ("there", there)):
+            words = {"repetitions": 2, "seeds": 2, "executor": executor}
+            found[name] = reproduce(name, on_progress=lambda *words: told.append(words), **words)
+            assert [max(n for what, n, _ in told if what == each) for each in ("training", "testing")] == [12, 16]
+            assert {(what, n) for what, _, n in told} == {
+                ("training", 12),
+                ("testing", 16),
+                ("recording", 5),
+                ("drawing", 0),
+            }
+            told.clear()
+    folders = [
+        {path: data for path, data in contents(small / name).items() if path.suffix in {".csv", ".json", ".npz"}}
+        for name in found
+    ]
+    assert all([*each.values()] == [*folders[0].values()] for each in folders)
+    one = found["there"]
+    assert one.folder == Path("there")
+    assert repr(one).startswith("paper: ours [95 % interval]\nscenario  quantity")
+    assert [finding.question in repr(one) for finding in one.findings] == [True] * len(one.findings)
+    assert one.caveat in repr(one)
+    assert one._repr_html_().startswith('<iframe srcdoc="&lt;!doctype html&gt;')
+    assert len(one.study.curves) == 12
+
+
+def test_a_folder_of_an_earlier_version_is_resumed(small, undrawn, monkeypatch):
+    monkeypatch.setattr("fireworld.reproduction.measurement.__version__", "0.1.0")
+    earlier = Path(__file__).parent / "data" / "reproduction-1"
+    for name in ("kept", "teams"):
+        shutil.copytree(earlier / name, small / "found" / name)
+    trained, call = [], RepetitionTraining.__call__
+    monkeypatch.setattr(RepetitionTraining, "__call__", lambda self: trained.append(self.number) or call(self))
+    reproduce("found", repetitions=2, seeds=2, resume=True)
+    assert trained == [2]
+    for path in (earlier / "expected").iterdir():
+        assert (small / "found" / path.name).read_bytes() == path.read_bytes(), path.name
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ({"repetitions": 0}, "repetitions: expected a whole number from 1 to 1000, got 0"),
+        ({"seeds": "many"}, "seeds: expected a whole number"),
+        ({"curriculum": "nowhere"}, "nowhere"),
+        ({"executor": "fibres"}, "executor: expected"),
+        ({"resume": True}, "resume: expected a reproduction to continue"),
+    ],
+)
+def test_wrong_arguments_take_one_line_and_leave_nothing(small, words, message):
+    with pytest.raises(FireworldError, match=message) as caught:
+        reproduce("found", **words)
+    assert "\n" not in str(caught.value)
+    assert not (small / "found").exists()
+
+
+def test_a_curriculum_without_table_1_takes_one_line(small, curriculum, monkeypatch):
+    monkeypatch.setattr("fireworld.reproduction.paper.TABLE_1", (paper.PaperTraining("train-1", 50, 4.5, 5),))
+    with pytest.raises(TrainingError, match="expected all scenarios of the paper's Table 1"):
+        reproduce("found", curriculum=curriculum)
+    assert not (small / "found").exists()
 
 
 WHOLE = {}
@@ -191,15 +269,15 @@ def assert_whole(folder, whole):
 
 def at_write(monkeypatch, name, act):
     """Do something once, before a piece of work is kept under a name."""
-    write = kept.write_file
+    write = reproduction_folder.write_file
 
     def write_file(path, data):
         if path.name == name:
-            monkeypatch.setattr(kept, "write_file", write)
+            monkeypatch.setattr(reproduction_folder, "write_file", write)
             act()
         write(path, data)
 
-    monkeypatch.setattr(kept, "write_file", write_file)
+    monkeypatch.setattr(reproduction_folder, "write_file", write_file)
 
 
 def kept_files(small):
@@ -210,14 +288,14 @@ def test_ctrl_c_and_resume(small, fireworld, whole, monkeypatch):  # noqa: F811
     at_write(monkeypatch, "tests-1.json", lambda: signal.raise_signal(signal.SIGINT))
     done = fireworld(*FEW, "--jobs", 1)
     assert done.code == 130
-    assert done.err == "interrupted; 1 of 2 trainings are kept in found: go on with --resume\n"
+    assert done.err == "interrupted; 1 of 2 trainings are kept in found: continue with --resume\n"
     assert kept_files(small) == ["settings.json", "tests-1.json", "training-1.json"]
     assert not [*(small / "found").glob("*.csv"), *(small / "found").glob("report.html")]
     refused = fireworld(*FEW)
     assert (refused.code, refused.err.count("\n")) == (2, 1)
-    assert "--resume goes on with it, --force replaces what is there" in refused.err
-    trained, call = [], Training.__call__
-    monkeypatch.setattr(Training, "__call__", lambda self: trained.append(self.number) or call(self))
+    assert "--resume continues it, --force replaces what is there" in refused.err
+    trained, call = [], RepetitionTraining.__call__
+    monkeypatch.setattr(RepetitionTraining, "__call__", lambda self: trained.append(self.number) or call(self))
     resumed = fireworld(*FEW, "--resume")
     assert resumed.code == 0, resumed.err
     assert trained == [2], "the first is not trained again"
@@ -272,10 +350,10 @@ def test_other_settings_are_refused(begun, fireworld, monkeypatch):  # noqa: F81
     hint = "; name what it was begun with, or begin again with --force\n"
     assert refusal(fireworld, begun, "--repetitions", 3) == f"{settings}repetitions: expected 3, got 2{hint}"
     assert refusal(fireworld, begun, "--seeds", 1) == f"{settings}seeds: expected [1000], got [1000, 1001]{hint}"
-    monkeypatch.setattr("fireworld.training.method.PAPER", METHOD.with_settings({"gamma": "0.9"}))
+    monkeypatch.setattr("fireworld.reproduction.reproduce.PAPER", METHOD.with_settings({"gamma": "0.9"}))
     assert refusal(fireworld, begun) == f"{settings}method.gamma: expected 0.9, got 0.5{hint}"
-    monkeypatch.setattr("fireworld.training.method.PAPER", METHOD)
-    monkeypatch.setattr("fireworld.reproduction.pieces.__version__", "9")
+    monkeypatch.setattr("fireworld.reproduction.reproduce.PAPER", METHOD)
+    monkeypatch.setattr("fireworld.reproduction.measurement.__version__", "9")
     assert refusal(fireworld, begun) == f"{settings}fireworld: expected 9, got '0.1.0'{hint}"
 
 
@@ -313,8 +391,7 @@ def test_nothing_to_resume(small, fireworld):  # noqa: F811
     done = fireworld(*FEW, "--resume")
     assert (done.code, done.out) == (2, "")
     assert done.err == (
-        "fireworld: --resume: expected a reproduction to go on with, got no found/kept/settings.json; "
-        "leave out --resume\n"
+        "fireworld: resume: expected a reproduction to continue, got no found/kept/settings.json; leave out --resume\n"
     )
     assert not (small / "found").exists()
     assert fireworld(*FEW, "--resume", "--force").code == 2
@@ -341,21 +418,3 @@ def test_without_matplotlib_nothing_is_begun(small, fireworld, monkeypatch):  # 
     assert (done.code, done.err.count("\n")) == (2, 1)
     assert "fireworld[figures]" in done.err
     assert not (small / "found").exists()
-
-
-def test_a_failing_task_stops_the_others():
-    workers = Workers(2, Event())
-
-    def fail():
-        raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        workers.run([fail, *[workers.stop.wait] * 3])
-    assert workers.stop.is_set()
-
-
-def test_results_come_in_order_and_none_after_a_stop():
-    workers = Workers(3, Event())
-    assert workers.run([lambda k=k: k * k for k in range(20)]) == [k * k for k in range(20)]
-    workers.stop.set()
-    assert workers.run([lambda: 1]) is None

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fireworld.evaluation.runs import QUANTITIES, evaluate
+from fireworld.evaluation.runs import evaluate
+from fireworld.executors import threads
+from fireworld.outcome import COLUMNS
 from fireworld.policy.names import BUILT_IN, load_policy
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import build_scenario
@@ -26,18 +28,18 @@ def test_outcomes_are_those_of_recorded_runs(built):
         assert found.seed[place] == seed
         assert found.score[place] == last.score.score
         assert found.score_max[place] == last.score.score_max == 5
-        assert found.burnt_out[place] == last.score.n_burnt_out
+        assert found.n_burnt_out[place] == last.score.n_burnt_out
         assert found.steps[place] == last.step
         assert found.completed[place] == last.terminated
-        assert found.civilians_alive[place] == last.score.n_civilians_alive
+        assert found.n_civilians_alive[place] == last.score.n_civilians_alive
         assert found.total_reward[place] == last.rewards.sum_so_far
-        assert found.water_litres[place] == last.score.water_used_litres
+        assert found.water_used_litres[place] == last.score.water_used_litres
     assert found.score_share.tolist() == [score / 5 for score in found.score.tolist()]
 
 
 def test_threads_change_nothing(built):
     one = evaluate(built, BUILT_IN["random"](), range(8))
-    many = evaluate(built, BUILT_IN["random"](), range(8), n_threads=3)
+    many = evaluate(built, BUILT_IN["random"](), range(8), workers=threads(3))
     assert len(set(one.total_reward.tolist())) > 4
-    for quantity in ("seed", *QUANTITIES):
+    for quantity in ("seed", *COLUMNS.values()):
         np.testing.assert_array_equal(getattr(one, quantity), getattr(many, quantity))

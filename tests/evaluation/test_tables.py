@@ -1,4 +1,4 @@
-"""Verdicts, findings, sheets and the page, on a study whose every figure is known."""
+"""Verdicts, findings, CSV files and the page, on a study whose every value is known."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import pytest
 from fireworld.evaluation.statistics import Estimate
 from fireworld.reproduction import paper
 from fireworld.reproduction.convergence_figures import draw_policy_changes, draw_returns
+from fireworld.reproduction.csv_files import CSV_FILES, csv_files
 from fireworld.reproduction.findings import caveat, findings, tally
-from fireworld.reproduction.paper_tables import APART, NEAR, WITHIN, Cell, make_tables
+from fireworld.reproduction.paper_tables import APART, NEAR, WITHIN, PaperCell, make_tables
 from fireworld.reproduction.report_page import report_page
-from fireworld.reproduction.sheets import SHEETS, sheets
 from fireworld.reproduction.study import ALONE, TOGETHER
 from tests.evaluation import synthetic
 
@@ -32,10 +32,10 @@ from tests.evaluation import synthetic
 )
 def test_the_verdict_of_a_cell(mean, low, high, verdict):
     ours = Estimate(mean, low, high, mean, 2, 3)
-    assert Cell(2, "test-1", "score", ALONE, 100.0, ours).verdict == verdict
+    assert PaperCell(2, "test-1", "score", ALONE, 100.0, ours).verdict == verdict
 
 
-def test_cells_hold_the_papers_figures_beside_ours():
+def test_cells_hold_the_papers_values_beside_ours():
     tables = make_tables(synthetic.study())
     assert len(tables.cells) == 16 + 18 + 18
     cell = tables.tests[0].together
@@ -43,7 +43,7 @@ def test_cells_hold_the_papers_figures_beside_ours():
     assert (cell.paper, cell.ours.mean) == (290, 436.0)
     assert [pair.without.verdict for pair in tables.tests[:2]] == [WITHIN, WITHIN]
     assert [share.mean for share in tables.converged] == [1.0] * 8
-    assert tables.lessons[0].ours.mean == 31.5
+    assert tables.trainings[0].ours.mean == 31.5
 
 
 def test_what_cooperation_changes():
@@ -76,7 +76,7 @@ def test_findings_follow_the_numbers(together, verdict, against_random):
 
 def test_every_cell_is_counted_once():
     cells = make_tables(synthetic.study()).cells
-    numbers = re.search(r"paper's (\d+) figures (\d+) lie .* to (\d+) more .* to (\d+) it is not", tally(cells))
+    numbers = re.search(r"paper's (\d+) values (\d+) lie .* to (\d+) more .* to (\d+) it is not", tally(cells))
     total, *parts = map(int, numbers.groups())
     assert total == len(cells) == sum(parts)
 
@@ -86,11 +86,11 @@ def test_small_studies_carry_a_caveat():
     assert caveat(synthetic.study(n_repetitions=20, n_seeds=20)) is None
 
 
-def test_sheets_are_the_same_every_time_and_complete():
+def test_csv_files_are_the_same_every_time_and_complete():
     study = synthetic.study()
-    texts = sheets(study, make_tables(study))
-    assert texts == sheets(synthetic.study(), make_tables(synthetic.study()))
-    assert tuple(texts) == SHEETS
+    texts = csv_files(study, make_tables(study))
+    assert texts == csv_files(synthetic.study(), make_tables(synthetic.study()))
+    assert tuple(texts) == CSV_FILES
     rows = {name: [*csv.DictReader(io.StringIO(text))] for name, text in texts.items()}
     assert all(None not in row and None not in row.values() for found in rows.values() for row in found)
     assert [len(rows[f"table-{number}.csv"]) for number in (1, 2, 3)] == [16, 18, 18]

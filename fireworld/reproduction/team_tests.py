@@ -1,4 +1,4 @@
-"""Trials: every team and control on every test of the paper, for `fireworld reproduce`."""
+"""Every team and control on every test of the paper."""
 
 from __future__ import annotations
 
@@ -16,52 +16,58 @@ from fireworld.scenario import load_scenario
 from fireworld.simulation.built import BuiltScenario, CityCache
 
 RULES: Final = ("random", *FIXED, NO_WATER)
-"""What does not differ between repetitions."""
+"""Teams that do not differ between repetitions."""
+LEARNED: Final = tuple(team for team in TEAMS if team not in RULES)
+"""Teams that do."""
 Tested = dict[str, dict[str, Outcomes]]
 """Outcomes by scenario and team."""
 
 
 @dataclass(frozen=True)
-class Tests:
+class TeamTests:
     """The tests of Tables 2 and 3, built, and the seeds of their runs."""
 
-    stages: Mapping[str, BuiltScenario]
+    built: Mapping[str, BuiltScenario]
     dry: Mapping[str, BuiltScenario]
     """The same without water."""
     seeds: Sequence[int]
 
-    def run(self, policies: Mapping[str, KernelPolicy], on_trial: Callable[[], object]) -> Tested:
-        """Let every policy run every test under all seeds.
+    def run(self, policies: Mapping[str, KernelPolicy], on_test: Callable[[], object]) -> Tested:
+        """Run every policy in every test under all seeds.
 
         Args:
             policies: by team.
-            on_trial: called after every test of a policy; an exception of it ends the work.
+            on_test: called after every test of a policy; an exception of it ends the work.
         """
         tested: Tested = {}
-        for name in self.stages:
+        for name in self.built:
             for team, policy in policies.items():
-                built = (self.dry if team == NO_WATER else self.stages)[name]
+                built = (self.dry if team == NO_WATER else self.built)[name]
                 tested.setdefault(name, {})[team] = evaluate(built, policy, self.seeds)
-                on_trial()
+                on_test()
         return tested
 
     def policies_of(self, repetition: Repetition, number: int) -> dict[str, KernelPolicy]:
         """Return what differs between repetitions: the trained teams, and tables drawn at random."""
-        n_brigades = max(len(built.placement.brigade_refuge) for built in self.stages.values())
+        n_brigades = max(built.n_brigades for built in self.built.values())
         trained = {name: team.policy() for name, team in repetition.teams.items()}
         return {**trained, RANDOM_TABLES: from_tables(random_tables(number, n_brigades=n_brigades))}
 
 
-def build_tests(seeds: Sequence[int], cities: CityCache) -> Tests:
+def build_tests(seeds: Sequence[int], cities: CityCache) -> TeamTests:
     """Build the tests.
 
     Args:
-        seeds: of the runs' luck.
+        seeds: of the runs.
         cities: cities built before; added to.
     """
-    names = [row.scenario for row in (*paper.TABLE_2, *paper.TABLE_3)]
-    stages = {name: cities.build(load_scenario(name)) for name in names}
-    return Tests(stages, {name: _without_water(built, cities) for name, built in stages.items()}, seeds)
+    scenarios = {row.scenario: load_scenario(row.scenario) for row in (*paper.TABLE_2, *paper.TABLE_3)}
+    no_water = {"parameters.brigades.power_litres": 0}
+    return TeamTests(
+        built={name: cities.build(scenario) for name, scenario in scenarios.items()},
+        dry={name: cities.build(scenario.with_values(no_water)) for name, scenario in scenarios.items()},
+        seeds=seeds,
+    )
 
 
 def rules() -> dict[str, KernelPolicy]:
@@ -77,9 +83,3 @@ def collect(of_repetitions: Sequence[Tested], of_rules: Tested) -> dict[str, dic
         }
         for name in of_rules
     }
-
-
-def _without_water(built: BuiltScenario, cities: CityCache) -> BuiltScenario:
-    """Return a test in which the brigades' pumps stand still."""
-    scenario = built.scenario.with_settings({"parameters.brigades.power_litres": "0"})
-    return cities.build(scenario)

@@ -5,13 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fireworld.evaluation.paired import (
-    METRICS,
-    N_SEEDS_MIN,
-    compare_outcomes,
-    judge,
-    over_all,
-)
+from fireworld.evaluation.paired import N_SEEDS_MIN, compare_outcomes, judge, over_all
+from fireworld.outcome import METRICS
 from tests.evaluation import synthetic
 
 SEEDS = range(8)
@@ -20,10 +15,9 @@ GROWING = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]
 
 def runs(score, *, score_max=10, burnt_out=100, steps=200, completed=True):
     """Make outcomes of given scores, one a seed."""
-    found = synthetic.outcomes(range(len(score)), score=0, score_max=score_max, burnt_out=burnt_out, steps=steps)
-    found.score[:] = score
-    found.completed[:] = completed
-    return found
+    return synthetic.outcomes(
+        range(len(score)), score=score, score_max=score_max, burnt_out=burnt_out, steps=steps, completed=completed
+    )
 
 
 def score_of(a, b, **more):
@@ -35,7 +29,7 @@ def shifted(shift, n=8):
     return score_of(GROWING[:n], [value + shift for value in GROWING[:n]])
 
 
-def test_luck_that_both_meet_is_taken_out():
+def test_random_draws_that_both_see_are_taken_out():
     found = shifted(1.0)
     assert (found.a.mean, found.b.mean) == pytest.approx((0.35, 0.45))
     assert found.a.interquartile_mean == pytest.approx((2 + 3 + 4 + 5) / 40)
@@ -76,7 +70,7 @@ def test_over_all_every_scenario_counts_the_same():
 
 
 def test_what_the_runs_of_one_seed_share_stays_together():
-    """A scenario that is there twice makes no interval narrower: it is the same luck, not more of it."""
+    """A scenario that is there twice makes no interval narrower: the random draws are the same, not more of them."""
     a, b = runs([0.0] * 8), runs([10.0, 0.0, 0.0, 10.0, 5.0, 10.0, 10.0, 3.0])
     once = over_all(compare_outcomes({"s": a}, {"s": b})).difference
     twice = over_all(compare_outcomes({"s": a, "again": a}, {"s": b, "again": b})).difference
@@ -162,8 +156,8 @@ def test_the_gate_at_its_borders():
 
 def test_a_margin_needs_fewer_seeds():
     unsure = score_of([0.0] * 8, [3.0, -3.4] * 4)
-    assert unsure.seeds_to_tell(margin=0.2) < unsure.seeds_to_tell()
-    assert unsure.advice(margin=0.2) == f"about {unsure.seeds_to_tell(margin=0.2):,} more seeds would tell"
+    assert unsure.seeds_needed(margin=0.2) < unsure.seeds_needed()
+    assert unsure.advice(margin=0.2) == f"about {unsure.seeds_needed(margin=0.2):,} more seeds would tell"
 
 
 def test_the_same_runs_give_the_same_numbers():

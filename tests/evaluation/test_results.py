@@ -10,9 +10,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from fireworld.errors import OutputError
-from fireworld.evaluation import results as archive
-from fireworld.evaluation.results import COLUMNS, Archive, Result, RunKey, open_archive, policy_identity, read_results
-from fireworld.evaluation.runs import QUANTITIES
+from fireworld.evaluation import results as results_file
+from fireworld.evaluation.comparison_runs import policy_identity
+from fireworld.evaluation.results import KEYS, Result, Results, RunKey, open_results, read_results
+from fireworld.outcome import COLUMNS
 from fireworld.policy.kernel import always
 from fireworld.policy.names import NamedPolicy, load_policy
 
@@ -24,29 +25,31 @@ def key(seed, scenario="aa"):
 
 
 def filled(path, seeds):
-    made = Archive(path)
+    path.unlink(missing_ok=True)
+    made = Results(path)
     for seed in seeds:
         made.add(key(seed), Result("quick", "chief", ROW))
-    return made
+    made.save()
+    return path.read_bytes()
 
 
 @pytest.fixture
 def path(tmp_path):
     made = tmp_path / "runs.parquet"
-    made.write_bytes(filled(made, range(200)).to_bytes())
+    filled(made, range(200))
     return made
 
 
 def test_what_is_written_is_read(path):
-    found = open_archive(path)
-    assert len(found.results) == 200
-    assert found.results[key(7)] == Result("quick", "chief", ROW)
+    found = open_results(path)
+    assert len(found.by_run) == 200
+    assert found.by_run[key(7)] == Result("quick", "chief", ROW)
     assert found.n_unsaved == 0
-    assert [type(value) for value in found.results[key(7)].row] == [float, float, int, int, bool, int, float, float]
+    assert [type(value) for value in found.by_run[key(7)].row] == [float, float, int, int, bool, int, float, float]
 
 
 def test_a_row_is_the_quantities_in_their_order(path):
-    assert tuple(COLUMNS)[-len(QUANTITIES) :] == QUANTITIES
+    assert pq.read_schema(path).names == [*KEYS, *COLUMNS]
     assert pq.read_table(path).to_pylist()[7] == {
         "scenario": "quick", "policy": "chief", "scenario_digest": "aa", "policy_digest": "bb", "seed": 7,
         "version": "1.0+cc", "score": 9.5, "score_max": 12.0, "burnt_out": 3, "steps": 77, "completed": True,
@@ -56,16 +59,16 @@ def test_a_row_is_the_quantities_in_their_order(path):
 
 def test_equal_results_give_equal_bytes_whatever_their_order(tmp_path):
     path = tmp_path / "new.parquet"
-    assert filled(path, range(50)).to_bytes() == filled(path, reversed(range(50))).to_bytes()
+    assert filled(path, range(50)) == filled(path, reversed(range(50)))
 
 
 def test_rows_that_came_in_meanwhile_are_kept(path):
-    mine = open_archive(path)
-    theirs = open_archive(path)
+    mine = open_results(path)
+    theirs = open_results(path)
     theirs.add(key(1000), Result("quick", "chief", ROW))
-    path.write_bytes(theirs.to_bytes())
+    theirs.save()
     mine.add(key(2000), Result("quick", "chief", ROW))
-    path.write_bytes(mine.to_bytes())
+    mine.save()
     assert {1000, 2000, 0, 199} <= {known.seed for known in read_results(path)}
 
 
@@ -83,7 +86,7 @@ def test_every_damaged_byte_is_noticed_or_harmless(path):
 def test_a_foreign_file_is_refused_and_left(path, content):
     path.write_bytes(content)
     with pytest.raises(OutputError, match="expected a results file") as caught:
-        open_archive(path)
+        open_results(path)
     assert "\n" not in str(caught.value)
     assert path.read_bytes() == content
 
@@ -91,17 +94,17 @@ def test_a_foreign_file_is_refused_and_left(path, content):
 def test_a_cut_off_file_is_refused(path):
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(OutputError, match="expected a results file"):
-        open_archive(path)
+        open_results(path)
 
 
 def test_another_table_is_refused(path):
     pq.write_table(pa.table({"score": [1.0]}), path)
     with pytest.raises(OutputError, match="other columns"):
-        open_archive(path)
+        open_results(path)
     table = pa.Table.from_pylist(pq.read_table(path).to_pylist())
     pq.write_table(table.replace_schema_metadata({"format": "fireworld-results/2"}), path)
     with pytest.raises(OutputError, match="later fireworld"):
-        open_archive(path)
+        open_results(path)
 
 
 def test_two_outcomes_of_one_run_are_refused(path):
@@ -109,18 +112,18 @@ def test_two_outcomes_of_one_run_are_refused(path):
     rows = [*table.to_pylist(), {**table.to_pylist()[3], "score": 1.0}]
     pq.write_table(pa.Table.from_pylist(rows, schema=table.schema), path)
     with pytest.raises(OutputError, match="two outcomes of quick, chief, seed 3"):
-        open_archive(path)
+        open_results(path)
 
 
 def test_no_folder_no_results(tmp_path):
     with pytest.raises(OutputError, match="no folder"):
-        open_archive(tmp_path / "nowhere" / "runs.parquet")
+        open_results(tmp_path / "nowhere" / "runs.parquet")
     with pytest.raises(OutputError, match="Is a directory"):
-        open_archive(tmp_path)
+        open_results(tmp_path)
 
 
 def test_without_a_file_nothing_is_imported_or_written():
-    assert open_archive(None).results == {}
+    assert open_results(None).by_run == {}
 
 
 class Own:
@@ -140,10 +143,11 @@ def test_what_tells_policies_apart():
 
 
 def test_the_version_follows_all_that_computes_a_run():
-    """What the runs import is digested, but for errors, records and the comparison itself."""
+    """What the runs import is digested, but for what makes no run: errors, executors, names of what is measured."""
     graph = grimp.build_graph("fireworld")
     needed = graph.find_upstream_modules("fireworld.evaluation.runs")
     needed |= graph.find_upstream_modules("fireworld.planning.planner")
     parts = {name.split(".")[1] for name in needed - {"fireworld"}}
-    assert parts - {"errors", "evaluation", "records"} <= {name.removesuffix(".py") for name in archive._SIMULATOR}
-    assert archive.simulator_version().startswith("0.")
+    no_run = {"errors", "evaluation", "executors", "interrupt", "outcome", "records"}
+    assert parts - no_run <= {name.removesuffix(".py") for name in results_file._SIMULATOR}
+    assert results_file.simulator_version().startswith("0.")

@@ -1,17 +1,18 @@
-"""Recordings, maps and graphs of a reproduction, for `fireworld reproduce`."""
+"""Recordings of a reproduction, and the pictures of its report: maps of these recordings, and graphs."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from fireworld_recorder.writer import LogWriter
 from fireworld_viewer.pictures.figure_files import png_bytes
 from fireworld_viewer.pictures.maps import draw_record
 
 from fireworld.policy.names import NamedPolicy
 from fireworld.policy.team import Team
+from fireworld.recording.record import play
 from fireworld.records import CityRecord, StepRecord
 from fireworld.reproduction import paper
 from fireworld.reproduction.convergence_figures import draw_policy_changes, draw_returns
@@ -23,7 +24,7 @@ from fireworld.simulation.run import prepare_run
 
 
 @dataclass(frozen=True)
-class Recorded:
+class RecordedRun:
     """A run that was recorded: what its maps need."""
 
     scenario: str
@@ -34,7 +35,7 @@ class Recorded:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ToRecord:
+class RunToRecord:
     """A run to be recorded."""
 
     scenario: str
@@ -43,7 +44,7 @@ class ToRecord:
     seed: int
     path: Path
 
-    def __call__(self, cities: CityCache) -> Recorded:
+    def __call__(self, cities: CityCache) -> RecordedRun:
         """Run and record.
 
         Raises:
@@ -52,16 +53,12 @@ class ToRecord:
         policy = self.members.policy()
         named = NamedPolicy(name=self.team, digest=policy.digest, policy=policy)
         run = prepare_run(cities.build(load_scenario(self.scenario)), named, seed=self.seed)
-        records: list[StepRecord] = []
-        with LogWriter(self.path, run.header, run.city, force=True) as log:
-            for record in run:
-                log.write(record)
-                records = [*records[:1], record]
-        return Recorded(self.scenario, self.team, run.city, records[0], records[-1])
+        last = play(run, record=self.path, force=True).last
+        return RecordedRun(self.scenario, self.team, run.city, next(iter(run)), last)
 
 
-def runs_to_record(repetition: Repetition, *, seed: int, folder: Path) -> list[ToRecord]:
-    """List one run of each row.
+def runs_to_record(repetition: Repetition, *, seed: int, folder: Path) -> list[RunToRecord]:
+    """Return one run of each row of the paper's tables.
 
     In Table 1 it is the cooperative team as it was at the end of the row's scenario; in Tables 2 and 3 it is both teams
     as they are after all of their training.
@@ -73,28 +70,27 @@ def runs_to_record(repetition: Repetition, *, seed: int, folder: Path) -> list[T
         for team in (ALONE, TOGETHER)
     ]
     return [
-        ToRecord(scenario=name, team=team, members=members, seed=seed, path=folder / f"{name}-{team}.mcap")
+        RunToRecord(scenario=name, team=team, members=members, seed=seed, path=folder / f"{name}-{team}.mcap")
         for name, team, members in rows
     ]
 
 
-def draw_all(study: Study, recorded: list[Recorded]) -> Iterator[tuple[str, bytes]]:
-    """Draw every image of the report: its name and its PNG file.
-
-    Raises:
-        ViewError: matplotlib is not installed.
-    """
-    yield "returns", png_bytes(draw_returns(study))
-    yield "policy-changes", png_bytes(draw_policy_changes(study))
+def pictures(study: Study, recorded: Sequence[RecordedRun]) -> dict[str, Callable[[], bytes]]:
+    """Return what draws each picture of the report, as a PNG file, by its name."""
+    drawn: dict[str, Callable[[], bytes]] = {
+        "returns": lambda: png_bytes(draw_returns(study)),
+        "policy-changes": lambda: png_bytes(draw_policy_changes(study)),
+    }
     tests = {row.scenario for row in (*paper.TABLE_2, *paper.TABLE_3)}
     for run in recorded:
         if run.scenario not in tests:
             continue
         if run.team == ALONE:
-            yield f"{run.scenario}-before", _map(run, run.first, "before")
-        yield f"{run.scenario}-{run.team}", _map(run, run.last, f"{run.team}, step {run.last.step}")
+            drawn[f"{run.scenario}-before"] = partial(_map, run, run.first, "before")
+        drawn[f"{run.scenario}-{run.team}"] = partial(_map, run, run.last, f"{run.team}, step {run.last.step}")
+    return drawn
 
 
-def _map(run: Recorded, record: StepRecord, moment: str) -> bytes:
+def _map(run: RecordedRun, record: StepRecord, moment: str) -> bytes:
     title = f"{run.scenario}: {moment}, score {record.score.score:.2f} of {record.score.score_max:.0f}"
     return png_bytes(draw_record(run.city, record, title=title))

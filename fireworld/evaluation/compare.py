@@ -1,0 +1,176 @@
+"""`compare`: policies on the same scenarios and seeds; known runs come from a results file, the others are made."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from threading import Event
+from typing import Any, Final
+
+from fireworld.arguments import SEED_MAX, ArgumentError, path_of, seed_of, settings_of, whole_number
+from fireworld.errors import PolicyError, ScenarioError, expected
+from fireworld.evaluation.comparison import ComparedPolicy, Comparison, find_metric
+from fireworld.evaluation.comparison_runs import ComparisonRuns, RunnablePolicy, runnable
+from fireworld.evaluation.paired import compare_outcomes
+from fireworld.evaluation.results import open_results, simulator_version
+from fireworld.executors import AnyExecutor, in_processes, workers_for
+from fireworld.interrupt import gentle_interrupt
+from fireworld.policy.names import note_on_team
+from fireworld.scenario import Scenario, load_scenario
+from fireworld.simulation.built import BuiltScenario, CityCache
+
+TESTS: Final = ("test-1", "test-2", "test-3")
+N_SEEDS: Final = 100
+N_SEEDS_MAX: Final = 10_000
+
+
+def compare(
+    policies: Sequence[Any],
+    *,
+    scenarios: Sequence[str | Path | Scenario] | str | Path | Scenario = TESTS,
+    seeds: int | Sequence[int] = N_SEEDS,
+    first_seed: int = 1,
+    set: Mapping[str, Any] | None = None,
+    executor: AnyExecutor = None,
+    results: Path | str | None = None,
+    metric: str = "score",
+    margin: float = 0.0,
+    on_run: Callable[[int, int], object] = lambda *_: None,
+    stop: Event | None = None,
+) -> Comparison:
+    """Compare policies with the first of them, run by run on the same scenarios and seeds.
+
+    Every policy begins every run anew: a class is made again, an object is copied. So the runs are those of
+    `fw.run(scenario, policy=..., seed=...)`, and do not depend on the executor.
+
+    Args:
+        policies: two or more: the reference (A), and those compared with it (each of them B). Names, files, classes,
+            objects, or functions of an observation.
+        scenarios: names, files or Scenario objects.
+        seeds: how many seeds, or which.
+        first_seed: the first, where only their number is given.
+        set: values of scenario keys, as in {"brigades.n": 7}; of all scenarios.
+        executor: who makes the runs. None: all cores, in threads for policies that run in compiled code, in processes
+            for others that processes can find again; a number: as many at a time, likewise; "threads" or "processes":
+            all of them in these; or an executor of concurrent.futures.
+        results: a file (.parquet) to take known runs from, and to add the others to.
+        metric: what the judgement is about: "score", "burnt-out", "time" or "civilians".
+        margin: a loss that does not matter, in the metric's unit.
+        on_run: called with the number of runs that are done or known, and of all: once before the first, and after
+            every run.
+        stop: set it, and no further run begins.
+
+    Raises:
+        ArgumentError: an argument that makes no sense.
+        PolicyError, TrainingError: a policy that cannot be found, made, named in results or sent to processes; or one
+            that fails in a run.
+        ScenarioError, CityError: a scenario that cannot be read or built, or comes twice.
+        OutputError: the results file cannot be read or written.
+        ExecutorError: an executor that is none, or a process that died.
+        Interrupted: Ctrl-C, or `stop` was set; what is done is in the results file.
+    """
+    chosen = find_metric(metric)
+    if not isinstance(margin, int | float) or not (math.isfinite(margin) and margin >= 0):
+        raise ArgumentError(expected("margin", "", "a number from 0 on", margin))
+    workers_for(executor)
+    run_seeds = _seeds(seeds, first_seed)
+    known = open_results(None if results is None else path_of("results", results))
+    found = _policies(policies)
+    for policy in found:
+        _check_policy(policy, results=known.path, processes=in_processes(executor))
+    built = _built(scenarios, settings_of(set))
+    runs = ComparisonRuns(found, built, run_seeds, known)
+    with gentle_interrupt(stop) as interrupted:
+        runs.make(executor, interrupted, on_run)
+    reference, *others = found
+    of_reference = runs.outcomes(reference)
+    compared = [ComparedPolicy(reference.name, reference.identity)]
+    for policy in others:
+        pairings = compare_outcomes(of_reference, runs.outcomes(policy), same_policy=policy.key == reference.key)
+        compared.append(ComparedPolicy(policy.name, policy.identity, tuple(pairings)))
+    return Comparison(
+        policies=tuple(compared),
+        scenarios=tuple((name, each.scenario.digest) for name, each in built.items()),
+        seeds=run_seeds,
+        version=simulator_version(),
+        metric=chosen.name,
+        margin=float(margin),
+        warnings=tuple(_warnings(found, built.values())),
+    )
+
+
+def _seeds(seeds: object, first_seed: object) -> Sequence[int]:
+    """Return the seeds of the runs.
+
+    Raises:
+        ArgumentError: they are none, or some come twice.
+    """
+    if isinstance(seeds, Iterable) and not isinstance(seeds, str | bytes):
+        listed = [seed_of(seed, name="seeds") for seed in seeds]
+        if not listed or len({*listed}) < len(listed):
+            raise ArgumentError(expected("seeds", "", "one seed or more, each of them once", listed))
+        return listed
+    first = seed_of(first_seed, name="first_seed")
+    n = whole_number("seeds", seeds, least=1, most=N_SEEDS_MAX)
+    if first + n - 1 > SEED_MAX:
+        raise ArgumentError(expected("first_seed", "", f"{n} seeds up to {SEED_MAX}", first))
+    return range(first, first + n)
+
+
+def _policies(policies: object) -> list[RunnablePolicy]:
+    """Find the policies.
+
+    Raises:
+        ArgumentError: there are fewer than two.
+        PolicyError, TrainingError: one cannot be found or made.
+    """
+    if not isinstance(policies, Sequence) or isinstance(policies, str) or len(policies) < 2:
+        raise ArgumentError(expected("policies", "", 'two or more, as in ["chief", "best"]', policies))
+    return [runnable(given, place) for place, given in enumerate(policies)]
+
+
+def _check_policy(policy: RunnablePolicy, *, results: Path | None, processes: bool) -> None:
+    """Check that results can name a policy, and processes make it.
+
+    Raises:
+        PolicyError: they cannot.
+    """
+    if results is not None and not policy.identity:
+        wanted = "a policy whose source is in a file, or with an attribute `digest`"
+        raise PolicyError(expected("results", "", wanted, policy.name, "leave out the results file"))
+    if processes and not policy.portable:
+        wanted = "a policy that other processes can import or unpickle"
+        raise PolicyError(expected("executor", "", wanted, policy.name, "leave out the executor"))
+
+
+def _built(scenarios: object, values: Mapping[str, Any]) -> dict[str, BuiltScenario]:
+    """Build the scenarios, by the names they were asked for.
+
+    Raises:
+        ArgumentError: there are none.
+        ScenarioError: one of them cannot be read or built, or comes twice.
+    """
+    listed = [scenarios] if isinstance(scenarios, str | Path | Scenario) else scenarios
+    if not isinstance(listed, Sequence) or not listed:
+        raise ArgumentError(expected("scenarios", "", "one or more names, files or scenarios", scenarios))
+    cities, built, seen = CityCache(), dict[str, BuiltScenario](), dict[str, str]()
+    for place, given in enumerate(listed):
+        scenario = (given if isinstance(given, Scenario) else load_scenario(given)).with_values(values)
+        name = (scenario.name or f"scenario {place}") if isinstance(given, Scenario) else str(given)
+        if scenario.digest in seen or name in built:
+            got = f"{name} a second time" if name in built else f"{name}, which is the same as {seen[scenario.digest]}"
+            raise ScenarioError(expected("scenarios", "", "each scenario once", got))
+        seen[scenario.digest] = name
+        built[name] = cities.build(scenario)
+    return built
+
+
+def _warnings(policies: Iterable[RunnablePolicy], built: Iterable[BuiltScenario]) -> list[str]:
+    """Return how teams are used differently from their training, a line each."""
+    found = (
+        note_on_team(policy.named, each.scenario.brigades.n, choices=each.scenario.choices)
+        for policy in policies
+        for each in built
+    )
+    return list(dict.fromkeys(filter(None, found)))

@@ -1,0 +1,246 @@
+"""The runs of a comparison: which are missing, who makes them, and where they are kept."""
+
+from __future__ import annotations
+
+import copy
+import os
+import pickle
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+from threading import Event
+from typing import Any, Final
+
+from fireworld.errors import PolicyError, expected
+from fireworld.evaluation.results import Result, Results, RunKey, simulator_version
+from fireworld.evaluation.runs import Outcomes, Row, outcomes, row_of, run_compiled, run_step_by_step
+from fireworld.executors import AnyExecutor, Workers, n_cores, processes, threads, workers_for
+from fireworld.interrupt import Interrupted
+from fireworld.policy.asking import describe
+from fireworld.policy.kernel import KernelPolicy
+from fireworld.policy.names import NamedPolicy, load_policy
+from fireworld.scenario import Scenario
+from fireworld.simulation.built import BuiltScenario, build_scenario
+
+SAVE_EVERY_RUNS: Final = 100
+RUNS_WORTH_A_PROCESS: Final = 8
+"""A process takes about as long to start as these."""
+
+
+@dataclass(frozen=True)
+class RunnablePolicy:
+    """A policy of a comparison.
+
+    Attributes:
+        given: what it is made of, anew for every run; of a policy that runs in compiled code, the policy itself.
+        named: the policy, made once.
+        name: as it was asked for: two team files may have one name in two folders.
+        identity: digest of what it does; empty if that is not known.
+        key: the identity; where there is none, its place among the policies.
+    """
+
+    given: Any
+    named: NamedPolicy
+    name: str
+    identity: str
+    key: str
+
+    @property
+    def compiled(self) -> bool:
+        """Whether it runs in compiled code."""
+        return isinstance(self.given, KernelPolicy)
+
+    @property
+    def portable(self) -> bool:
+        """Whether other processes can make it."""
+        if isinstance(self.given, str | Path) or self.compiled:
+            return True
+        if getattr(self.given, "__module__", "__main__") == "__main__" or not self.identity:
+            return False
+        try:
+            pickle.dumps(self.given)
+        except Exception:  # noqa: BLE001 - whatever the user's object raises
+            return False
+        return True
+
+
+def runnable(given: Any, place: int) -> RunnablePolicy:
+    """Find a policy.
+
+    Args:
+        given: its name, file, class, object, or function.
+        place: among the policies of a comparison.
+
+    Raises:
+        PolicyError, TrainingError: it cannot be found or made.
+    """
+    named = _find(given)
+    identity = policy_identity(named)
+    return RunnablePolicy(
+        given=named.policy if isinstance(named.policy, KernelPolicy) else given,
+        named=named,
+        name=str(given) if isinstance(given, str | os.PathLike) else named.name,
+        identity=identity,
+        key=identity or f"policy {place}",
+    )
+
+
+@dataclass(frozen=True)
+class PolicyRun:
+    """A run to be made, here or in another process."""
+
+    built: BuiltScenario
+    label: str
+    """The scenario as errors name it."""
+    policy: Any
+    seed: int
+
+    def __call__(self) -> Row:
+        """Run.
+
+        Raises:
+            PolicyError: the policy failed.
+        """
+        if isinstance(self.policy, KernelPolicy):
+            return row_of(run_compiled(self.built, self.policy, seed=self.seed))
+        try:
+            return row_of(run_step_by_step(self.built, _find(_copied(self.policy)).policy, seed=self.seed))
+        except PolicyError as error:
+            raise PolicyError(f"{self.label}, seed {self.seed}: {error}") from error
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Send the scenario only; the other process builds it once."""
+        return _sent_run, (self.built.scenario, self.label, self.policy, self.seed)
+
+
+@dataclass(frozen=True)
+class ComparisonRuns:
+    """All runs of a comparison."""
+
+    policies: Sequence[RunnablePolicy]
+    built: Mapping[str, BuiltScenario]
+    seeds: Sequence[int]
+    results: Results
+    missing: dict[RunKey, tuple[RunnablePolicy, Result, PolicyRun]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for policy in self.policies:
+            for label, built in self.built.items():
+                result = Result(built.scenario.name or label, policy.named.name, ())
+                for key in self._keys(policy, built):
+                    if not self.results.has(key):
+                        self.missing[key] = policy, result, PolicyRun(built, label, policy.given, key.seed)
+
+    def make(self, executor: AnyExecutor, stop: Event, on_run: Callable[[int, int], object]) -> None:
+        """Make the runs that are missing; what is done is saved, whatever happens.
+
+        Raises:
+            Interrupted: before the last run was done.
+        """
+        n_all = len({policy.key for policy in self.policies}) * len(self.built) * len(self.seeds)
+        n_known, n_done = n_all - len(self.missing), 0
+        on_run(n_known, n_all)
+
+        def keep(key: RunKey, result: Result) -> None:
+            nonlocal n_done
+            n_done += 1
+            self.results.add(key, result)
+            if self.results.n_unsaved >= SAVE_EVERY_RUNS:
+                self.results.save()
+            on_run(n_known + n_done, n_all)
+
+        how = "interrupted"
+        try:
+            if all(self._make(keys, workers, keep) for keys, workers in self._shares(executor, stop)):
+                return
+        except KeyboardInterrupt:
+            how = "interrupted within a run"
+        finally:
+            self.results.save()
+        path = self.results.path
+        kept = f"they are kept in {path}" if path is not None else "with --results they would have been kept"
+        raise Interrupted(f"{how}; {n_done} of {len(self.missing)} runs were done: {kept}")
+
+    def outcomes(self, policy: RunnablePolicy) -> dict[str, Outcomes]:
+        """Return how a policy's runs came out, by scenario; all of them must be known."""
+        known = self.results.by_run
+        return {
+            label: outcomes(self.seeds, [known[key].row for key in self._keys(policy, built)])
+            for label, built in self.built.items()
+        }
+
+    def _keys(self, policy: RunnablePolicy, built: BuiltScenario) -> list[RunKey]:
+        digest, version = built.scenario.digest, simulator_version()
+        return [RunKey(digest, policy.key, seed, version) for seed in self.seeds]
+
+    def _make(self, keys: list[RunKey], workers: Workers, keep: Callable[[RunKey, Result], object]) -> bool:
+        tasks = [self.missing[key][2] for key in keys]
+        known = [(key, self.missing[key][1]) for key in keys]
+        return workers.run(tasks, lambda k, row: keep(known[k][0], replace(known[k][1], row=row))) is not None
+
+    def _shares(self, executor: AnyExecutor, stop: Event) -> Iterator[tuple[list[RunKey], Workers]]:
+        """Share the runs out to those who make them; Python code does not run side by side in threads."""
+        anywhere, sent, here = list[RunKey](), list[RunKey](), list[RunKey]()
+        chosen = not (executor is None or isinstance(executor, int))
+        for key, (policy, _, _) in self.missing.items():
+            share = anywhere if chosen or policy.compiled else sent if policy.portable else here
+            share.append(key)
+        yield anywhere, workers_for(executor, stop=stop)
+        n = min(executor if isinstance(executor, int) else _n_processes(), len(sent) // RUNS_WORTH_A_PROCESS)
+        yield sent, processes(n, stop=stop) if n > 1 else threads(1, stop=stop)
+        yield here, threads(1, stop=stop)
+
+
+def _n_processes() -> int:
+    """Return how many processes are used unasked: none where starting them would run a script of the user's again."""
+    return n_cores() if not hasattr(sys.modules["__main__"], "__file__") else 1
+
+
+def policy_identity(named: NamedPolicy) -> str:
+    """Return the digest of what a policy does, if it has one; else of its file, with its class; "" if neither is known.
+
+    A file may hold several policies: so the class goes with it.
+    """
+    own = getattr(named.policy, "digest", None)
+    if isinstance(own, str):
+        return own
+    return f"{named.digest}:{type(named.policy).__qualname__}" if named.digest else ""
+
+
+def _copied(policy: Any) -> Any:
+    """Return a copy of an object, so that nothing it remembers gets from run to run; a class or a name stays itself."""
+    try:
+        return copy.deepcopy(policy)
+    except Exception as error:
+        raise PolicyError(f"policy: {type(policy).__name__} cannot be copied: {describe(error)}") from error
+
+
+def _sent_run(scenario: Scenario, label: str, policy: Any, seed: int) -> PolicyRun:
+    return PolicyRun(_built_once(scenario), label, policy, seed)
+
+
+@lru_cache(maxsize=16)
+def _built_once(scenario: Scenario) -> BuiltScenario:
+    return build_scenario(scenario)
+
+
+def _find(given: Any) -> NamedPolicy:  # XXX find_policy
+    if isinstance(given, str | Path):
+        return load_policy(str(given))
+    import hashlib
+    import inspect
+
+    from fireworld.policy.asking import name_of
+    from fireworld.policy.protocol import Policy
+
+    made = given() if inspect.isclass(given) else given
+    if not isinstance(made, Policy):
+        raise PolicyError(expected("policy", "", "a policy", made))
+    digest = getattr(made, "digest", None)
+    try:
+        source = hashlib.sha256(Path(inspect.getfile(type(made))).read_bytes()).hexdigest()
+    except (OSError, TypeError):
+        source = ""
+    return NamedPolicy(name_of(made), digest if isinstance(digest, str) else source, made)
