@@ -163,7 +163,7 @@ def _workshop(order: Order, workers: Workers, cities: CityCache, progress: Progr
     from fireworld.reproduction.pieces import Workshop
     from fireworld.reproduction.trials import build_tests
     from fireworld.training.curriculum import load_curriculum
-    from fireworld.training.method import PAPER
+    from fireworld.training.methods.sarsa import PAPER
 
     training, testing = (progress.add_task(name, total=None) for name in ("training", "testing"))
     workshop = Workshop(

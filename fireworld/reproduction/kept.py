@@ -14,12 +14,13 @@ from msgspec import Struct
 from fireworld.errors import TrainingError, expected
 from fireworld.evaluation.runs import QUANTITIES, Outcomes, outcomes
 from fireworld.files import write_file
-from fireworld.policy.team import Team, load_team, save_team
+from fireworld.policy.teams.table_team import TableTeam
+from fireworld.policy.teams.team import load_team
 from fireworld.reproduction.folder import SETTINGS
 from fireworld.reproduction.repetitions import Repetition
 from fireworld.reproduction.study import TOGETHER, Lesson
 from fireworld.reproduction.trials import Tested
-from fireworld.training.checkpoint import check_same
+from fireworld.training.training import check_same
 
 FORMAT: Final = "fireworld-reproduction/1"
 _HINT: Final = "delete it and it is made anew"
@@ -84,9 +85,9 @@ class Kept:
         """
         teams, graduates = repetition.teams, repetition.graduates
         for name, team in teams.items():
-            save_team(team, self._team(name, number), force=True)
+            team.save(self._team(name, number), force=True)
         for scenario, team in graduates.items():
-            save_team(team, self._graduate(scenario, number), force=True)
+            team.save(self._graduate(scenario, number), force=True)
         content = TrainedText(
             {name: team.digest for name, team in teams.items()},
             {scenario: team.digest for scenario, team in graduates.items()},
@@ -181,10 +182,10 @@ class Kept:
         write_file(path, msgspec.json.encode(content))
 
 
-def _read_team(path: Path, digest: str, training: Path) -> Team:
+def _read_team(path: Path, digest: str, training: Path) -> TableTeam:
     """Read a team, and see that it is the one that was kept."""
     team = load_team(path)
-    if team.digest != digest:
+    if not isinstance(team, TableTeam) or team.digest != digest:
         hint = f"delete {training} and it is trained anew"
         raise TrainingError(expected(str(path), "", f"the team {digest[:12]} that was kept", team.digest[:12], hint))
     return team

@@ -10,7 +10,7 @@ from fireworld_recorder.writer import LogWriter
 from fireworld_viewer.pictures.figure_files import png_bytes
 
 from fireworld.policy.names import NamedPolicy
-from fireworld.policy.team import Team
+from fireworld.policy.teams.team import Team
 from fireworld.recording.pages.record_map import draw_record
 from fireworld.records import CityRecord, StepRecord
 from fireworld.reproduction import paper

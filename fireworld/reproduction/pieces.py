@@ -15,7 +15,7 @@ from fireworld.reproduction.study import TEAMS
 from fireworld.reproduction.trials import RULES, Tested, Tests, rules
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import Curriculum
-from fireworld.training.method import Method
+from fireworld.training.methods.sarsa import Sarsa
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,7 +24,7 @@ class Workshop:
 
     kept: Kept
     curriculum: Curriculum
-    method: Method
+    method: Sarsa
     n_repetitions: int
     tests: Tests
     cities: CityCache

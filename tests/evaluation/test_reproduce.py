@@ -14,7 +14,7 @@ from fireworld_recorder.reader import open_log
 from fireworld.cli import reproduce
 from fireworld.errors import OutputError
 from fireworld.executors import Workers
-from fireworld.policy.team import load_team
+from fireworld.policy.teams.team import load_team
 from fireworld.reproduction import kept, paper
 from fireworld.reproduction.repetitions import Training, random_tables, without_flags
 from fireworld.reproduction.sheets import SHEETS
@@ -22,8 +22,7 @@ from fireworld.reproduction.study import ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import load_curriculum
-from fireworld.training.method import Method
-from fireworld.training.trainer import Trainer
+from fireworld.training.methods.sarsa import Sarsa, SarsaTrainer
 from tests.cli.conftest import fireworld  # noqa: F401 - a fixture
 
 CURRICULUM = """
@@ -37,7 +36,7 @@ stages:
     cooperation: true
     scenarios: [quick, quick]
 """
-METHOD = Method(n_episodes_max=25, n_episodes_unchanged=5)
+METHOD = Sarsa(n_episodes_max=25, n_episodes_unchanged=5)
 FEW = ("reproduce", "--repetitions", 2, "--seeds", 2, "--out", "found")
 
 
@@ -53,7 +52,7 @@ def small(tmp_path, monkeypatch, curriculum):
     """A paper whose every scenario is a small town."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(reproduce, "CURRICULUM", curriculum)
-    monkeypatch.setattr("fireworld.training.method.PAPER", METHOD)
+    monkeypatch.setattr("fireworld.training.methods.sarsa.PAPER", METHOD)
     monkeypatch.setattr("fireworld.reproduction.paper.TABLE_1", (paper.Lesson("quick", 50, 4.5, 5),))
     test = paper.Test("quick", 2, (90, 60), (5, 1), (3.0, 4.0), 5)
     monkeypatch.setattr("fireworld.reproduction.paper.TABLE_2", (test,))
@@ -85,7 +84,7 @@ def test_a_repetition_equals_trainings_from_end_to_end(curriculum):
         (TOGETHER_WITHOUT_FLAGS, without_flags(chosen)),
         (ALONE, chosen.only(["alone"])),
     ):
-        trainer = Trainer(whole, METHOD, seed=1)
+        trainer = SarsaTrainer(whole, METHOD, seed=1)
         reports = [*trainer]
         assert found.teams[name].digest == trainer.team().digest, name
         assert (found.teams[name].visits == trainer.team().visits).all()
@@ -103,7 +102,7 @@ def test_graduates_are_the_team_after_each_scenario(tmp_path):
     chosen = load_curriculum(path)
     found, _ = train(chosen, with_graduates=True)
     assert list(found.graduates) == ["quick", "a", "b"]
-    trainer, after = Trainer(chosen, METHOD, seed=1), {}
+    trainer, after = SarsaTrainer(chosen, METHOD, seed=1), {}
     assert trainer.graduate is None
     for report in trainer:
         if not trainer.progress.episode:
@@ -272,9 +271,9 @@ def test_other_settings_are_refused(begun, fireworld, monkeypatch):  # noqa: F81
     hint = "; name what it was begun with, or begin again with --force\n"
     assert refusal(fireworld, begun, "--repetitions", 3) == f"{settings}repetitions: expected 3, got 2{hint}"
     assert refusal(fireworld, begun, "--seeds", 1) == f"{settings}seeds: expected [1000], got [1000, 1001]{hint}"
-    monkeypatch.setattr("fireworld.training.method.PAPER", METHOD.with_settings({"gamma": "0.9"}))
+    monkeypatch.setattr("fireworld.training.methods.sarsa.PAPER", METHOD.with_settings({"gamma": "0.9"}))
     assert refusal(fireworld, begun) == f"{settings}method.gamma: expected 0.9, got 0.5{hint}"
-    monkeypatch.setattr("fireworld.training.method.PAPER", METHOD)
+    monkeypatch.setattr("fireworld.training.methods.sarsa.PAPER", METHOD)
     monkeypatch.setattr("fireworld.reproduction.pieces.__version__", "9")
     assert refusal(fireworld, begun) == f"{settings}fireworld: expected 9, got '0.1.0'{hint}"
 

@@ -1,23 +1,26 @@
-"""Methods: the paper's figures, other ones, and every mistake in one line."""
+"""Methods: the paper's hyperparameters, other ones, and every mistake in one line."""
 
 from __future__ import annotations
+
+from dataclasses import fields
 
 import pytest
 
 from fireworld.errors import TrainingError
-from fireworld.training.method import PAPER, Method, find_method, method_keys
+from fireworld.training.methods import find_method
+from fireworld.training.methods.sarsa import PAPER, Sarsa
 
 
 def test_the_paper():
     assert find_method("paper") == PAPER
     assert (PAPER.rule, PAPER.alpha, PAPER.gamma, PAPER.epsilon_decay) == ("sarsa", 0.7, 0.5, 0.9)
     assert (PAPER.n_episodes_max, PAPER.n_episodes_unchanged) == (130, 20)
-    assert list(PAPER.as_dict()) == method_keys()
+    assert list(PAPER.as_dict()) == [item.name for item in fields(Sarsa)]
 
 
-def test_other_figures():
+def test_other_hyperparameters():
     changed = PAPER.with_settings({"alpha": "1e-1", "commit": "4", "shared_table": "true", "reward": "change"})
-    assert changed == Method(alpha=0.1, commit=4, shared_table=True, reward="change")
+    assert changed == Sarsa(alpha=0.1, commit=4, shared_table=True, reward="change")
 
 
 @pytest.mark.parametrize(
@@ -39,7 +42,7 @@ def test_other_figures():
         ("choices", "", "one of in-turn, simultaneous, got ''"),
     ],
 )
-def test_a_figure_that_cannot_be(key, text, message):
+def test_a_hyperparameter_that_cannot_be(key, text, message):
     with pytest.raises(TrainingError, match=message):
         PAPER.with_settings({key: text})
 
