@@ -108,7 +108,7 @@ def command(
         method=method,
         seed=seed,
         set=split_settings(settings, example="alpha=0.1"),
-        stages=None if stages is None else [name.strip() for name in stages.split(",")],
+        stages=stages,
         output=output,
         log=log,
         resume=resume,

@@ -79,6 +79,8 @@ class Curriculum:
             TrainingError: no stage of that name.
         """
         known = [stage.name for stage in self.stages]
+        if not isinstance(names, Sequence):
+            raise TrainingError(expected("--stages", "", "names of stages", type(names).__name__))
         for name in names:
             if name not in known:
                 raise TrainingError(expected("--stages", "", f"stages of {self.name}: {', '.join(known)}", name))

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from operator import index
 from pathlib import Path
-from typing import Final
+from typing import Final, SupportsIndex
 
 from fireworld.errors import TrainingError, expected
 from fireworld.policy.teams.team import Team
@@ -16,6 +17,8 @@ from fireworld.training.methods import find_method
 from fireworld.training.training import Callback, Training, begin_all, train_all
 
 SEED_MAX: Final = 2**32 - 1
+REPETITIONS_MAX: Final = 10_000
+JOBS_MAX: Final = 1000
 
 
 def train(
@@ -24,7 +27,7 @@ def train(
     method: str | Method = "paper",
     seed: int = 1,
     set: Mapping[str, object] | None = None,
-    stages: Sequence[str] | None = None,
+    stages: str | Sequence[str] | None = None,
     output: str | Path | None = None,
     log: str | Path | None = None,
     resume: bool = False,
@@ -42,7 +45,7 @@ def train(
         method: a name, as in "paper" or "search", or a `Method` with its hyperparameters.
         seed: of all random draws of the training, 0 to 2**32 - 1.
         set: hyperparameters of the method by name, as in {"alpha": 0.1}.
-        stages: names of the curriculum's stages to train in; None: all.
+        stages: the curriculum's stages to train in, by name: a list, or text as in "alone,together". None: all.
         output: the team file to write. While the training is unfinished, a checkpoint stands beside it.
         log: a CSV file to write, with a line for every report.
         resume: continue from the checkpoint of `output`; or, if its training is done, return that team.
@@ -63,6 +66,9 @@ def train(
         OutputError: a file is in the way, or cannot be written.
         KeyboardInterrupt: Ctrl-C; the part under way has been finished, and a checkpoint stands beside the output.
     """
+    jobs = None if jobs is None else _whole("--jobs", jobs, 1, JOBS_MAX)
+    if not isinstance(callbacks, Sequence) or not all(map(callable, callbacks)):
+        raise TrainingError(expected("callbacks", "", "a list of functions of (training, report)", callbacks))
     (training,) = prepare_trainings(
         curriculum,
         method=method,
@@ -87,7 +93,7 @@ def prepare_trainings(
     method: str | Method = "paper",
     seed: int = 1,
     set: Mapping[str, object] | None = None,
-    stages: Sequence[str] | None = None,
+    stages: str | Sequence[str] | None = None,
     output: str | Path | None = None,
     log: str | Path | None = None,
     resume: bool = False,
@@ -98,9 +104,8 @@ def prepare_trainings(
     There are as many as `repetitions`, with the seeds that follow `seed`; several have numbered files, TEAM-1.npz and
     so on.
     """
-    for name, value, least, most in (("--repetitions", repetitions, 1, 10_000), ("--seed", seed, 0, SEED_MAX)):
-        if type(value) is not int or not least <= value <= most:
-            raise TrainingError(expected(name, "", f"a whole number from {least} to {most}", value))
+    repetitions = _whole("--repetitions", repetitions, 1, REPETITIONS_MAX)
+    seed = _whole("--seed", seed, 0, SEED_MAX)
     if seed + repetitions - 1 > SEED_MAX:
         got = f"up to {seed + repetitions - 1}"
         raise TrainingError(expected("--repetitions", "", f"seeds up to {SEED_MAX}", got))
@@ -108,15 +113,21 @@ def prepare_trainings(
         raise TrainingError("--force and --resume exclude each other")
     if resume and output is None:
         raise TrainingError(expected("--resume", "", "an output whose checkpoint to continue from", "none"))
-    way = (find_method(method) if isinstance(method, str) else method).with_settings(set or {})
+    way = find_method(method) if isinstance(method, str) else method
+    if not isinstance(way, Method):
+        raise TrainingError(expected("--method", "", "a name or a Method", type(way).__name__))
+    if not isinstance(set or {}, Mapping):
+        raise TrainingError(expected("--set", "", "hyperparameters by name", type(set).__name__))
+    way = way.with_settings(set or {})
     chosen = find_curriculum(way.curriculum if curriculum is None else curriculum)
-    chosen = chosen if stages is None else chosen.only(stages)
+    if stages is not None:
+        chosen = chosen.only([name.strip() for name in stages.split(",")] if isinstance(stages, str) else stages)
     cities = CityCache()
     trainings = [
         Training(
             trainer=way.trainer(chosen, seed=seed + number - 1, cities=cities),
-            path=_numbered(output, number, repetitions),
-            log_path=_numbered(log, number, repetitions),
+            path=_numbered("-o", output, number, repetitions),
+            log_path=_numbered("--log", log, number, repetitions),
             force=force,
         )
         for number in range(1, repetitions + 1)
@@ -125,9 +136,18 @@ def prepare_trainings(
     return trainings
 
 
-def _numbered(path: str | Path | None, number: int, repetitions: int) -> Path | None:
+def _whole(name: str, value: SupportsIndex, least: int, most: int) -> int:
+    """Return a whole number, of whatever type, as an int."""
+    if not isinstance(value, SupportsIndex) or isinstance(value, bool) or not least <= index(value) <= most:
+        raise TrainingError(expected(name, "", f"a whole number from {least} to {most}", value))
+    return index(value)
+
+
+def _numbered(name: str, path: str | Path | None, number: int, repetitions: int) -> Path | None:
     """Return the file of one of several trainings: TEAM-3.npz; TEAM.npz if it is the only one."""
     if path is None:
         return None
+    if not isinstance(path, str | Path):
+        raise TrainingError(expected(name, "", "the path of a file", type(path).__name__))
     whole = Path(path)
     return whole if repetitions == 1 else whole.with_name(f"{whole.stem}-{number}{whole.suffix}")

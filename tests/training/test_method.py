@@ -50,3 +50,40 @@ def test_a_hyperparameter_that_cannot_be(key, text, message):
 def test_an_unknown_method():
     with pytest.raises(TrainingError, match=r"^--method: expected one of .*paper.*, got 'best-ever'$"):
         find_method("best-ever")
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"alpha": "0.1"}, ""),
+        ({"alpha": 0.1}, ""),
+        ({"alpha": 1}, ""),
+        ({"alpha": True}, r"^--set: alpha: expected a number, got True$"),
+        ({"alpha": None}, r"^--set: alpha: expected a number, got None$"),
+        ({"alpha": 10**400}, r"^--set: alpha: expected a number, got 1000"),
+        ({"commit": 2.0}, r"^--set: commit: expected a whole number, got 2.0$"),
+        ({"shared_table": 1}, r"^--set: shared_table: expected true or false, got 1$"),
+        ({"shared_table": []}, r"^--set: shared_table: expected true or false, got \[\]$"),
+        ({"rule": 3}, r"^method: rule: expected one of sarsa, expected-sarsa, q-learning, got 3$"),
+        ({"rule": []}, r"^method: rule: expected one of sarsa, "),
+    ],
+)
+def test_plain_values_and_text(settings, message):
+    if not message:
+        assert PAPER.with_settings(settings).as_dict()["alpha"] == float(settings["alpha"])
+        return
+    with pytest.raises(TrainingError, match=message):
+        PAPER.with_settings(settings)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"alpha": "0.1"}, "alpha: expected a number from 0 to 1, got '0.1'"),
+        ({"commit": 2.0}, "commit: expected a whole number from 1 to 1000000, got 2.0"),
+        ({"shared_table": 1}, "shared_table: expected true or false, got 1"),
+    ],
+)
+def test_values_of_another_type(values, message):
+    with pytest.raises(TrainingError, match=f"^method: {message}$"):
+        Sarsa(**values)

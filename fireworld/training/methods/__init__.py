@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from fireworld.errors import TrainingError, expected
@@ -24,7 +23,7 @@ METHODS: Final[dict[str, Method]] = {}
 
 def method_names() -> list[str]:
     """Return the names of all methods; nothing is imported for it."""
-    modules = (module.name for module in pkgutil.iter_modules([str(Path(__file__).parent)]))
+    modules = (module.name for module in pkgutil.iter_modules(__path__))
     return [*ALIASES, *modules, *METHODS]
 
 
