@@ -151,7 +151,7 @@ class Trainer(ABC, Generic[AMethod, AReport]):
         seed: of all random draws.
         report_type: what it yields.
         plots: titles of what is drawn of every team, by name.
-        unit: what is counted along the plots, as in "episode".
+        unit: what is reported on, as in "episode".
         uses_workers: whether one training keeps all workers busy.
     """
 
@@ -184,11 +184,6 @@ class Trainer(ABC, Generic[AMethod, AReport]):
     def done(self) -> bool:
         """Whether the training is at its end."""
         return self.share_done >= 1.0
-
-    @property
-    @abstractmethod
-    def position(self) -> str:
-        """Where the training stands, in words, as in "after 3 generations"."""
 
     @abstractmethod
     def run(self, workers: Workers) -> Iterator[AReport]:

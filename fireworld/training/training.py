@@ -177,8 +177,9 @@ class Training:
             write_file(self.log_path, (_csv_line(self.trainer.report_type.columns()) + self.log).encode())
 
     def _with_checkpoint(self, error: OutputError) -> OutputError:
-        hint = f"; {self.checkpoint} of this training is there: continue with --resume" if self.has_checkpoint else ""
-        return OutputError(f"{error}{hint}")
+        return OutputError(
+            f"{error}; continue from {self.checkpoint} with --resume" if self.has_checkpoint else str(error)
+        )
 
     def _check_identity(self, team: Team, path: Path) -> None:
         check_same(team.short_provenance, self.trainer.identity, path)

@@ -65,7 +65,7 @@ def test_ctrl_c_and_resume(here, fireworld, files, monkeypatch):
     done = fireworld(*TRAIN, "t.npz")
     assert done.code == 130
     assert done.out == ""
-    assert "t.npz.checkpoint is there: continue with --resume" in done.err
+    assert "; continue from t.npz.checkpoint with --resume" in done.err
     assert files() == ["t.npz.checkpoint", "whole.npz"]
     again = fireworld(*TRAIN, "t.npz")
     assert again.code == 2
@@ -147,8 +147,7 @@ def test_a_full_disk_keeps_the_checkpoint(here, fireworld, files, monkeypatch):
         done = fireworld(*TRAIN, "t.npz")
     assert (done.code, done.out) == (2, "")
     assert done.err.splitlines()[-1] == (
-        "fireworld: t.npz: cannot be written: No space left on device; "
-        "t.npz.checkpoint of this training is there: continue with --resume"
+        "fireworld: t.npz: cannot be written: No space left on device; continue from t.npz.checkpoint with --resume"
     )
     assert files() == ["t.npz.checkpoint", "whole.npz"]
     assert fireworld(*TRAIN, "t.npz", "--resume").code == 0

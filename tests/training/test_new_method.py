@@ -127,10 +127,6 @@ class GuessTrainer(Trainer[Guess, GuessReport]):
     def share_done(self):
         return self.n_done / self.method.n_guesses
 
-    @property
-    def position(self):
-        return f"after {self.n_done} guesses"
-
     def run(self, workers):
         while not self.done:
             self.action = below(self.seed, WEIGHT, self.n_done, 0, bound=len(ACTIONS))

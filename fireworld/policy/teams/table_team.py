@@ -104,7 +104,7 @@ class TableTeam(Team):
         for values, visits in zip(self.tables, self.visits, strict=True):
             visited = visits.any(axis=1)
             counts = np.bincount(values[visited].argmax(axis=1), minlength=len(ACTIONS))
-            found.append(TableSummary(len(values), int(visited.sum()), tuple(int(count) for count in counts)))
+            found.append(TableSummary(int(visited.sum()), tuple(counts.tolist())))
         return found
 
     def agreement(self) -> tuple[int, int]:

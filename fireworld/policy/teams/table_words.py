@@ -65,7 +65,6 @@ class Choice:
 class TableSummary:
     """What one table does overall."""
 
-    n_states: int
     n_visited: int
     n_by_action: tuple[int, ...]
     """Visited states in which the table prefers each action."""

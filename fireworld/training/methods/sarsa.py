@@ -164,11 +164,6 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         progress = self.progress
         return (progress.scenario_number + progress.episode / self.method.n_episodes_max) / len(self._plan)
 
-    @property
-    def position(self) -> str:
-        """Scenario and episode."""
-        return f"in scenario {self.progress.scenario_number + 1}, after {self.progress.episode} episodes"
-
     def run(self, workers: Workers) -> Iterator[EpisodeReport]:
         """Train, yielding a report after every episode; all in this thread."""
         del workers

@@ -149,11 +149,6 @@ class SearchTrainer(Trainer[Search, Generation]):
         """How many of the generations are done."""
         return self.progress.generation / self.method.n_generations
 
-    @property
-    def position(self) -> str:
-        """Generations that are done."""
-        return f"after {self.progress.generation} generations"
-
     def run(self, workers: Workers) -> Iterator[Generation]:
         """Search, yielding a report after every generation.
 
