@@ -127,8 +127,7 @@ def _print_result(training: Training) -> None:
     if team is not None:
         click.echo(f"{training.path}: seed {training.seed}, {team.summary}, digest {team.digest}")
     elif training.has_checkpoint:
-        done = f"{training.n_reports} {training.trainer.unit}s"
-        click.echo(f"interrupted after {done}; continue from {training.checkpoint} with --resume", err=True)
+        click.echo(training.interruption, err=True)
 
 
 @contextmanager

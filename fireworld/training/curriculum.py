@@ -215,5 +215,5 @@ def _variations(base: Scenario, stage: StageText) -> Iterator[Scenario]:
     combinations = [dict(zip(stage.vary, values, strict=True)) for values in itertools.product(*stage.vary.values())]
     for number, (group, values) in enumerate(itertools.product(stage.each or ({},), combinations), 1):
         settings = {**stage.set, **group, **values}
-        varied = base.with_settings({key: json.dumps(value) for key, value in settings.items()})
+        varied = base.with_values(settings)
         yield msgspec.structs.replace(varied, name=f"{stage.name}-{number}")

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from operator import index
 from pathlib import Path
-from typing import Final, SupportsIndex
+from typing import Final
 
+from fireworld.arguments import SEED_MAX, path_of, seed_of, settings_of, whole_number
 from fireworld.errors import TrainingError, expected
+from fireworld.interrupt import Interrupted
 from fireworld.policy.teams.team import Team
 from fireworld.scenario import Scenario
 from fireworld.simulation.built import CityCache
@@ -16,7 +17,6 @@ from fireworld.training.method import Method
 from fireworld.training.methods import find_method
 from fireworld.training.training import Callback, Training, begin_all, train_all
 
-SEED_MAX: Final = 2**32 - 1
 REPETITIONS_MAX: Final = 10_000
 JOBS_MAX: Final = 1000
 
@@ -64,9 +64,10 @@ def train(
         TrainingError: no such curriculum, method, hyperparameter or stage, or a checkpoint of another training.
         ScenarioError: a scenario that makes no sense.
         OutputError: a file is in the way, or cannot be written.
-        KeyboardInterrupt: Ctrl-C; the part under way has been finished, and a checkpoint stands beside the output.
+        Interrupted: Ctrl-C; the part under way has been finished, and a checkpoint stands beside the output.
+        ArgumentError: another kind of value than an argument may have.
     """
-    jobs = None if jobs is None else _whole("--jobs", jobs, 1, JOBS_MAX)
+    jobs = None if jobs is None else whole_number("jobs", jobs, least=1, most=JOBS_MAX)
     if not isinstance(callbacks, Sequence) or not all(map(callable, callbacks)):
         raise TrainingError(expected("callbacks", "", "a list of functions of (training, report)", callbacks))
     (training,) = prepare_trainings(
@@ -82,7 +83,7 @@ def train(
     )
     train_all([training], jobs=jobs, callbacks=callbacks)
     if training.team is None and not training.stopped:
-        raise KeyboardInterrupt
+        raise Interrupted(training.interruption)
     return training.team if training.team is not None else training.trainer.team()
 
 
@@ -104,8 +105,8 @@ def prepare_trainings(
     There are as many as `repetitions`, with the seeds that follow `seed`; several have numbered files, TEAM-1.npz and
     so on.
     """
-    repetitions = _whole("--repetitions", repetitions, 1, REPETITIONS_MAX)
-    seed = _whole("--seed", seed, 0, SEED_MAX)
+    repetitions = whole_number("repetitions", repetitions, least=1, most=REPETITIONS_MAX)
+    seed = seed_of(seed)
     if seed + repetitions - 1 > SEED_MAX:
         got = f"up to {seed + repetitions - 1}"
         raise TrainingError(expected("--repetitions", "", f"seeds up to {SEED_MAX}", got))
@@ -116,9 +117,7 @@ def prepare_trainings(
     way = find_method(method) if isinstance(method, str) else method
     if not isinstance(way, Method):
         raise TrainingError(expected("--method", "", "a name or a Method", type(way).__name__))
-    if not isinstance(set or {}, Mapping):
-        raise TrainingError(expected("--set", "", "hyperparameters by name", type(set).__name__))
-    way = way.with_settings(set or {})
+    way = way.with_settings(settings_of(set))
     chosen = find_curriculum(way.curriculum if curriculum is None else curriculum)
     if stages is not None:
         chosen = chosen.only([name.strip() for name in stages.split(",")] if isinstance(stages, str) else stages)
@@ -126,8 +125,8 @@ def prepare_trainings(
     trainings = [
         Training(
             trainer=way.trainer(chosen, seed=seed + number - 1, cities=cities),
-            path=_numbered("-o", output, number, repetitions),
-            log_path=_numbered("--log", log, number, repetitions),
+            path=_numbered("output", output, number, repetitions),
+            log_path=_numbered("log", log, number, repetitions),
             force=force,
         )
         for number in range(1, repetitions + 1)
@@ -136,18 +135,9 @@ def prepare_trainings(
     return trainings
 
 
-def _whole(name: str, value: SupportsIndex, least: int, most: int) -> int:
-    """Return a whole number, of whatever type, as an int."""
-    if not isinstance(value, SupportsIndex) or isinstance(value, bool) or not least <= index(value) <= most:
-        raise TrainingError(expected(name, "", f"a whole number from {least} to {most}", value))
-    return index(value)
-
-
 def _numbered(name: str, path: str | Path | None, number: int, repetitions: int) -> Path | None:
     """Return the file of one of several trainings: TEAM-3.npz; TEAM.npz if it is the only one."""
     if path is None:
         return None
-    if not isinstance(path, str | Path):
-        raise TrainingError(expected(name, "", "the path of a file", type(path).__name__))
-    whole = Path(path)
+    whole = path_of(name, path)
     return whole if repetitions == 1 else whole.with_name(f"{whole.stem}-{number}{whole.suffix}")

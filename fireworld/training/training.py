@@ -64,6 +64,12 @@ class Training:
         """The checkpoint's file."""
         return self.path and self.path.with_name(self.path.name + CHECKPOINT_SUFFIX)
 
+    @property
+    def interruption(self) -> str:
+        """How far an interrupted training has come, and how to continue."""
+        done = f"interrupted after {self.n_reports} {self.trainer.unit}s"
+        return f"{done}; continue from {self.checkpoint} with --resume" if self.has_checkpoint else done
+
     def begin(self) -> None:
         """Check that nothing would be overwritten, before any work is done.
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fireworld.errors import FireworldError, OutputError, TrainingError
+from fireworld.interrupt import Interrupted
 from fireworld.policy.teams.ranking_team import RankingTeam
 from fireworld.policy.teams.table_team import TableTeam
 from fireworld.policy.teams.team import load_team
@@ -133,7 +134,7 @@ def test_ctrl_c_leaves_a_checkpoint(here, files, method, monkeypatch):
         if training.n_reports == 2:
             signal.raise_signal(signal.SIGINT)
 
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(Interrupted, match=r"^interrupted after 2 \w+s; continue from a.npz.checkpoint with --resume$"):
         train("tiny.yaml", **options, callbacks=[interrupt])
     assert files() == ["a.npz.checkpoint"]
     assert train("tiny.yaml", **options, resume=True).digest == train("tiny.yaml", **options, force=True).digest
@@ -169,22 +170,22 @@ def test_a_callback_that_fails_is_the_callers_matter(here, files):
         ),
         ({"method": "magic"}, "^--method: expected one of paper, sarsa, search, got 'magic'$"),
         ({"method": 3}, "^--method: expected a name or a Method, got 'int'$"),
-        ({"seed": -1}, "^--seed: expected a whole number from 0 to 4294967295, got -1$"),
-        ({"seed": 1.0}, "^--seed: expected a whole number from 0 to 4294967295, got 1.0$"),
-        ({"seed": True}, "^--seed: expected a whole number"),
+        ({"seed": -1}, "^seed: expected a whole number from 0 to 4294967295, got -1$"),
+        ({"seed": 1.0}, "^seed: expected a whole number from 0 to 4294967295, got 1.0$"),
+        ({"seed": True}, "^seed: expected a whole number"),
         ({"set": {"speed": 3}}, "^--set: speed: expected one of rule, alpha"),
         ({"set": {"alpha": 7}}, "^method: alpha: expected a number from 0 to 1, got 7.0$"),
-        ({"set": ["alpha=7"]}, "^--set: expected hyperparameters by name, got 'list'$"),
+        ({"set": ["alpha=7"]}, r"^set: expected values by key, as in .*, got \['alpha=7'\]$"),
         ({"stages": "al"}, "^--stages: expected stages of tiny: alone, together, got 'al'$"),
         ({"stages": 1}, "^--stages: expected names of stages, got 'int'$"),
-        ({"output": 3}, "^-o: expected the path of a file, got 'int'$"),
+        ({"output": 3}, "^output: expected the path of a file, got 3$"),
         ({"output": "no/t.npz"}, "^no/t.npz: expected an existing folder"),
         ({"output": "t.npy"}, "^t.npy: expected a file ending in .npz, got '.npy'$"),
         ({"output": "t.npz", "log": "t.npz"}, "^t.npz: expected a file of its own"),
         ({"resume": True}, "^--resume: expected an output whose checkpoint to continue from, got 'none'$"),
         ({"output": "t.npz", "resume": True}, "^--resume: expected a checkpoint to continue from, got no t.npz.check"),
         ({"output": "t.npz", "resume": True, "force": True}, "^--force and --resume exclude each other$"),
-        ({"jobs": 0}, "^--jobs: expected a whole number from 1 to 1000, got 0$"),
+        ({"jobs": 0}, "^jobs: expected a whole number from 1 to 1000, got 0$"),
         ({"callbacks": print}, r"^callbacks: expected a list of functions of \(training, report\), got <built-in"),
         ({"callbacks": [3]}, r"^callbacks: expected a list of functions of \(training, report\), got \[3\]$"),
     ],

@@ -242,7 +242,7 @@ class SearchTrainer(Trainer[Search, Generation]):
             return
         n = self.method.n_steps_max
         scenarios = [scenario for stage in self.curriculum.stages for scenario in stage.scenarios]
-        short = [one.with_settings({"steps": str(n)}) if one.steps > n else one for one in scenarios]
+        short = [one.with_values({"steps": n}) if one.steps > n else one for one in scenarios]
         self._fires = [self._cities.build(scenario) for scenario in short]
 
     def _generation(self, pool: Executor, stop: Event) -> Generation | None:
