@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from threading import Event
 from typing import Final
 
 import numpy as np
 
 from benchmarks.learning_fires import N_THREADS, TESTS, Fires, shares
+from fireworld.executors import threads
 from fireworld.kernels.arrays import Array
 from fireworld.kernels.choice import FIXED
 from fireworld.planning.planner import planner
@@ -20,18 +20,17 @@ from fireworld.policy.asking import begin
 from fireworld.policy.kernel import NO_TABLES, KernelPolicy, from_tables
 from fireworld.policy.names import BUILT_IN
 from fireworld.policy.protocol import Policy
-from fireworld.policy.team import load_team, save_team
+from fireworld.policy.teams.team import load_team
 from fireworld.policy.words import N_FLAG_VALUES, N_OWN, N_STATES, RADIX, features_of
 from fireworld.records import ACTIONS
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import Curriculum, CurriculumStage, load_curriculum
-from fireworld.training.method import PAPER, Method
-from fireworld.training.search import Search, Searcher
-from fireworld.training.searches import SearchRun
-from fireworld.training.trainer import Trainer
+from fireworld.training.methods.sarsa import PAPER, Sarsa
+from fireworld.training.methods.search import Search, SearchTrainer
+from fireworld.training.training import Training, train_all
 
 SEED_OF_DISTILLING: Final = 30_000
-"""Above the seeds of all tests: the planner that teaches meets other luck."""
+"""Above the seeds of all tests: the planner that teaches sees other random draws."""
 N_BRIGADES: Final = 4
 SEARCH: Final = Search()
 HALF: Final = replace(SEARCH, n_candidates=36, n_best=9, n_fires=32)
@@ -179,11 +178,11 @@ class Workshop:
         def make(number: int, group: str) -> KernelPolicy:
             del group
             path = self.folder / f"{name}-{number}.npz"
-            run = SearchRun(Searcher(self.curriculum(), search, seed=number, cities=self.cities), path)
-            run.resume()
-            run.run(Event(), n_threads=N_THREADS, report=lambda _, __: None)
-            assert run.ranking is not None
-            return run.ranking.policy()
+            training = Training(search.trainer(self.curriculum(), seed=number, cities=self.cities), path)
+            training.resume()
+            train_all([training], jobs=N_THREADS)
+            assert training.team is not None
+            return training.team.policy()
 
         return make
 
@@ -196,22 +195,22 @@ class Workshop:
 
     def sarsa(self, *, cooperation: bool) -> Callable[[int, str], KernelPolicy]:
         """Let SARSA learn in the contested fires, with what helped most elsewhere."""
-        method = Method(
+        method = Sarsa(
             reward="change", shared_table=True, alpha=0.1, gamma=0.95, commit=4, n_episodes_max=self.size.n_episodes_max
         )
         return self._trained(
             f"sarsa-{cooperation}", self.curriculum(cooperation=cooperation).only(["contested"]), method
         )
 
-    def _trained(self, name: str, curriculum: Curriculum, method: Method) -> Callable[[int, str], KernelPolicy]:
+    def _trained(self, name: str, curriculum: Curriculum, method: Sarsa) -> Callable[[int, str], KernelPolicy]:
         def make(number: int, group: str) -> KernelPolicy:
             del group
             path = self.folder / f"{name}-{number}.npz"
             if not path.exists():
-                trainer = Trainer(curriculum, method, seed=number, cities=self.cities)
+                trainer = method.trainer(curriculum, seed=number, cities=self.cities)
                 for _ in trainer:
                     pass
-                save_team(trainer.team(), path)
+                trainer.team().save(path)
             return load_team(path).policy()
 
         return make
@@ -222,13 +221,13 @@ class Workshop:
         def make(number: int, group: str) -> KernelPolicy:
             del group
             path = self.folder / f"linear-{cooperation}-{number}.npy"
-            searcher = TableSearcher(
+            searcher = TableSearchTrainer(
                 self.curriculum(), replace(self.size.half, cooperation=cooperation), seed=number, cities=self.cities
             )
             if not path.exists():
-                for _ in searcher.run(n_threads=N_THREADS, stop=Event()):
+                for _ in searcher.run(threads(N_THREADS)):
                     pass
-                np.save(path, searcher.state.mean)
+                np.save(path, searcher.progress.mean)
             return searcher.policy_of(np.load(path))
 
         return make
@@ -246,14 +245,14 @@ class Workshop:
         return make
 
 
-class TableSearcher(Searcher):
+class TableSearchTrainer(SearchTrainer):
     """Searches for a table: its values are weighted sums of indicators of the features, and of pairs of the flags."""
 
     def free_weights(self) -> Array:
         """Return which weights are searched for."""
         shown = indicators()
         free = np.ones((shown.shape[1], len(ACTIONS)), dtype=np.bool_)
-        if not self.search.cooperation:
+        if not self.method.cooperation:
             free[sum(RADIX[:N_OWN]) :] = False
         return free.ravel()
 

@@ -16,10 +16,9 @@ from typing import Final
 
 import click
 
-from fireworld.policy.files import load_team_file
-from fireworld.policy.ranking import Ranking
-from fireworld.policy.shipped import team_path
-from fireworld.policy.team import Team
+from fireworld.policy.teams.shipped import team_path
+from fireworld.policy.teams.table_team import TableTeam
+from fireworld.policy.teams.team import Team, load_team
 
 COMMANDS: Final[Mapping[str, tuple[str, ...]]] = {
     "paper-cooperative": ("train", "paper", "--seed", "1"),
@@ -29,7 +28,7 @@ COMMANDS: Final[Mapping[str, tuple[str, ...]]] = {
 """How each team is trained: the words after `fireworld`, `-o TEAM.npz` apart."""
 
 
-def train_all(folder: Path) -> dict[str, Team | Ranking]:
+def train_all(folder: Path) -> dict[str, Team]:
     """Train every team by its command, side by side; files go to the folder."""
     program = [sys.executable, "-c", "from fireworld.cli import main; main()"]
     started = {
@@ -41,13 +40,13 @@ def train_all(folder: Path) -> dict[str, Team | Ranking]:
     for name, process in started.items():
         if process.wait() != 0:
             raise click.ClickException(f"{name}: fireworld {' '.join(COMMANDS[name])}: exit code {process.returncode}")
-    return {name: load_team_file(folder / f"{name}.npz") for name in COMMANDS}
+    return {name: load_team(folder / f"{name}.npz") for name in COMMANDS}
 
 
-def same(team: Team | Ranking, other: Team | Ranking) -> bool:
+def same(team: Team, other: Team) -> bool:
     """Tell whether two teams have learned the same from the same; the version of fireworld may be another."""
     origins = [{**one.provenance, "fireworld": ""} for one in (team, other)]
-    if isinstance(team, Team) and isinstance(other, Team) and (team.visits != other.visits).any():
+    if isinstance(team, TableTeam) and isinstance(other, TableTeam) and (team.visits != other.visits).any():
         return False
     return team.digest == other.digest and origins[0] == origins[1]
 
@@ -61,7 +60,7 @@ def main(context: click.Context, *, write: bool) -> None:
     with TemporaryDirectory() as folder:
         for name, team in train_all(Path(folder)).items():
             path = team_path(name)
-            unchanged = path.is_file() and same(team, load_team_file(path))
+            unchanged = path.is_file() and same(team, load_team(path))
             if not unchanged and write:
                 shutil.copy(Path(folder) / path.name, path)
             n_others += not (unchanged or write)

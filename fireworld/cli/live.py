@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import replace
 from threading import Lock
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -16,20 +15,10 @@ if TYPE_CHECKING:
     from fireworld_viewer.rerun_view.training_curves import TrainingLayout, TrainingPoint
 
     from fireworld.records import CityRecord, RunHeader, StepRecord
-    from fireworld.training.teams import Training
-    from fireworld.training.trainer import EpisodeReport
+    from fireworld.training.method import Play, Report, Trainer
+    from fireworld.training.training import Callback, Training
 
 Command = TypeVar("Command", bound=Callable[..., Any])
-
-CURVES: Final = {
-    "return": "Return",
-    "score": "Score, as a share of the best",
-    "epsilon": "Epsilon",
-    "n_changed": "States in which the greedy action changed",
-    "n_burnt_out": "Burnt out",
-    "n_steps": "Steps",
-}
-"""What is drawn of each episode, and the titles."""
 
 
 def view_options(command: Command) -> Command:
@@ -41,7 +30,7 @@ def view_options(command: Command) -> Command:
 
 
 def find_screen(*, view: bool, url: str | None) -> Screen | None:
-    """Find out where a live view is to go, None for nowhere, before anything is run.
+    """Return where a live view goes, None for nowhere; before anything is run.
 
     Raises:
         ViewError: there is no viewer, no display, or nothing at the address.
@@ -57,108 +46,92 @@ def find_screen(*, view: bool, url: str | None) -> Screen | None:
 
 @contextmanager
 def watched_run(screen: Screen | None, header: RunHeader, city: CityRecord) -> Iterator[Callable[[StepRecord], None]]:
-    """Give a function that shows the next record, and bring the rest at the end; without a screen it does nothing."""
+    """Yield a function that shows the next record; at the end the rest is shown. Without a screen it does nothing."""
     if screen is None:
         yield lambda _: None
         return
     from fireworld_viewer.rerun_view.live import RunView
 
-    with closing(RunView(screen, header, city, warn=warn)) as watched:
+    with closing(RunView(screen, header, city, warn=_print_note)) as watched:
         yield watched.add
 
 
 @contextmanager
-def watched_training(screen: Screen | None) -> Iterator[Callable[[Training, EpisodeReport], None]]:
-    """Give a function that shows an episode, as `watched_run` does for a run.
+def watched_trainings(screen: Screen | None, trainings: Sequence[Training]) -> Iterator[Callback]:
+    """Yield a callback that shows a report, as `watched_run` does for a run.
 
-    At the end of every stage the first team plays the last scenario once, greedily and with luck of its own, in the
-    thread of the view: neither the training nor its luck knows of it. The viewer turns to each, so there are few.
+    What is drawn is up to the method. Runs that it has to show are those of the first team, in the thread of the view:
+    neither the training nor its random draws depend on them. The viewer turns to each, so there are few.
     """
     if screen is None:
         yield lambda _, __: None
         return
     from fireworld_viewer.rerun_view.live import TrainingView
 
-    episodes, lock = Episodes(), Lock()
-    with closing(TrainingView(screen, _layout(), warn=warn)) as watched:
+    lock = Lock()
+    with closing(TrainingView(screen, _layout([one.trainer for one in trainings]), warn=_print_note)) as watched:
 
-        def show(training: Training, episode: EpisodeReport) -> None:
+        def show(training: Training, report: Report) -> None:
             with lock:
-                point, play = episodes.point(training, episode)
-                watched.add(point, play=play)
+                play = training.trainer.play(report) if training is trainings[0] else None
+                watched.add(_point(training, report), play=play and _play_run(play))
 
         yield show
 
 
-def _layout() -> TrainingLayout:
-    from fireworld_viewer.rerun_view.training_curves import TrainingLayout
+def _layout(trainers: Sequence[Trainer[Any, Any]]) -> TrainingLayout:
+    """Return what is drawn: plots of all teams, and a tab for each that has plots of its own."""
+    from fireworld_viewer.rerun_view.training_curves import LayoutTab, TrainingLayout
 
-    return TrainingLayout(title="training", timeline="episode", plots=CURVES, log="Scenarios")
-
-
-class Episodes:
-    """Makes of the reports of all trainings what is shown of them."""
-
-    def __init__(self) -> None:
-        self._n_episodes: dict[int, int] = {}
-        self._first: int | None = None
-
-    def point(self, training: Training, episode: EpisodeReport) -> tuple[TrainingPoint, PlayRun | None]:
-        """Return an episode as it is drawn, and what is to be played after it."""
-        from fireworld_viewer.rerun_view.training_curves import TrainingPoint
-
-        seed = training.trainer.seed
-        number = self._n_episodes.get(seed, 0)
-        self._n_episodes[seed] = number + 1
-        self._first = seed if self._first is None else self._first
-        ended = training.trainer.progress.episode == 0  # it starts at 0 again with every scenario
-        settled = "settled" if episode.converged else "not settled"
-        values = {
-            "return": episode.total_reward,
-            "score": episode.score / episode.score_max,
-            "epsilon": episode.epsilon,
-            "n_changed": episode.n_changed,
-            "n_burnt_out": episode.n_burnt_out,
-            "n_steps": episode.n_steps,
-        }
-        team = f"seed {seed}"
-        point = TrainingPoint(
-            number=number,
-            values={name: {team: value} for name, value in values.items()},
-            note=f"{team}: {episode.scenario}: {settled} after {episode.episode + 1} episodes" if ended else "",
-        )
-        return point, _play(training, episode) if ended and seed == self._first and _ends_stage(training) else None
+    first = trainers[0]
+    return TrainingLayout(
+        title=f"training-{first.method.name}",
+        timeline=first.unit,
+        plots=first.plots,
+        tabs={f"Seed {one.seed}": LayoutTab(one.own_plots(), _page(one)) for one in trainers if one.own_plots()},
+        log="Milestones",
+    )
 
 
-def _ends_stage(training: Training) -> bool:
-    """Whether the scenario that has just ended was the last of its stage."""
-    stages = training.trainer.curriculum.stages
-    lasts = itertools.accumulate(len(stage.scenarios) for stage in stages)
-    return training.trainer.progress.scenario_number in lasts
+def _point(training: Training, report: Report) -> TrainingPoint:
+    """Return a report as it is drawn."""
+    from fireworld_viewer.rerun_view.training_curves import TrainingPoint
+
+    trainer, team = training.trainer, f"seed {training.seed}"
+    values = {
+        plot: {", ".join(filter(None, (team, name))): value for name, value in curves.items()}
+        if plot in trainer.plots
+        else curves
+        for plot, curves in trainer.points(report).items()
+    }
+    page = trainer.page()
+    return TrainingPoint(
+        number=training.n_reports,
+        values=values,
+        note=f"{team}: {report.text}" if report.milestone else "",
+        pages={_page(trainer): page} if page else {},
+    )
 
 
-def _play(training: Training, episode: EpisodeReport) -> PlayRun:
-    """Prepare the play of a scenario by the team that has just finished it; the tables are copied now."""
-    trainer = training.trainer
-    team = trainer.graduate if trainer.graduate is not None else trainer.team()
-    scenario = [one for stage in trainer.curriculum.stages for one in stage.scenarios][episode.scenario_number]
-    title = f"after stage {episode.stage}: {scenario.name}, seed {trainer.seed}"
+def _page(trainer: Trainer[Any, Any]) -> str:
+    """Return the name of the page about a team."""
+    return f"page/{trainer.seed}"
 
-    def play() -> tuple[str, RunHeader, CityRecord, list[StepRecord]]:
-        import msgspec
 
+def _play_run(play: Play) -> PlayRun:
+    def run() -> tuple[str, RunHeader, CityRecord, list[StepRecord]]:
         from fireworld.policy.names import NamedPolicy
         from fireworld.simulation.built import build_scenario
         from fireworld.simulation.run import prepare_run
 
-        policy = team.policy()
-        as_trained = msgspec.structs.replace(scenario, choices=trainer.method.choices)
-        run = prepare_run(build_scenario(as_trained), NamedPolicy("team in training", policy.digest, policy), seed=1)
-        return title, run.header, run.city, [replace(record, snapshot=None) for record in run]
+        policy = play.team.policy()
+        named = NamedPolicy("team in training", policy.digest, policy)
+        run = prepare_run(build_scenario(play.scenario), named, seed=1)
+        return play.title, run.header, run.city, [replace(record, snapshot=None) for record in run]
 
-    return play
+    return run
 
 
-def warn(line: str) -> None:
-    """Say why a view has ended before what it shows."""
+def _print_note(line: str) -> None:
+    """Print why a view has ended before what it shows."""
     click.echo(line, err=True)

@@ -14,7 +14,7 @@ from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.live import find_screen, view_options, watched_run
 from fireworld.cli.options import record_options, seed_option, settings_option, steps_option
 from fireworld.cli.progress import BAR, ELAPSED, bars, is_watched
-from fireworld.policy.shipped import team_names
+from fireworld.policy.teams.shipped import team_names
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -16,11 +16,11 @@ from typing import Final
 from fireworld.errors import PolicyError, expected
 from fireworld.policy.asking import describe
 from fireworld.policy.chief import chief
-from fireworld.policy.files import parse_team_file
 from fireworld.policy.kernel import KernelPolicy, always, at_random, each_another
-from fireworld.policy.npz import SUFFIX, read_bytes
 from fireworld.policy.protocol import Policy
-from fireworld.policy.shipped import team_names, team_path
+from fireworld.policy.teams.npz import SUFFIX, read_bytes
+from fireworld.policy.teams.shipped import team_names, team_path
+from fireworld.policy.teams.team import parse_team
 from fireworld.records import ACTIONS
 
 BUILT_IN: Final[dict[str, Callable[[], KernelPolicy]]] = {
@@ -116,7 +116,7 @@ def _note_on_choices(trained: str, choices: str) -> str:
 def _load_team(path: Path, *, name: str) -> NamedPolicy:
     """Return the policy of a team file; a recording names it without its folder and takes the file along."""
     content = read_bytes(path)
-    team = parse_team_file(content, source=str(path))
+    team = parse_team(content, source=str(path))
     policy = team.policy()
     return NamedPolicy(name, policy.digest, policy, {TEAM_ATTACHMENT: content}, team.choices)
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 from fireworld.errors import FireworldError, LogError, PolicyError, expected
 from fireworld.policy.asking import begin
-from fireworld.policy.files import parse_team_file
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.names import TEAM_ATTACHMENT, NamedPolicy, load_policy
 from fireworld.policy.protocol import Policy
+from fireworld.policy.teams.team import parse_team
 from fireworld.recording.decisions import ComparedPolicy, RecordedDecisions
 from fireworld.records import ACTION_NAMES, MemoryRecording, RunHeader, StepRecord
 from fireworld.simulation.built import BuiltScenario
@@ -47,7 +47,7 @@ def recorded_policy(header: RunHeader, *, source: str) -> NamedPolicy:
     name, team_file = header.policy, header.attachments.get(TEAM_ATTACHMENT)
     try:
         if team_file is not None:
-            team = parse_team_file(team_file, source=TEAM_ATTACHMENT)
+            team = parse_team(team_file, source=TEAM_ATTACHMENT)
             policy = team.policy()
             named = NamedPolicy(name, policy.digest, policy, {TEAM_ATTACHMENT: team_file})
         else:

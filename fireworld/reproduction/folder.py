@@ -16,12 +16,13 @@ from fireworld.evaluation.runs import Outcomes, outcomes
 from fireworld.files import write_file
 from fireworld.kernels.arrays import Array
 from fireworld.outcome import COLUMNS
-from fireworld.policy.team import Team, load_team, save_team
+from fireworld.policy.teams.table_team import TableTeam
+from fireworld.policy.teams.team import load_team
 from fireworld.reproduction.csv_files import CSV_FILES
 from fireworld.reproduction.repetitions import Repetition
 from fireworld.reproduction.study import TEAMS, TOGETHER, LearningCurve
 from fireworld.reproduction.team_tests import Tested
-from fireworld.training.checkpoint import check_same
+from fireworld.training.training import check_same
 
 FORMAT: Final = "fireworld-reproduction/1"
 REPORT: Final = "report.html"
@@ -121,9 +122,9 @@ class ReproductionFolder:
         """
         teams, graduates = repetition.teams, repetition.graduates
         for name, team in teams.items():
-            save_team(team, self._team(name, number), force=True)
+            team.save(self._team(name, number), force=True)
         for scenario, team in graduates.items():
-            save_team(team, self._graduate(scenario, number), force=True)
+            team.save(self._graduate(scenario, number), force=True)
         content = RepetitionText(
             {name: team.digest for name, team in teams.items()},
             {scenario: team.digest for scenario, team in graduates.items()},
@@ -230,10 +231,10 @@ class ReproductionFolder:
         write_file(path, msgspec.json.encode(content, enc_hook=np.ndarray.tolist))
 
 
-def _read_team(path: Path, digest: str, training: Path) -> Team:
+def _read_team(path: Path, digest: str, training: Path) -> TableTeam:
     """Read a team, and check that it is the one that was written."""
     team = load_team(path)
-    if team.digest != digest:
+    if not isinstance(team, TableTeam) or team.digest != digest:
         hint = f"delete {training} and it is trained anew"
         raise TrainingError(expected(str(path), "", f"the team {digest[:12]} that was written", team.digest[:12], hint))
     return team

@@ -18,7 +18,7 @@ from fireworld.reproduction.study import Study
 from fireworld.reproduction.team_tests import LEARNED, RULES, TeamTests, Tested, build_tests, collect, rules
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import Curriculum
-from fireworld.training.method import Method
+from fireworld.training.methods.sarsa import Sarsa
 
 OnProgress = Callable[[str, int, int], object]
 """Called with what is being done, how many parts of it are done, and how many there are."""
@@ -58,7 +58,7 @@ class Measurement:
 
     folder: ReproductionFolder
     curriculum: Curriculum
-    method: Method
+    method: Sarsa
     n_repetitions: int
     seeds: Sequence[int]
     stop: Event = field(default_factory=Event)

@@ -11,7 +11,7 @@ from fireworld_viewer.pictures.figure_files import png_bytes
 from fireworld_viewer.pictures.maps import draw_record
 
 from fireworld.policy.names import NamedPolicy
-from fireworld.policy.team import Team
+from fireworld.policy.teams.team import Team
 from fireworld.recording.record import play
 from fireworld.records import CityRecord, StepRecord
 from fireworld.reproduction import paper

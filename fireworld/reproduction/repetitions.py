@@ -12,22 +12,21 @@ import numpy as np
 from fireworld.draws import TABLE, below
 from fireworld.interrupt import Interrupted
 from fireworld.kernels.arrays import Array
-from fireworld.policy.team import Team
+from fireworld.policy.teams.table_team import TableTeam
 from fireworld.policy.words import N_FLAG_VALUES, N_STATES
 from fireworld.records import ACTIONS
 from fireworld.reproduction.study import ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS, LearningCurve
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import Curriculum
-from fireworld.training.method import Method
-from fireworld.training.trainer import EpisodeReport, Progress, Trainer
+from fireworld.training.methods.sarsa import EpisodeReport, Progress, Sarsa, SarsaTrainer
 
 
 @dataclass(frozen=True)
 class Repetition:
     """The teams of one repetition, by name, and how they learned."""
 
-    teams: Mapping[str, Team]
-    graduates: Mapping[str, Team]
+    teams: Mapping[str, TableTeam]
+    graduates: Mapping[str, TableTeam]
     """The cooperative team as it was at the end of each of the scenarios together, by scenario; may be left out."""
     curves: tuple[LearningCurve, ...]
 
@@ -49,7 +48,7 @@ class RepetitionTraining:
     """
 
     curriculum: Curriculum
-    method: Method
+    method: Sarsa
     number: int
     cities: CityCache
     stop: Event
@@ -74,17 +73,17 @@ class RepetitionTraining:
         progress = Progress(n_alone, tables=flagged, visits=np.zeros(flagged.shape, dtype=np.int64))
         team_alone = replace(control.team(), tables=begun[:1].copy(), visits=control.progress.visits[:1].copy())
         together = self._trainer(self.curriculum, progress)
-        graduates: dict[str, Team] = {}
+        graduates: dict[str, TableTeam] = {}
         curves += self._follow(together, TOGETHER, until=self.curriculum.n_scenarios, graduates=graduates)
         curves += self._follow(control, TOGETHER_WITHOUT_FLAGS, until=self.curriculum.n_scenarios)
         teams = {ALONE: team_alone, TOGETHER: together.team(), TOGETHER_WITHOUT_FLAGS: control.team()}
         return Repetition(teams=teams, graduates=graduates if self.with_graduates else {}, curves=tuple(curves))
 
-    def _trainer(self, curriculum: Curriculum, progress: Progress | None = None) -> Trainer:
-        return Trainer(curriculum, self.method, seed=self.number, progress=progress, cities=self.cities)
+    def _trainer(self, curriculum: Curriculum, progress: Progress | None = None) -> SarsaTrainer:
+        return SarsaTrainer(curriculum, self.method, seed=self.number, progress=progress, cities=self.cities)
 
     def _follow(
-        self, trainer: Trainer, team: str, *, until: int, graduates: dict[str, Team] | None = None
+        self, trainer: SarsaTrainer, team: str, *, until: int, graduates: dict[str, TableTeam] | None = None
     ) -> list[LearningCurve]:
         """Train up to a scenario; add the team at the end of each to `graduates`."""
         curves = []

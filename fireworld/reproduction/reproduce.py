@@ -24,7 +24,7 @@ from fireworld.reproduction.report_page import report_page
 from fireworld.reproduction.report_text import report_text
 from fireworld.reproduction.study import Study
 from fireworld.training.curriculum import Curriculum, load_curriculum
-from fireworld.training.method import PAPER
+from fireworld.training.methods.sarsa import PAPER
 
 CURRICULUM: Final = "paper"
 FIRST_SEED: Final = 1000

@@ -1,1 +1,1 @@
-"""Training: curricula, the paper's method and its variants, and the teams that come of it."""
+"""Training: curricula, the methods by which teams learn, and the function `train`."""

@@ -15,7 +15,7 @@ import msgspec
 from msgspec import Meta, Struct
 
 from fireworld.errors import FireworldError, TrainingError, expected
-from fireworld.scenario import Scenario, load_scenario
+from fireworld.scenario import Scenario, load_scenario, scenario_names
 from fireworld.scenario.shipped import shipped_folder
 from fireworld.scenario.yaml_text import read_yaml
 
@@ -79,6 +79,8 @@ class Curriculum:
             TrainingError: no stage of that name.
         """
         known = [stage.name for stage in self.stages]
+        if not isinstance(names, Sequence):
+            raise TrainingError(expected("--stages", "", "names of stages", type(names).__name__))
         for name in names:
             if name not in known:
                 raise TrainingError(expected("--stages", "", f"stages of {self.name}: {', '.join(known)}", name))
@@ -98,8 +100,44 @@ class Curriculum:
 
 
 def curriculum_names() -> list[str]:
-    """Name the curricula that come with fireworld."""
+    """Return the names of the curricula that come with fireworld."""
     return sorted(path.stem for path in (shipped_folder() / "curricula").glob("*.yaml"))
+
+
+def find_curriculum(given: str | Path | Curriculum | Scenario) -> Curriculum:
+    """Return the curriculum that is meant, or a curriculum of the one scenario that is meant.
+
+    Args:
+        given: a curriculum, the name of a shipped one or of a file; or a scenario, the name of a shipped one or of a
+            file. A file with the key `stages` is a curriculum.
+
+    Raises:
+        TrainingError: no such curriculum or scenario, or a curriculum that makes no sense.
+        ScenarioError: broken YAML, or a scenario that makes no sense.
+    """
+    if isinstance(given, Curriculum):
+        return given
+    if isinstance(given, Scenario):
+        return curriculum_of(given)
+    if not isinstance(given, str | Path):
+        wanted = "a curriculum or a scenario: an object, a name or a path"
+        raise TrainingError(expected("curriculum", "", wanted, type(given).__name__))
+    if str(given) not in curriculum_names():
+        if str(given) in scenario_names():
+            return curriculum_of(load_scenario(str(given)))
+        document = _read_document(Path(given), source=str(given))
+        if isinstance(document, dict) and "stages" not in document:
+            return curriculum_of(load_scenario(given))
+    return load_curriculum(given)
+
+
+def curriculum_of(scenario: Scenario) -> Curriculum:
+    """Return the curriculum of one scenario.
+
+    Its stage has cooperation (4320 states) if there is more than one brigade; a single one has nobody to see.
+    """
+    stage = CurriculumStage(scenario.name, scenario.brigades.n > 1, (scenario,))
+    return Curriculum(name=scenario.name, stages=(stage,))
 
 
 def load_curriculum(name_or_path: str | Path) -> Curriculum:
@@ -109,20 +147,24 @@ def load_curriculum(name_or_path: str | Path) -> Curriculum:
         TrainingError: no such curriculum, or one that makes no sense.
         ScenarioError: broken YAML.
     """
-    path = Path(name_or_path)
-    if str(name_or_path) in curriculum_names():
-        path = shipped_folder() / "curricula" / f"{name_or_path}.yaml"
-    source = str(name_or_path)
+    path, source = Path(name_or_path), str(name_or_path)
+    if source in curriculum_names():
+        path = shipped_folder() / "curricula" / f"{source}.yaml"
+    return _build(_read_document(path, source=source), source=source, path=path)
+
+
+def _read_document(path: Path, *, source: str) -> Any:
     try:
         with path.open("rb") as file:
             text = file.read(SIZE_MAX_BYTES + 1)
     except (OSError, ValueError) as error:
         names = ", ".join(curriculum_names())
         reason = getattr(error, "strerror", None) or str(error)
-        raise TrainingError(expected(source, "", f"a curriculum file or one of {names}", reason)) from None
+        wanted = f"a curriculum file or one of {names}, or a scenario"
+        raise TrainingError(expected(source, "", wanted, reason)) from None
     if len(text) > SIZE_MAX_BYTES:
         raise TrainingError(expected(source, "", f"a curriculum of at most {SIZE_MAX_BYTES} bytes", "more of them"))
-    return _build(read_yaml(text, source=source), source=source, path=path)
+    return read_yaml(text, source=source)
 
 
 def _build(document: Any, *, source: str, path: Path) -> Curriculum:
@@ -173,5 +215,5 @@ def _variations(base: Scenario, stage: StageText) -> Iterator[Scenario]:
     combinations = [dict(zip(stage.vary, values, strict=True)) for values in itertools.product(*stage.vary.values())]
     for number, (group, values) in enumerate(itertools.product(stage.each or ({},), combinations), 1):
         settings = {**stage.set, **group, **values}
-        varied = base.with_settings({key: json.dumps(value) for key, value in settings.items()})
+        varied = base.with_values(settings)
         yield msgspec.structs.replace(varied, name=f"{stage.name}-{number}")

@@ -1,143 +1,280 @@
-"""Method: how a team learns. The defaults are the paper's; everything else is a declared variant."""
+"""What a method of training is: hyperparameters, a trainer that is iterated, and the reports that it yields."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+import sys
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    Final,
+    Generic,
+    Literal,
+    NamedTuple,
+    Self,
+    TypeVar,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
+from fireworld import __version__
 from fireworld.errors import TrainingError, expected
-from fireworld.policy.team import COMMIT_MAX
+from fireworld.executors import Workers, threads
+from fireworld.kernels.arrays import Array
+from fireworld.policy.teams.team import Team
+from fireworld.scenario import Scenario
+from fireworld.simulation.built import CityCache
+from fireworld.training.curriculum import Curriculum
 
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
+COUNT_MAX: Final = 1_000_000
 
-Rule = Literal["sarsa", "expected-sarsa", "q-learning"]
-RULES: Final[tuple[Rule, ...]] = ("sarsa", "expected-sarsa", "q-learning")
-CHOSEN: Final[Mapping[str, tuple[str, ...]]] = {
-    "rule": RULES,
-    "reward": ("stock", "change"),
-    "choices": ("in-turn", "simultaneous"),
-}
-"""Figures that are one of a few words."""
-N_EPISODES_MAX: Final = 1_000_000
+
+class Limits(NamedTuple):
+    """What numbers a hyperparameter may be."""
+
+    wanted: str
+    """In words."""
+    least: float = -sys.float_info.max
+    most: float = sys.float_info.max
+    above: bool = False
+    """The least number itself is not allowed."""
+
+    def allow(self, value: float) -> bool:
+        """Return whether a number is within the limits; nan and infinity never are."""
+        return (self.least < value if self.above else self.least <= value) and value <= self.most
+
+
+Share = Annotated[float, Limits("a number from 0 to 1", 0.0, 1.0)]
+NotNegative = Annotated[float, Limits("a number >= 0", 0.0)]
+Positive = Annotated[float, Limits("a number > 0", 0.0, above=True)]
+PositiveShare = Annotated[float, Limits("a number above 0, at most 1", 0.0, 1.0, above=True)]
+Count = Annotated[int, Limits(f"a whole number from 1 to {COUNT_MAX}", 1, COUNT_MAX)]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Method:
-    """How a team learns."""
+class Method(ABC):
+    """How a team learns: a frozen dataclass whose fields are the hyperparameters.
 
-    rule: Rule = "sarsa"
-    alpha: float = 0.7
-    """Learning rate."""
-    alpha_decay: float = 0.0
-    """The n-th visit of a state and action learns at alpha / (1 + alpha_decay * (n - 1))."""
-    gamma: float = 0.5
-    """Discount of the next step."""
-    epsilon_decay: float = 0.9
-    """Episode k of a scenario explores with probability epsilon_decay ** k, k from 0."""
-    n_episodes_max: int = 130
-    """Episodes of a scenario at most."""
-    n_episodes_unchanged: int = 20
-    """A scenario ends when no greedy action has changed for so many episodes."""
-    shared_table: bool = False
-    """All brigades learn into one table."""
-    fixed_noise: bool = False
-    """Every episode of a scenario meets the same luck."""
-    reward: Literal["stock", "change"] = "stock"
-    """The state's cost at every step, as in the paper; or how it changed."""
-    choices: Literal["in-turn", "simultaneous"] = "in-turn"
-    """Whether brigades see what those before them chose in this step."""
-    commit: int = 1
-    """Steps that a choice is kept for."""
+    A field is a bool, a `Literal` of words, or a number with `Limits`, such as `Share` or `Count`; what it may be is
+    checked by its type.
+
+    Attributes:
+        name: of the method, as files have it.
+        curriculum: the name of the curriculum that it trains in if none is given.
+    """
+
+    name: ClassVar[str]
+    curriculum: ClassVar[str]
 
     def __post_init__(self) -> None:
-        """Refuse figures that make no method."""
-        for name in ("alpha", "gamma", "epsilon_decay"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and 0.0 <= value <= 1.0):
-                raise TrainingError(expected("method", name, "a number from 0 to 1", value))
-        if not (math.isfinite(self.alpha_decay) and self.alpha_decay >= 0.0):
-            raise TrainingError(expected("method", "alpha_decay", "a number >= 0", self.alpha_decay))
-        for name, most in (
-            ("n_episodes_max", N_EPISODES_MAX),
-            ("n_episodes_unchanged", N_EPISODES_MAX),
-            ("commit", COMMIT_MAX),
-        ):
-            if not 1 <= getattr(self, name) <= most:
-                wanted = f"a whole number from 1 to {most}"
-                raise TrainingError(expected("method", name, wanted, getattr(self, name)))
-        for name, words in CHOSEN.items():
-            if getattr(self, name) not in words:
-                raise TrainingError(expected("method", name, "one of " + ", ".join(words), getattr(self, name)))
+        """Raise TrainingError if a hyperparameter is not what it may be."""
+        for key, kind in _kinds(type(self)).items():
+            value = getattr(self, key)
+            wanted = _wanted(kind)
+            if wanted and not _allowed(value, kind):
+                raise TrainingError(expected("method", key, wanted, value))
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return all figures by name."""
-        return asdict(self)
-
-    def with_settings(self, settings: Mapping[str, str]) -> Method:
-        """Return the method with other figures.
+    @abstractmethod
+    def trainer(self, curriculum: Curriculum, *, seed: int, cities: CityCache | None = None) -> Trainer[Any, Any]:
+        """Return what trains one team.
 
         Args:
-            settings: figures as text by name, as in {"alpha": "0.1", "shared_table": "true"}.
+            curriculum: what to learn in.
+            seed: of all random draws of this training.
+            cities: cities built before, shared between trainings.
+        """
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return all hyperparameters by name."""
+        return asdict(self)
+
+    def with_settings(self, settings: Mapping[str, object]) -> Self:
+        """Return the method with other hyperparameters.
+
+        Args:
+            settings: values by name, plain or as text: {"alpha": 0.1, "shared_table": "true"}.
 
         Raises:
-            TrainingError: no such figure, or not a value it can have.
+            TrainingError: no such hyperparameter, or not a value it can have.
         """
-        return replace(self, **read_figures(settings, self))
+        kinds = _kinds(type(self))
+        for key in settings:
+            if key not in kinds:
+                raise TrainingError(expected("--set", key, "one of " + ", ".join(kinds), key))
+        return replace(self, **{key: _read(key, value, kinds[key]) for key, value in settings.items()})
 
 
-PAPER: Final = Method()
-METHODS: Final = {"paper": PAPER}
-"""Methods by name."""
-SEARCH: Final = "search"
-"""The name of the other way to train: `fireworld.training.search`."""
+@dataclass(frozen=True, kw_only=True)
+class Report(ABC):
+    """What a trainer yields from time to time; the fields of its subclass are the columns of the log."""
+
+    milestone: bool
+    """A part of the training is done: time for a checkpoint, and for a line on the terminal."""
+
+    @property
+    @abstractmethod
+    def text(self) -> str:
+        """What happened, in one line."""
+
+    @classmethod
+    def columns(cls) -> list[str]:
+        """Return the names of the columns of the log."""
+        return [item.name for item in fields(cls) if item.name != "milestone"]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the columns by name."""
+        return {name: getattr(self, name) for name in self.columns()}
 
 
-def method_keys() -> list[str]:
-    """Name the figures of a method."""
-    return [item.name for item in fields(Method)]
+class Play(NamedTuple):
+    """A run to be shown while a team learns."""
+
+    title: str
+    scenario: Scenario
+    team: Team
 
 
-def find_method(name: str) -> Method:
-    """Return a method by name.
+AMethod = TypeVar("AMethod", bound=Method)
+AReport = TypeVar("AReport", bound=Report)
 
-    Raises:
-        TrainingError: no such method.
+
+class Trainer(ABC, Generic[AMethod, AReport]):
+    """Trains one team. Iterate over it to train; between reports it can be saved and restored.
+
+    Attributes:
+        method: how the team learns.
+        curriculum: what it learns in.
+        seed: of all random draws.
+        report_type: what it yields.
+        plots: titles of what is drawn of every team, by name.
+        unit: what is reported on, as in "episode".
+        uses_workers: whether one training keeps all workers busy.
     """
-    if name not in METHODS:
-        raise TrainingError(expected("--method", "", "one of " + ", ".join((*METHODS, SEARCH)), name))
-    return METHODS[name]
+
+    report_type: ClassVar[type[Report]]
+    plots: ClassVar[Mapping[str, str]]
+    unit: ClassVar[str]
+    uses_workers: ClassVar[bool] = False
+
+    def __init__(self, curriculum: Curriculum, method: AMethod, *, seed: int) -> None:
+        if not curriculum.n_scenarios:
+            raise TrainingError(expected(curriculum.name, "stages", "a scenario to learn in", "none"))
+        self.method, self.curriculum, self.seed = method, curriculum, seed
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What decides what comes of a training: equal identities, equal teams."""
+        return {
+            "curriculum": {"name": self.curriculum.name, "digest": self.curriculum.digest},
+            "method": {"name": self.method.name, **self.method.as_dict()},
+            "seed": self.seed,
+            "fireworld": __version__,
+        }
+
+    @property
+    @abstractmethod
+    def share_done(self) -> float:
+        """How much is done, 0 to 1; 1 at the end only."""
+
+    @property
+    def done(self) -> bool:
+        """Whether the training is at its end."""
+        return self.share_done >= 1.0
+
+    @abstractmethod
+    def run(self, workers: Workers) -> Iterator[AReport]:
+        """Train, yielding a report after every part.
+
+        Args:
+            workers: who does the work, where it comes in many parts; when their `stop` is set, this may end between
+                two reports, with the state of the last one. What comes of it does not depend on their number.
+        """
+
+    def __iter__(self) -> Iterator[AReport]:
+        return self.run(threads(1))
+
+    @abstractmethod
+    def team(self) -> Team:
+        """Return the team as it is now."""
+
+    @abstractmethod
+    def state(self) -> dict[str, Array]:
+        """Return what is needed to continue, besides the team."""
+
+    @abstractmethod
+    def restore(self, team: Team, state: Mapping[str, Array], *, source: str) -> None:
+        """Continue where another trainer of this identity stood.
+
+        Args:
+            team: its team.
+            state: its state.
+            source: what errors call the file.
+
+        Raises:
+            TrainingError: they make no sense.
+        """
+
+    def own_plots(self) -> Mapping[str, str]:
+        """Return the titles of what is drawn of this team alone, by name."""
+        return {}
+
+    @abstractmethod
+    def points(self, report: AReport) -> Mapping[str, Mapping[str, float]]:
+        """Return what is drawn of the last report: by plot, then by curve; "" is a plot's only curve."""
+
+    def page(self) -> str:
+        """Return what there is to say of the team as it is now, in Markdown, to be read beside its own plots."""
+        return ""
+
+    def play(self, report: AReport) -> Play | None:
+        """Return a run to be shown after the last report, if it is time for one."""
+        del report
+        return None
 
 
-def read_figures(settings: Mapping[str, str], figures: DataclassInstance) -> dict[str, Any]:
-    """Read figures that a user sets, each of the kind that it is of by now.
-
-    Args:
-        settings: figures as text by name.
-        figures: what they belong to.
-
-    Raises:
-        TrainingError: no such figure, or not a value it can have.
-    """
-    names = [item.name for item in fields(figures)]
-    for key in settings:
-        if key not in names:
-            raise TrainingError(expected("--set", key, "one of " + ", ".join(names), key))
-    return {key: _read(key, text, getattr(figures, key)) for key, text in settings.items()}
+def _kinds(method: type[Method]) -> dict[str, Any]:
+    """Return the types of the hyperparameters by name."""
+    hints = get_type_hints(method, include_extras=True)
+    return {item.name: hints[item.name] for item in fields(method)}
 
 
-def _read(key: str, text: str, default: object) -> object:
-    """Read a figure of the kind that its default is of."""
-    if isinstance(default, str):
-        return text
-    if isinstance(default, bool):
-        if text not in {"true", "false"}:
-            raise TrainingError(expected("--set", key, "true or false", text))
-        return text == "true"
+def _wanted(kind: Any) -> str:
+    """Return in words what a hyperparameter may be."""
+    if kind is bool:
+        return "true or false"
+    if get_origin(kind) is Literal:
+        return "one of " + ", ".join(get_args(kind))
+    limits: Limits = kind.__metadata__[0]
+    return limits.wanted
+
+
+def _allowed(value: object, kind: Any) -> bool:
+    if kind is bool:
+        return isinstance(value, bool)
+    if get_origin(kind) is Literal:
+        return value in get_args(kind)
+    number, limits = get_args(kind)
+    is_number = isinstance(value, int) or (number is float and isinstance(value, float))
+    return is_number and not isinstance(value, bool) and limits.allow(value)
+
+
+def _read(key: str, given: object, kind: Any) -> object:
+    """Read a hyperparameter, given as text or as a plain value."""
+    if get_origin(kind) is Literal:
+        return given
+    if kind is bool:
+        found = {"true": True, "false": False}.get(given, given) if isinstance(given, str) else given
+        if not isinstance(found, bool):
+            raise TrainingError(expected("--set", key, "true or false", given))
+        return found
+    number = get_args(kind)[0]
     try:
-        return type(default)(text)  # type: ignore[call-arg]  # a number of one kind or the other
-    except ValueError:
-        wanted = "a whole number" if isinstance(default, int) else "a number"
-        raise TrainingError(expected("--set", key, wanted, text)) from None
+        if isinstance(given, str | int | number) and not isinstance(given, bool):
+            return number(given)
+    except (ValueError, OverflowError):
+        pass
+    raise TrainingError(expected("--set", key, "a whole number" if number is int else "a number", given))

@@ -7,8 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from fireworld.policy.ranking import WEIGHTS, Ranking, save_ranking
-from fireworld.policy.shipped import team_path
+from fireworld.policy.teams.ranking_team import RankingTeam
+from fireworld.policy.teams.ranking_words import WEIGHTS
+from fireworld.policy.teams.shipped import team_path
 
 NAMES = [weight.name for weight in WEIGHTS]
 ORIGIN = {
@@ -26,12 +27,12 @@ def here(here):
     weights[0, :3] = 0.5, -2.0, 0.25
     weights[1, NAMES.index("others_here")] = -1.0
     weights[0, NAMES.index("easiest")] = 7.0
-    save_ranking(Ranking(weights[:1], True, ORIGIN), here / "own.npz")
-    save_ranking(Ranking(weights, False), here / "named.npz")
+    RankingTeam(weights[:1], True, ORIGIN).save(here / "own.npz")
+    RankingTeam(weights, False).save(here / "named.npz")
     other = weights.copy()
     other[0, 1] = -2.5
     other[1, 0] = 0.125
-    save_ranking(Ranking(other, False), here / "other.npz")
+    RankingTeam(other, False).save(here / "other.npz")
     return here
 
 
@@ -114,7 +115,7 @@ def test_rankings_compared(here, fireworld):
 def test_what_is_ranked_is_told(here, fireworld):
     weights = np.zeros((1, len(NAMES)))
     for name, own_targets in (("a.npz", True), ("b.npz", False)):
-        save_ranking(Ranking(weights, own_targets), here / name)
+        RankingTeam(weights, own_targets).save(here / name)
     done = fireworld("policy", "diff", "a.npz", "b.npz")
     assert done.code == 1
     assert done.out == (

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 
-from fireworld.policy.ranking import FORMAT, WEIGHTS
+from fireworld.policy.teams.ranking_team import RankingTeam
+from fireworld.policy.teams.ranking_words import WEIGHTS
 from tests.docs.pages import ROOT
 
 
@@ -13,4 +14,4 @@ def test_the_weights_are_those_of_the_code():
     section = page.partition("\n## 7. Ranking, an extension\n")[2].partition("\n## ")[0]
     rows = re.findall(r"^\| `([^`]+)` \| (.+) \|$", section, re.MULTILINE)
     assert rows == [(weight.name, weight.meaning) for weight in WEIGHTS]
-    assert FORMAT in section
+    assert f"of the kind `{RankingTeam.kind}`" in section

@@ -14,7 +14,7 @@ import pytest
 from fireworld.evaluation import comparison_runs
 from fireworld.evaluation.results import read_results
 from fireworld.policy.names import load_policy
-from fireworld.policy.team import Team, save_team
+from fireworld.policy.teams.table_team import TableTeam
 from tests.cli.conftest import fireworld, here  # noqa: F401 - fixtures
 
 pytestmark = pytest.mark.usefixtures("here")
@@ -191,7 +191,7 @@ def test_team_files_of_one_name_are_told_apart(fireworld, here):  # noqa: F811
         (here / folder).mkdir()
         tables = np.zeros((1, 270, 4))
         tables[:, :, 3 - 2 * number] = 1.0
-        save_team(Team(tables=tables, visits=np.zeros((1, 270, 4), dtype=np.int64)), here / folder / "team.npz")
+        TableTeam(tables=tables, visits=np.zeros((1, 270, 4), dtype=np.int64)).save(here / folder / "team.npz")
     found = compared(fireworld, "old/team.npz", "new/team.npz", *QUICK, "--seeds", 6)
     assert (found["a"]["name"], found["b"]["name"]) == ("old/team.npz", "new/team.npz")
     assert row(found)["verdict"] == "better"

@@ -16,7 +16,7 @@ import pytest
 from fireworld_recorder.reader import open_log
 
 from fireworld.errors import FireworldError, OutputError, TrainingError
-from fireworld.policy.team import load_team
+from fireworld.policy.teams.team import load_team
 from fireworld.reproduction import folder as reproduction_folder
 from fireworld.reproduction import paper
 from fireworld.reproduction.csv_files import CSV_FILES
@@ -26,8 +26,7 @@ from fireworld.reproduction.study import ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import load_curriculum
-from fireworld.training.method import Method
-from fireworld.training.trainer import Trainer
+from fireworld.training.methods.sarsa import Sarsa, SarsaTrainer
 from tests.cli.conftest import fireworld  # noqa: F401 - a fixture
 
 CURRICULUM = """
@@ -41,7 +40,7 @@ stages:
     cooperation: true
     scenarios: [quick, quick]
 """
-METHOD = Method(n_episodes_max=25, n_episodes_unchanged=5)
+METHOD = Sarsa(n_episodes_max=25, n_episodes_unchanged=5)
 FEW = ("reproduce", "--repetitions", 2, "--seeds", 2, "--out", "found")
 
 
@@ -96,7 +95,7 @@ def test_a_repetition_equals_trainings_from_end_to_end(curriculum):
         (TOGETHER_WITHOUT_FLAGS, without_flags(chosen)),
         (ALONE, chosen.only(["alone"])),
     ):
-        trainer = Trainer(whole, METHOD, seed=1)
+        trainer = SarsaTrainer(whole, METHOD, seed=1)
         reports = [*trainer]
         assert found.teams[name].digest == trainer.team().digest, name
         assert (found.teams[name].visits == trainer.team().visits).all()
@@ -114,7 +113,7 @@ def test_graduates_are_the_team_after_each_scenario(tmp_path):
     chosen = load_curriculum(path)
     found, _ = train(chosen, with_graduates=True)
     assert list(found.graduates) == ["quick", "a", "b"]
-    trainer, after = Trainer(chosen, METHOD, seed=1), {}
+    trainer, after = SarsaTrainer(chosen, METHOD, seed=1), {}
     assert trainer.graduate is None
     for report in trainer:
         if not trainer.progress.episode:

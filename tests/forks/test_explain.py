@@ -13,7 +13,7 @@ import pytest
 from fireworld_recorder.reader import open_log
 
 from fireworld.policy.names import load_policy
-from fireworld.policy.ranking import Ranking, save_ranking
+from fireworld.policy.teams.ranking_team import RankingTeam
 from fireworld.recording.decisions import RecordedDecisions
 from fireworld.recording.explanation.search import explain
 from fireworld.recording.explanation.stretches import Stretch, find_stretches
@@ -210,7 +210,7 @@ RANKING = [-0.63, 2.12, 1.59, -0.04, 2.19, 0.94, -0.2, 1.19, 0.83, 0.58, -0.01, 
 
 def test_a_stretch_of_one_target_is_what_a_fork_with_that_target_is(here, fireworld, answer):
     """Between two runs of a team that ranks targets: the words of the answer are those that a fork takes."""
-    save_ranking(Ranking(np.array([RANKING]), own_targets=True, provenance={}), here / "ranking.npz")
+    RankingTeam(np.array([RANKING]), own_targets=True, provenance={}).save(here / "ranking.npz")
     answer("run", "quick", "--policy", "ranking.npz", "--record", "ranked.mcap")
     answer("fork", "ranked.mcap", "--at", 5, "--decide", "1=own-target:44", "--record", "f.mcap")
     known = answer("explain", "ranked.mcap", "f.mcap")

@@ -15,7 +15,7 @@ from fireworld_recorder.writer import StepFile
 
 from fireworld.policy.asking import begin
 from fireworld.policy.names import load_policy
-from fireworld.policy.team import Team, save_team
+from fireworld.policy.teams.table_team import TableTeam
 from fireworld.recording.fork import Change, prepare_fork
 from fireworld.recording.replay import build_recorded
 from fireworld.recording.resume import resume
@@ -197,8 +197,10 @@ def test_a_fork_of_a_fork_tells_of_both(here, answer):
 @pytest.mark.parametrize("commit", [1, 7])
 def test_a_team_comes_from_the_recording(here, answer, commit):
     tables = np.random.default_rng(3).normal(size=(2, 4320, 4))
-    team = Team(tables=tables, visits=np.zeros(tables.shape, dtype=np.int64), provenance={"method": {"commit": commit}})
-    save_team(team, here / "team.npz")
+    team = TableTeam(
+        tables=tables, visits=np.zeros(tables.shape, dtype=np.int64), provenance={"method": {"commit": commit}}
+    )
+    team.save(here / "team.npz")
     answer("run", "quick", "--steps", 30, "--policy", "team.npz", "--record", "t.mcap")
     (here / "team.npz").unlink()
     assert answer("fork", "t.mcap", "--at", 17, "--record", "f.mcap")["digest"] == open_log("t.mcap").digest
@@ -211,8 +213,10 @@ def test_a_team_comes_from_the_recording(here, answer, commit):
 def test_a_brigade_that_is_told_drops_what_it_was_committed_to(here, answer):
     tables = np.zeros((1, 4320, 4))
     tables[..., 0] = 1.0
-    team = Team(tables=tables, visits=np.zeros(tables.shape, dtype=np.int64), provenance={"method": {"commit": 50}})
-    save_team(team, here / "team.npz")
+    team = TableTeam(
+        tables=tables, visits=np.zeros(tables.shape, dtype=np.int64), provenance={"method": {"commit": 50}}
+    )
+    team.save(here / "team.npz")
     answer("run", "quick", "--steps", 12, "--policy", "team.npz", "--record", "t.mcap")
     answer("fork", "t.mcap", "--at", 4, "--decide", "0=nearest-to-me", "--record", "f.mcap")
     made = [actions[0] for actions in open_log("f.mcap").ragged("/decisions", "action")[1:8]]

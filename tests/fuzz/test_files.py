@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from fireworld.city.plan_file import dump_plan, parse_plan
 from fireworld.conformance.city_file import load_city_file
 from fireworld.errors import TrainingError
-from fireworld.policy.team import FORMAT, Team, parse_team, save_team
+from fireworld.policy.teams.table_team import TableTeam
+from fireworld.policy.teams.team import FORMAT, parse_team
 from fireworld.scenario import parse_scenario
 from fireworld.scenario.shipped import shipped_folder
 from fireworld.training.curriculum import load_curriculum
@@ -37,7 +38,7 @@ def team_file() -> bytes:
     """A small team file."""
     path = file_of(b"", "team.npz")
     rows = np.arange(270 * 4).reshape(1, 270, 4)
-    save_team(Team(rows / 8.0, rows, {"method": {"commit": 2}}), path, force=True)
+    TableTeam(rows / 8.0, rows, {"method": {"commit": 2}}).save(path, force=True)
     return path.read_bytes()
 
 
@@ -72,7 +73,7 @@ def use_city(text: bytes) -> None:
 def use_team(data: bytes) -> None:
     """Read a team and let it choose."""
     with only_complaints():
-        team, _ = parse_team(data, source="team.npz")
+        team = parse_team(data, source="team.npz")
         assert len(team.digest) == len(team.policy().digest) == 64
         assert team.commit >= 1
 
@@ -187,7 +188,7 @@ def test_the_good_files_are_read():
     """What is altered above is good before."""
     assert parse_scenario(SCENARIO, source="a").brigades.n
     assert len(parse_plan(CITY_TEXT, where="a").footprints.building_id) == 2
-    assert parse_team(team_file(), source="a")[0].commit == 2
+    assert parse_team(team_file(), source="a").commit == 2
     assert load_curriculum(file_of(CURRICULUM, "curriculum.yaml")).n_scenarios == 6
     assert FOLDER.name
 

@@ -14,7 +14,7 @@ import pytest
 from fireworld_recorder.reader import open_log
 from fireworld_recorder.writer import LogWriter
 
-from fireworld.policy.team import Team, save_team
+from fireworld.policy.teams.table_team import TableTeam
 from fireworld.policy.words import N_STATES
 from fireworld.recording.golden import check as goldens
 from fireworld.recording.golden.check import find_goldens, store_text, text_path
@@ -260,12 +260,12 @@ def test_settings_are_kept_and_told(here, golden):
 
 def test_a_team_file_is_found_from_the_golden(here, golden, monkeypatch):
     tables = np.random.default_rng(1).random((2, N_STATES, 4))
-    save_team(Team(tables=tables, visits=np.zeros(tables.shape, dtype=np.int64)), here / "team.npz")
+    TableTeam(tables=tables, visits=np.zeros(tables.shape, dtype=np.int64)).save(here / "team.npz")
     assert golden("add", "quick", "--policy", "team.npz", "--steps", 4, "--dir", "kept").code == 0
     (here / "elsewhere").mkdir()
     monkeypatch.chdir(here / "elsewhere")
     assert golden("check", here / "kept").code == 0
-    save_team(Team(tables=-tables, visits=np.zeros(tables.shape, dtype=np.int64)), here / "team.npz", force=True)
+    TableTeam(tables=-tables, visits=np.zeros(tables.shape, dtype=np.int64)).save(here / "team.npz", force=True)
     done = golden("check", here / "kept")
     assert done.code == 1
     assert "quick-team: step 1, choose: brigade 0 " in done.out

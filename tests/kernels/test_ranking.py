@@ -18,7 +18,7 @@ from fireworld.kernels.ranking import (
 )
 from fireworld.parameters import PAPER
 from fireworld.policy.protocol import Action
-from fireworld.policy.ranking import OF_BUILDING, WEIGHTS
+from fireworld.policy.teams.ranking_words import OF_BUILDING, WEIGHTS
 from fireworld.records import ACTION_NAMES, ACTIONS
 from tests.kernels.small import METRE, burn, make_city, make_world, square
 

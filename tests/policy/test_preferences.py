@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from fireworld.errors import TrainingError
-from fireworld.policy.preferences import WORDS, by_size, compare_rankings, counted, preferences, sentences
-from fireworld.policy.ranking import WEIGHTS, Ranking
+from fireworld.policy.teams.ranking_team import RankingTeam
+from fireworld.policy.teams.ranking_words import WEIGHTS
+from fireworld.policy.teams.team import compare_teams
 from fireworld.records import ACTIONS
 
 NAMES = [weight.name for weight in WEIGHTS]
@@ -19,12 +20,11 @@ def make_ranking(*rows, own_targets=True):
     for row, named in enumerate(rows):
         for name, weight in named.items():
             weights[row, NAMES.index(name)] = weight
-    return Ranking(weights, own_targets)
+    return RankingTeam(weights, own_targets)
 
 
 def test_every_weight_has_words_for_both_signs():
-    assert list(WORDS) == NAMES
-    words = [text for both in WORDS.values() for text in both]
+    words = [text for weight in WEIGHTS for text in (weight.more, weight.less)]
     assert len(set(words)) == 2 * len(NAMES)
 
 
@@ -39,7 +39,7 @@ def test_every_weight_has_words_for_both_signs():
 )
 def test_the_sign_says_which_way(name, more, less):
     for value, words in ((0.3, more), (-0.3, less)):
-        assert list(sentences(make_ranking({name: value}), row=0)) == [f"above all: {words}"]
+        assert list(make_ranking({name: value}).sentences(row=0)) == [f"above all: {words}"]
 
 
 def test_the_size_says_how_much():
@@ -55,7 +55,7 @@ def test_the_size_says_how_much():
             "others_near": -0.099,
         }
     )
-    assert list(sentences(ranking, row=0)) == [
+    assert list(ranking.sentences(row=0)) == [
         "above all: prefers hotter buildings, prefers smaller buildings",
         "also: prefers what has much fuel left, stays with its target",
         (
@@ -63,41 +63,41 @@ def test_the_size_says_how_much():
             "prefers what it can spray at once"
         ),
     ]
-    told = [(one.weight.name, one.strength) for one in preferences(ranking, row=0)]
+    told = [(one.weight.name, one.strength) for one in ranking.preferences(row=0)]
     assert told[-1] == ("others_near", ""), "hardly counts"
     assert len(told) == 8, "weights of 0 say nothing"
 
 
 def test_size_is_measured_within_a_row():
     ranking = make_ranking({"volume": 100.0, "mine": 1.0}, {"mine": 0.01, "volume": -0.01})
-    assert list(sentences(ranking, row=0)) == ["above all: prefers larger buildings"]
-    assert list(sentences(ranking, row=1)) == ["above all: prefers smaller buildings, stays with its target"]
-    assert [weight.name for weight in by_size(ranking)][:2] == ["volume", "mine"]
+    assert list(ranking.sentences(row=0)) == ["above all: prefers larger buildings"]
+    assert list(ranking.sentences(row=1)) == ["above all: prefers smaller buildings, stays with its target"]
+    assert [weight.name for weight, _ in ranking.by_size][:2] == ["volume", "mine"]
 
 
 def test_weights_of_actions_count_where_actions_are_chosen_among():
     rows = {"easiest": 2.0, "nearest-to-me": -1.5, "mine": 1.0}
     named, own = (make_ranking(rows, own_targets=own) for own in (False, True))
-    assert next(sentences(named, row=0)) == (
+    assert next(named.sentences(row=0)) == (
         "above all: prefers what easiest names, avoids what nearest-to-me names, stays with its target"
     )
-    assert list(sentences(own, row=0)) == ["above all: stays with its target"]
-    assert [weight.name for weight in counted(own)] == NAMES[:13]
-    assert not {weight.name for weight in by_size(own)} & set(ACTIONS)
-    assert len(by_size(named)) == 17
+    assert list(own.sentences(row=0)) == ["above all: stays with its target"]
+    assert [weight.name for weight in own.counted] == NAMES[:13]
+    assert not {weight.name for weight, _ in own.by_size} & set(ACTIONS)
+    assert len(named.by_size) == 17
 
 
 def test_nothing_is_preferred():
-    (sentence,) = sentences(make_ranking({}), row=0)
+    (sentence,) = make_ranking({}).sentences(row=0)
     assert sentence == "all weights are 0: every target is worth the same, and the first one is taken"
-    assert preferences(make_ranking({"easiest": 3.0}), row=0) == []
+    assert make_ranking({"easiest": 3.0}).preferences(row=0) == []
 
 
 def test_where_two_rankings_differ():
     a = make_ranking({"volume": 1.0, "mine": 2.0}, {"fuel_left": 1.0})
     b = make_ranking({"volume": 1.5, "mine": -2.0}, {"fuel_left": 1.0, "easiest": 1e-12})
-    assert compare_rankings(a, a).same
-    found = compare_rankings(a, b)
+    assert compare_teams(a, a).same
+    found = compare_teams(a, b)
     assert not found.same
     assert [(one.row, one.name, one.a, one.b) for one in found.changed] == [
         (0, "mine", 2.0, -2.0),
@@ -107,10 +107,10 @@ def test_where_two_rankings_differ():
 
 
 def test_what_is_ranked_is_a_difference():
-    found = compare_rankings(make_ranking({"mine": 1.0}), make_ranking({"mine": 1.0}, own_targets=False))
+    found = compare_teams(make_ranking({"mine": 1.0}), make_ranking({"mine": 1.0}, own_targets=False))
     assert (found.changed, found.own_targets, found.same) == ((), (True, False), False)
 
 
 def test_other_rows_cannot_be_compared():
     with pytest.raises(TrainingError, match=r"^B: weights: expected as many rows as in A, 1, got 2 of them$"):
-        compare_rankings(make_ranking({}), make_ranking({}, {}))
+        compare_teams(make_ranking({}), make_ranking({}, {}))

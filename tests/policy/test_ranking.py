@@ -13,7 +13,8 @@ from fireworld.kernels.ranking import N_TARGET_FEATURES, N_WEIGHTS
 from fireworld.policy.kernel import from_rankings
 from fireworld.policy.names import load_policy
 from fireworld.policy.protocol import Action, Decision
-from fireworld.policy.ranking import WEIGHTS, Ranking, save_ranking
+from fireworld.policy.teams.ranking_team import RankingTeam
+from fireworld.policy.teams.ranking_words import WEIGHTS
 from fireworld.recording.replay import RecordedPolicy
 from fireworld.records import MemoryRecording
 from fireworld.simulation.observer import Observer
@@ -26,7 +27,7 @@ NAMES = [weight.name for weight in WEIGHTS]
 
 def make_ranking(n_rows=2, *, own_targets=True, **provenance):
     weights = np.random.default_rng(8).normal(size=(n_rows, N_WEIGHTS))
-    return Ranking(weights, own_targets, provenance)
+    return RankingTeam(weights, own_targets, provenance)
 
 
 @pytest.mark.parametrize(("own_targets", "kind"), [(False, RANK_NAMED), (True, RANK_ALL)])
@@ -100,9 +101,9 @@ def test_the_digest_tells_rankings_apart():
     other[1, 16] += 1e-12
     policies = [from_rankings(rows, own_targets=own) for rows in (weights, other, weights[:1]) for own in (True, False)]
     assert len({policy.digest for policy in policies}) == 6
-    rankings = [Ranking(rows, own) for rows in (weights, other, weights[:1]) for own in (True, False)]
+    rankings = [RankingTeam(rows, own) for rows in (weights, other, weights[:1]) for own in (True, False)]
     assert len({ranking.digest for ranking in rankings}) == 6
-    assert Ranking(weights.copy(), True, {"seed": 5}).digest == rankings[0].digest, "of what is followed alone"
+    assert RankingTeam(weights.copy(), True, {"seed": 5}).digest == rankings[0].digest, "of what is followed alone"
     assert rankings[0].policy().digest == policies[0].digest
 
 
@@ -111,7 +112,7 @@ def here(tmp_path, monkeypatch):
     """The current folder, with a file of each kind of ranking."""
     monkeypatch.chdir(tmp_path)
     for name, own_targets in (("all.npz", True), ("named.npz", False)):
-        save_ranking(make_ranking(own_targets=own_targets), tmp_path / name)
+        make_ranking(own_targets=own_targets).save(tmp_path / name)
     return tmp_path
 
 
@@ -138,7 +139,7 @@ def test_a_recording_of_a_ranking_is_replayed_from_itself(here, fireworld, name)
 def test_other_weights_are_another_run(here, fireworld):  # noqa: F811 - the fixture
     changed = make_ranking()
     changed.weights[0, 0] -= 3.0
-    save_ranking(changed, here / "other.npz")
+    changed.save(here / "other.npz")
     digests = [
         json.loads(fireworld("run", "quick", "--policy", name, "--json").out)["digest"]
         for name in ("all.npz", "other.npz", "all.npz")

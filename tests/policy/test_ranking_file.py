@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from fireworld.errors import TrainingError
-from fireworld.policy.files import load_team_file, parse_team_file
 from fireworld.policy.names import load_policy, note_on_team
-from fireworld.policy.ranking import FORMAT, parse_ranking, save_ranking
-from fireworld.policy.team import Team, save_team
+from fireworld.policy.teams.table_team import TableTeam
+from fireworld.policy.teams.team import FORMAT, load_team, parse_team, read_team, write_team
 from tests.policy.test_ranking import NAMES, make_ranking
 
 
@@ -19,9 +18,9 @@ from tests.policy.test_ranking import NAMES, make_ranking
 def test_written_and_read_again(tmp_path, own_targets):
     ranking = make_ranking(own_targets=own_targets, seed=4, method={"name": "search"})
     for name in ("a.npz", "b.npz"):
-        save_ranking(ranking, tmp_path / name)
+        ranking.save(tmp_path / name)
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
-    read = load_team_file(tmp_path / "a.npz")
+    read = load_team(tmp_path / "a.npz")
     np.testing.assert_array_equal(read.weights, ranking.weights)
     assert read.weights.dtype == np.float64
     assert (read.own_targets, read.digest, read.provenance) == (
@@ -35,33 +34,37 @@ def test_written_and_read_again(tmp_path, own_targets):
 
 
 def test_it_may_hold_more_arrays(tmp_path):
-    save_ranking(make_ranking(), tmp_path / "a.npz", extra={"spread": np.ones(17)})
-    ranking, more = parse_ranking((tmp_path / "a.npz").read_bytes(), source="a")
+    write_team(make_ranking(), tmp_path / "a.npz", extra={"spread": np.ones(17)})
+    ranking, more = read_team(tmp_path / "a.npz")
     assert list(more) == ["spread"]
     assert ranking.digest == make_ranking().digest
 
 
 def test_it_is_a_policy_by_its_path(tmp_path):
     path = tmp_path / "mine.npz"
-    save_ranking(make_ranking(3), path)
+    make_ranking(3).save(path)
     named = load_policy(str(path))
     assert (named.name, named.trained_choices) == ("mine.npz", "")
     assert named.attachments == {"policy.npz": path.read_bytes()}
     assert named.digest == make_ranking(3).policy().digest
     assert note_on_team(named, 3) == ""
     assert "mine.npz: 3 " in note_on_team(named, 4)
-    save_ranking(make_ranking(1), path, force=True)
+    make_ranking(1).save(path, force=True)
     assert note_on_team(load_policy(str(path)), 4) == "", "one row is for all"
 
 
 def test_team_files_of_tables_are_read_too(tmp_path):
-    save_team(Team(np.zeros((1, 270, 4)), np.zeros((1, 270, 4), dtype=np.int64)), tmp_path / "a.npz")
-    assert isinstance(load_team_file(tmp_path / "a.npz"), Team)
+    TableTeam(np.zeros((1, 270, 4)), np.zeros((1, 270, 4), dtype=np.int64)).save(tmp_path / "a.npz")
+    assert isinstance(load_team(tmp_path / "a.npz"), TableTeam)
+
+
+OLD_FORMAT = "fireworld-ranking/1"
 
 
 def write(path, *, weights=None, left_out=(), **header):
     """Write the file of a ranking with something else in it."""
-    told = {"format": FORMAT, "weights": NAMES, "own_targets": True, **header}
+    new = {"format": FORMAT, "kind": "ranking", "provenance": {}}
+    told = {**new, "weights": NAMES, "own_targets": True, **header}
     told = {key: value for key, value in told.items() if key not in left_out}
     arrays = {
         "header": np.frombuffer(json.dumps(told).encode(), dtype=np.uint8),
@@ -99,11 +102,11 @@ SHAPE = r"weights: expected float64 weights of shape \(brigades, 17\), got "
         ({"left_out": ("array header",)}, "expected a team file, got no header in it$"),
     ],
 )
-def test_what_is_wrong_with_a_file(tmp_path, changes, message):
-    write(tmp_path / "bad.npz", **changes)
+@pytest.mark.parametrize("form", [FORMAT, OLD_FORMAT])
+def test_what_is_wrong_with_a_file(tmp_path, form, changes, message):
+    write(tmp_path / "bad.npz", **{"format": form, **changes})
     for read in (
-        lambda: parse_team_file((tmp_path / "bad.npz").read_bytes(), source="bad"),
-        lambda: parse_ranking((tmp_path / "bad.npz").read_bytes(), source="bad"),
+        lambda: parse_team((tmp_path / "bad.npz").read_bytes(), source="bad"),
         lambda: load_policy(str(tmp_path / "bad.npz")),
     ):
         with pytest.raises(TrainingError, match=message) as caught:
@@ -114,33 +117,33 @@ def test_what_is_wrong_with_a_file(tmp_path, changes, message):
 
 def test_a_file_of_a_later_format(tmp_path):
     write(tmp_path / "bad.npz", format="fireworld-ranking/2")
-    message = r"^bad: format: expected fireworld-ranking/1, got 'fireworld-ranking/2'; made by a later fireworld\?$"
+    message = r"^bad: format: expected fireworld-team/2, got 'fireworld-ranking/2'; made by a later fireworld\?$"
     with pytest.raises(TrainingError, match=message):
-        parse_ranking((tmp_path / "bad.npz").read_bytes(), source="bad")
+        parse_team((tmp_path / "bad.npz").read_bytes(), source="bad")
     with pytest.raises(TrainingError, match="got 'fireworld-ranking/2'"):
         load_policy(str(tmp_path / "bad.npz"))
 
 
 @pytest.mark.parametrize("names", [NAMES[:-1], NAMES[::-1], [*NAMES, "smell"], "temperature", {"temperature": 1}])
 def test_weights_of_something_else_are_refused(tmp_path, names):
-    told = {"format": FORMAT, "weights": names, "own_targets": True}
+    told = {"format": OLD_FORMAT, "weights": names, "own_targets": True}
     header = np.frombuffer(json.dumps(told).encode(), dtype=np.uint8)
     np.savez(tmp_path / "bad.npz", header=header, array=0, weights=make_ranking().weights)
     with pytest.raises(TrainingError, match=r"bad\.npz: weights: expected temperature, volume, fuel_left, "):
-        load_team_file(tmp_path / "bad.npz")
+        load_team(tmp_path / "bad.npz")
 
 
 def test_damaged_files(tmp_path):
-    save_ranking(make_ranking(), tmp_path / "a.npz")
+    make_ranking().save(tmp_path / "a.npz")
     good = (tmp_path / "a.npz").read_bytes()
     with pytest.raises(TrainingError, match=r"a: expected a team file \(.npz\), got BadZipFile"):
-        parse_team_file(good[: len(good) // 2], source="a")
+        parse_team(good[: len(good) // 2], source="a")
     n_refused = 0
     for place in range(40, len(good) - 40, 23):
         bad = bytearray(good)
         bad[place] ^= 0x5A
         try:
-            read = parse_team_file(bytes(bad), source="a")
+            read = parse_team(bytes(bad), source="a")
         except TrainingError:
             n_refused += 1
         else:

@@ -6,8 +6,7 @@ import pytest
 
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import load_curriculum
-from fireworld.training.method import Method
-from fireworld.training.trainer import Trainer
+from fireworld.training.methods.sarsa import Sarsa
 from tests.cli.conftest import fireworld  # noqa: F401 - the fixture that calls the command line
 
 TINY = """
@@ -23,7 +22,7 @@ stages:
     set: {brigades.n: 3, steps: 14}
     vary: {"fires.0.n_buildings": [2, 4]}
 """
-SHORT = Method(n_episodes_max=6, n_episodes_unchanged=3)
+SHORT = Sarsa(n_episodes_max=6, n_episodes_unchanged=3)
 SHORT_WORDS = ("--set", "n_episodes_max=6", "--set", "n_episodes_unchanged=3")
 
 
@@ -45,6 +44,6 @@ def make_trainer(curriculum):
     cities = CityCache()
 
     def make(seed=1, method=SHORT, **changes):
-        return Trainer(curriculum, method.with_settings(changes), seed=seed, cities=cities)
+        return method.with_settings(changes).trainer(curriculum, seed=seed, cities=cities)
 
     return make

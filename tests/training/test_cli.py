@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from fireworld_recorder.reader import open_log
 
-from fireworld.policy.team import FORMAT, load_team
-from fireworld.training.trainer import Trainer
+from fireworld.errors import OutputError
+from fireworld.policy.teams.team import load_team, write_team
+from fireworld.training.methods.sarsa import SarsaTrainer
 from tests.training.conftest import SHORT_WORDS
 
 TRAIN = ("train", "tiny.yaml", *SHORT_WORDS, "-o")
@@ -50,7 +51,7 @@ def test_repetitions_and_stages(here, fireworld, files):
 
 
 def test_ctrl_c_and_resume(here, fireworld, files, monkeypatch):
-    whole, run_episode, n_left = fireworld(*TRAIN, "whole.npz"), Trainer._run_episode, [5]
+    whole, run_episode, n_left = fireworld(*TRAIN, "whole.npz"), SarsaTrainer._run_episode, [5]
 
     def interrupted(*arguments):
         n_left[0] -= 1
@@ -60,11 +61,11 @@ def test_ctrl_c_and_resume(here, fireworld, files, monkeypatch):
         return run_episode(*arguments)
 
     monkeypatch.setattr(signal, "getsignal", lambda _: signal.default_int_handler)
-    monkeypatch.setattr(Trainer, "_run_episode", interrupted)
+    monkeypatch.setattr(SarsaTrainer, "_run_episode", interrupted)
     done = fireworld(*TRAIN, "t.npz")
     assert done.code == 130
     assert done.out == ""
-    assert "t.npz.checkpoint is kept: go on with --resume" in done.err
+    assert "; continue from t.npz.checkpoint with --resume" in done.err
     assert files() == ["t.npz.checkpoint", "whole.npz"]
     again = fireworld(*TRAIN, "t.npz")
     assert again.code == 2
@@ -89,13 +90,16 @@ def test_ctrl_c_and_resume(here, fireworld, files, monkeypatch):
             (*TRAIN, "t.npz", "--stages", "al"),
             "fireworld: --stages: expected stages of tiny: alone, together, got 'al'",
         ),
-        ((*TRAIN, "t.npz", "--resume"), "fireworld: --resume: expected a checkpoint to go on from"),
+        ((*TRAIN, "t.npz", "--resume"), "fireworld: --resume: expected a checkpoint to continue from"),
         ((*TRAIN, "no/t.npz"), "fireworld: no/t.npz: expected an existing folder"),
         ((*TRAIN, "t.npz", "--log", "no/l.csv"), "fireworld: no/l.csv: expected an existing folder"),
-        ((*TRAIN, "t.npy"), "Error: -o: expected a name that ends in .npz, got 't.npy'."),
-        ((*TRAIN, "t.npz", "--log", "t.npz"), "Error: -o and --log name the same file."),
-        ((*TRAIN, "t.npz", "--force", "--resume"), "Error: --force and --resume exclude each other."),
-        ((*TRAIN, "t.npz", "--seed", 2**32 - 1, "--repetitions", 2), "Error: --repetitions: expected seeds up to"),
+        ((*TRAIN, "t.npy"), "fireworld: t.npy: expected a file ending in .npz, got '.npy'"),
+        (
+            (*TRAIN, "t.npz", "--log", "t.npz"),
+            "fireworld: t.npz: expected a file of its own for every input and output, got one name twice",
+        ),
+        ((*TRAIN, "t.npz", "--force", "--resume"), "fireworld: --force and --resume exclude each other"),
+        ((*TRAIN, "t.npz", "--seed", 2**32 - 1, "--repetitions", 2), "fireworld: --repetitions: expected seeds up to"),
         (("policy", "show", "absent.npz"), "fireworld: absent.npz: expected a team file, got No such file"),
         (("run", "quick", "--policy", "absent.npz"), "fireworld: absent.npz: expected a team file, got No such file"),
         (("run", "quick", "--policy", "bad.npz"), "fireworld: bad.npz: expected a team file (.npz), got BadZipFile"),
@@ -139,12 +143,11 @@ def test_policy_show_and_diff(here, fireworld):
 def test_a_full_disk_keeps_the_checkpoint(here, fireworld, files, monkeypatch):
     assert fireworld(*TRAIN, "whole.npz").code == 0
     with monkeypatch.context() as changed:
-        changed.setattr("fireworld.training.teams.save_team", _failing("t.npz"))
+        changed.setattr("fireworld.training.training.write_team", _failing("t.npz"))
         done = fireworld(*TRAIN, "t.npz")
     assert (done.code, done.out) == (2, "")
     assert done.err.splitlines()[-1] == (
-        "fireworld: t.npz: cannot be written: No space left on device; "
-        "t.npz.checkpoint of this training is kept: go on with --resume"
+        "fireworld: t.npz: cannot be written: No space left on device; continue from t.npz.checkpoint with --resume"
     )
     assert files() == ["t.npz.checkpoint", "whole.npz"]
     assert fireworld(*TRAIN, "t.npz", "--resume").code == 0
@@ -153,18 +156,16 @@ def test_a_full_disk_keeps_the_checkpoint(here, fireworld, files, monkeypatch):
 
 def _failing(name):
     """Return a writer that finds no space left for one file."""
-    from fireworld.errors import OutputError
-    from fireworld.policy.team import save_team
 
     def save(team, path, **more):
         if path.name == name:
             raise OutputError(f"{path}: cannot be written: No space left on device")
-        save_team(team, path, **more)
+        write_team(team, path, **more)
 
     return save
 
 
-def write_team(path, *, form=FORMAT, shape=(2, 270, 4), nan_at=None, **provenance):
+def write_old_team(path, *, form="fireworld-team/1", shape=(2, 270, 4), nan_at=None, **provenance):
     tables = np.zeros(shape)
     if nan_at is not None:
         tables[nan_at] = np.nan
@@ -176,12 +177,12 @@ def write_team(path, *, form=FORMAT, shape=(2, 270, 4), nan_at=None, **provenanc
     ("changes", "message"),
     [
         ({"shape": (2, 5040, 4)}, "tables: expected float64 tables of shape (brigades, 4320 or 270, 4), got "),
-        ({"form": "fireworld-team/9"}, "format: expected fireworld-team/1, got 'fireworld-team/9'"),
+        ({"form": "fireworld-team/9"}, "format: expected fireworld-team/2, got 'fireworld-team/9'"),
         ({"nan_at": (1, 17, 2)}, "tables[1, 17, 2]: expected a finite number, got nan"),
     ],
 )
 def test_team_files_that_cannot_be_followed(here, fireworld, files, changes, message):
-    write_team(here / "bad.npz", **changes)
+    write_old_team(here / "bad.npz", **changes)
     content = (here / "bad.npz").read_bytes()
     for words in (
         ("run", "quick", "--policy", "bad.npz", "--record", "a.mcap"),
@@ -234,7 +235,7 @@ def test_a_curriculum_of_what_is_not_there(here, fireworld, files, stage, messag
     ],
 )
 def test_a_team_trained_with_other_choices(here, fireworld, trained, run, note):
-    write_team(here / "t.npz", method={"choices": trained})
+    write_old_team(here / "t.npz", method={"choices": trained})
     done = fireworld("run", "quick", "--steps", 3, "--policy", "t.npz", "--set", f"choices={run}", "--json")
     assert done.code == 0
     assert done.err == (note and f"t.npz: trained with choices {trained}, run with choices {run}{note}")

@@ -9,14 +9,14 @@ import pytest
 
 from fireworld.errors import PolicyError, TrainingError
 from fireworld.kernels.observation import state_index
-from fireworld.policy.inspection import agreement, choice, compare, summarize
-from fireworld.policy.team import Team
+from fireworld.policy.teams.table_team import TableTeam
+from fireworld.policy.teams.team import compare_teams
 from fireworld.policy.words import FEATURES, RADIX, describe_state, features_of, find_states, short_state, state_of
 
 
 def make_team(values=(), visits=(), *, n_tables=1, n_states=4320, commit=1):
     """Return a team of zeros, but for these (table, row): four values, and these visits."""
-    team = Team(
+    team = TableTeam(
         np.zeros((n_tables, n_states, 4)),
         np.zeros((n_tables, n_states, 4), dtype=np.int64),
         {"method": {"commit": commit}},
@@ -94,7 +94,7 @@ def test_a_state_that_is_none(text, message):
     ],
 )
 def test_what_a_team_does_and_why(values, visits, action, why):
-    one = choice(make_team({(0, 9): values}, {(0, 9): visits}), table=0, state=9)
+    one = make_team({(0, 9): values}, {(0, 9): visits}).choice(table=0, state=9)
     assert one.action == action
     assert one.why.startswith(why)
     assert one.visited == any(visits)
@@ -102,9 +102,9 @@ def test_what_a_team_does_and_why(values, visits, action, why):
 
 def test_a_table_of_270_states_does_not_tell_what_others_do():
     team = make_team({(0, 3): (0, 0, 1, 0)}, n_states=270)
-    ones = [choice(team, table=0, state=state) for state in (48, 55, 63)]
+    ones = [team.choice(table=0, state=state) for state in (48, 55, 63)]
     assert {(one.state, one.action) for one in ones} == {(48, 2)}
-    assert choice(team, table=0, state=64).action == 0
+    assert team.choice(table=0, state=64).action == 0
 
 
 def test_a_summary():
@@ -116,39 +116,39 @@ def test_a_summary():
         (1, 2): (3, 0, 0, 0),
     }
     team = make_team(values, dict.fromkeys([*values][:2] + [*values][3:], (1, 0, 0, 0)), n_tables=2)
-    first, second = summarize(team)
+    first, second = team.summaries()
     assert (first.n_visited, first.n_by_action) == (2, (0, 2, 0, 0))
     assert (second.n_visited, second.n_by_action) == (2, (1, 1, 0, 0))
-    assert agreement(team) == (1, 2)
+    assert team.agreement() == (1, 2)
 
 
 def test_where_two_teams_differ():
     state = state_of((3, 0, 0, 2, 0, 0, 0, 0))
     a = make_team({(1, state): (1, 0, 0, 0), (0, 5): (1, 0, 0, 0)}, n_tables=2)
     b = make_team({(1, state): (0, 0, 1, 0), (0, 5): (2, 0, 0, 0)}, n_tables=2)
-    assert compare(a, a).same
-    found = compare(a, b)
+    assert compare_teams(a, a).same
+    found = compare_teams(a, b)
     assert (found.same, found.same_actions, found.n_values_only) == (False, False, 1)
     ((one, other),) = found.changed
     assert (one.table, one.state, one.action, other.action) == (1, state, 0, 2)
     counts = dict(found.by_feature())
     assert counts["free_edges"] == {"0": 0, "1": 0, "2": 0, "3": 1, "4": 0}
     assert counts["volume"]["medium"] == 1
-    values_only = compare(a, make_team({(1, state): (1, 0, 0, 0), (0, 5): (2, 0, 0, 0)}, n_tables=2))
+    values_only = compare_teams(a, make_team({(1, state): (1, 0, 0, 0), (0, 5): (2, 0, 0, 0)}, n_tables=2))
     assert values_only.same_actions
     assert not values_only.same
 
 
 def test_how_long_choices_are_kept_is_a_difference():
-    assert not compare(make_team(), make_team(commit=2)).same_actions
+    assert not compare_teams(make_team(), make_team(commit=2)).same_actions
 
 
 @pytest.mark.parametrize("other", [{"n_states": 270}, {"n_tables": 2}])
 def test_what_cannot_be_compared(other):
     with pytest.raises(TrainingError, match="B: tables: expected 1 of 4320 states, as in A, got "):
-        compare(make_team(), make_team(**other))
+        compare_teams(make_team(), make_team(**other))
 
 
 def test_choices_are_frozen():
     with pytest.raises(dataclasses.FrozenInstanceError):
-        choice(make_team(), table=0, state=0).action = 3
+        make_team().choice(table=0, state=0).action = 3

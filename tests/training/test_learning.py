@@ -11,7 +11,7 @@ from fireworld.policy.kernel import from_tables
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import build_scenario
 from fireworld.simulation.state import fresh_learner
-from fireworld.training.method import RULES
+from fireworld.training.methods.sarsa import RULES
 
 ALPHA, GAMMA = 0.5, 0.5
 

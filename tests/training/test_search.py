@@ -1,4 +1,4 @@
-"""Searching the weights of a ranking: the same for any number of threads, stopped and gone on with, and worth it."""
+"""Searching the weights of a ranking: the same for any number of threads, stopped and resumed, and worth it."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from fireworld.errors import TrainingError
+from fireworld.executors import threads
 from fireworld.kernels.ranking import N_OF_TEAM, N_TARGET_FEATURES, N_WEIGHTS
 from fireworld.policy.kernel import from_rankings
-from fireworld.policy.ranking import WEIGHTS
+from fireworld.policy.teams.ranking_words import WEIGHTS
 from fireworld.simulation.built import CityCache, build_scenario
 from fireworld.training.curriculum import load_curriculum
-from fireworld.training.search import Search, Searcher
+from fireworld.training.methods.search import Search, SearchTrainer
 
 FIRES = """
 stages:
@@ -42,28 +43,28 @@ def fires(tmp_path_factory):
 def make(fires):
     cities = CityCache()
 
-    def make(*, seed=1, **figures):
-        return Searcher(fires, Search(**{**SHORT, **figures}), seed=seed, cities=cities)
+    def make(*, seed=1, **changes):
+        return SearchTrainer(fires, Search(**{**SHORT, **changes}), seed=seed, cities=cities)
 
     return make
 
 
 def found(searcher, *, n_threads=1):
     """Search to the end; return the weights."""
-    reports = list(searcher.run(n_threads=n_threads, stop=Event()))
-    assert [report.generation for report in reports] == list(range(searcher.search.n_generations))
-    return searcher.ranking().weights
+    reports = list(searcher.run(threads(n_threads)))
+    assert [report.generation for report in reports] == list(range(searcher.method.n_generations))
+    return searcher.team().weights
 
 
 def test_the_same_weights_whatever_the_number_of_threads(make):
     one, three = (make(), make())
-    reports = [list(searcher.run(n_threads=n, stop=Event())) for searcher, n in ((one, 1), (three, 3))]
+    reports = [list(searcher.run(threads(n))) for searcher, n in ((one, 1), (three, 3))]
     assert reports[0] == reports[1]
-    assert one.ranking().weights.tobytes() == three.ranking().weights.tobytes()
-    assert one.state.spread.tobytes() == three.state.spread.tobytes()
+    assert one.team().weights.tobytes() == three.team().weights.tobytes()
+    assert one.progress.spread.tobytes() == three.progress.spread.tobytes()
 
 
-def test_other_seeds_and_figures_other_weights(make):
+def test_other_seeds_and_hyperparameters_other_weights(make):
     variants = ({}, {"seed": 2}, {"n_fires": 1}, {"n_steps_max": 20}, {"step": 0.5}, {"spread": 2.0}, {"n_best": 3})
     assert len({found(make(**variant)).tobytes() for variant in variants}) == len(variants)
 
@@ -84,32 +85,32 @@ class SetAfter(Event):
 
 @pytest.mark.parametrize("n_threads", [1, 2])
 @pytest.mark.parametrize(("n_looks", "n_done"), [(1, 0), (6, 0), (12, 0), (14, 1), (25, 1), (30, 2)])
-def test_stopped_within_a_generation_and_gone_on_with(make, n_looks, n_done, n_threads):
+def test_stopped_within_a_generation_and_resumed(make, n_looks, n_done, n_threads):
     """A generation is 6 x 2 fights, 13 looks: one that was left off is as if it had not begun."""
     whole, searcher = make(), make()
-    reports = list(whole.run(n_threads=1, stop=Event()))
-    first = list(searcher.run(n_threads=n_threads, stop=SetAfter(n_looks)))
+    reports = list(whole.run(threads(1)))
+    first = list(searcher.run(threads(n_threads, stop=SetAfter(n_looks))))
     assert first == reports[:n_done]
-    assert searcher.state.generation == n_done
+    assert searcher.progress.generation == n_done
     if not n_done:
-        assert not searcher.ranking().weights.any()
-    assert list(searcher.run(n_threads=n_threads, stop=Event())) == reports[n_done:]
+        assert not searcher.team().weights.any()
+    assert list(searcher.run(threads(n_threads))) == reports[n_done:]
     assert searcher.done
-    assert searcher.ranking().weights.tobytes() == whole.ranking().weights.tobytes()
-    assert list(searcher.run(n_threads=1, stop=Event())) == [], "it is done"
+    assert searcher.team().weights.tobytes() == whole.team().weights.tobytes()
+    assert list(searcher.run(threads(1))) == [], "it is done"
 
 
 def test_stopped_at_once_nothing_is_found(make):
     stop = Event()
     stop.set()
     searcher = make()
-    assert list(searcher.run(n_threads=2, stop=stop)) == []
-    assert not searcher.ranking().weights.any()
-    assert searcher.ranking().provenance["generations_done"] == 0
+    assert list(searcher.run(threads(2, stop=stop))) == []
+    assert not searcher.team().weights.any()
+    assert searcher.team().provenance["generations_done"] == 0
 
 
 @pytest.mark.parametrize(
-    ("figures", "at_zero"),
+    ("changes", "at_zero"),
     [
         ({}, ACTIONS),
         ({"own_targets": False}, [False] * N_WEIGHTS),
@@ -117,27 +118,27 @@ def test_stopped_at_once_nothing_is_found(make):
         ({"cooperation": False, "own_targets": False}, TEAM),
     ],
 )
-def test_what_is_not_searched_for_stays_zero(make, figures, at_zero):
+def test_what_is_not_searched_for_stays_zero(make, changes, at_zero):
     assert sum(TEAM) == N_OF_TEAM
-    searcher = make(**figures)
+    searcher = make(**changes)
     weights = found(searcher)
     assert weights.shape == (1, N_WEIGHTS)
     assert (weights[0] == 0.0).tolist() == at_zero
-    assert (searcher.state.spread == 0.0).tolist() == at_zero
-    assert searcher.ranking().own_targets == figures.get("own_targets", True)
+    assert (searcher.progress.spread == 0.0).tolist() == at_zero
+    assert searcher.team().own_targets == changes.get("own_targets", True)
 
 
 def test_what_a_ranking_tells_of_its_origin(make, fires):
     searcher = make(seed=7)
     found(searcher)
-    told = searcher.ranking().provenance
+    told = searcher.team().provenance
     assert (told["seed"], told["generations_done"]) == (7, 3)
     assert told["curriculum"] == {"name": "fires", "digest": fires.digest}
     assert told["method"] == {"name": "search", **Search(**SHORT).as_dict()}
 
 
 def share_of_score(weights, fires, *, seeds=range(50, 58)):
-    """The mean score of a ranking, as a share of the maximum, with luck that nobody searched with."""
+    """The mean score of a ranking, as a share of the maximum, with random draws that nobody searched with."""
     shares = []
     for scenario in fires.stages[0].scenarios:
         built = build_scenario(scenario.with_settings({"steps": "40"}))
@@ -149,14 +150,14 @@ def share_of_score(weights, fires, *, seeds=range(50, 58)):
 
 
 def test_searching_is_worth_it(make, fires):
-    """Weights of zero go for the lowest id, and lose a quarter; those found lose next to nothing, on other luck too."""
+    """Weights of zero go for the lowest id, and lose a quarter; those found lose next to nothing, with new draws."""
     searcher = make(n_generations=4, n_candidates=12, n_best=3, n_fires=3, n_steps_max=40)
-    reports = list(searcher.run(n_threads=2, stop=Event()))
+    reports = list(searcher.run(threads(2)))
     assert reports[-1].score_mean > reports[0].score_mean + 0.1
     assert reports[-1].spread < reports[0].spread
     assert all(report.score_best >= report.score_mean for report in reports)
     assert share_of_score(np.zeros((1, N_WEIGHTS)), fires) < 0.8
-    assert share_of_score(searcher.ranking().weights, fires) > 0.95
+    assert share_of_score(searcher.team().weights, fires) > 0.95
 
 
 def test_one_generation_by_hand(make, monkeypatch):
@@ -169,15 +170,15 @@ def test_one_generation_by_hand(make, monkeypatch):
         return weights[3] + fire
 
     monkeypatch.setattr(searcher, "_fight", fight)
-    (report,) = searcher.run(n_threads=1, stop=Event())
+    (report,) = searcher.run(threads(1))
     candidates = np.array(sorted(tried.values(), key=lambda weights: -weights[3]))
     assert candidates.shape == (6, N_WEIGHTS)
     assert len(set(candidates[:, 3])) == 6
     best = candidates[:2]
-    assert searcher.state.mean == pytest.approx(0.5 * best.mean(axis=0))
+    assert searcher.progress.mean == pytest.approx(0.5 * best.mean(axis=0))
     spread = np.maximum(0.5 * 2.0 + 0.5 * best.std(axis=0), 1.1)
     spread[N_TARGET_FEATURES:] = 0.0
-    assert searcher.state.spread == pytest.approx(spread)
+    assert searcher.progress.spread == pytest.approx(spread)
     assert report.spread == pytest.approx(spread[:N_TARGET_FEATURES].mean())
     assert report.score_best - report.score_mean == pytest.approx(best[:, 3].mean() - candidates[:, 3].mean())
 
@@ -197,18 +198,18 @@ class Fires:
 def test_all_candidates_meet_the_same_fires_drawn_anew_and_never_twice(make, monkeypatch):
     searcher = make(n_generations=20, n_candidates=2, n_best=1)
     fought = Fires(searcher, monkeypatch).fought
-    list(searcher.run(n_threads=1, stop=Event()))
+    list(searcher.run(threads(1)))
     generations = [fought[k : k + 4] for k in range(0, 80, 4)]
     assert all(fires[:2] == fires[2:] and fires[0] != fires[1] for fires in generations)
     assert {tuple(sorted(fires[:2])) for fires in generations} == {(0, 1), (0, 2), (1, 2)}
     many = make(n_fires=99, n_generations=1, n_candidates=1, n_best=1)
     fought = Fires(many, monkeypatch).fought
-    list(many.run(n_threads=1, stop=Event()))
+    list(many.run(threads(1)))
     assert sorted(fought) == [0, 1, 2], "no more than there are"
 
 
 @pytest.mark.parametrize(
-    ("figures", "message"),
+    ("changes", "message"),
     [
         ({"n_generations": 0}, "method: n_generations: expected a whole number from 1 to 1000000, got 0"),
         ({"n_candidates": 0}, "method: n_candidates: expected a whole number from 1"),
@@ -224,12 +225,12 @@ def test_all_candidates_meet_the_same_fires_drawn_anew_and_never_twice(make, mon
         ({"spread_least": -0.1}, "method: spread_least: expected a number > 0, got -0.1"),
     ],
 )
-def test_figures_that_make_no_search(figures, message):
+def test_hyperparameters_that_make_no_search(changes, message):
     with pytest.raises(TrainingError, match=f"^{message}"):
-        Search(**figures)
+        Search(**changes)
 
 
-def test_figures_set_by_hand():
+def test_hyperparameters_set_by_hand():
     search = Search().with_settings({"n_fires": "5", "step": "0.25", "own_targets": "false", "cooperation": "true"})
     assert search == Search(n_fires=5, step=0.25, own_targets=False)
 
@@ -246,7 +247,7 @@ def test_figures_set_by_hand():
         ({"n_best": "50"}, "method: n_best: expected at most n_candidates, 48, got 50"),
     ],
 )
-def test_figures_that_cannot_be_set(settings, message):
+def test_hyperparameters_that_cannot_be_set(settings, message):
     with pytest.raises(TrainingError, match=f"^{message}") as caught:
         Search().with_settings(settings)
     assert "\n" not in str(caught.value)

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from threading import Event
-
 import numpy as np
 import pytest
 
 from fireworld.errors import OutputError, TrainingError
-from fireworld.policy.files import load_team_file
+from fireworld.executors import threads
+from fireworld.policy.teams.team import load_team, write_team
 from fireworld.simulation.built import CityCache
+from fireworld.training import training as training_module
 from fireworld.training.curriculum import load_curriculum
-from fireworld.training.search import Search, Searcher
-from fireworld.training.searches import SearchRun
+from fireworld.training.methods.search import Search
+from fireworld.training.training import Training
 
-FIGURES = {"n_generations": 4, "n_candidates": 5, "n_best": 2, "n_fires": 2, "n_steps_max": 12}
-WORDS = ("train", "tiny.yaml", "--method", "search", *(w for k, v in FIGURES.items() for w in ("--set", f"{k}={v}")))
+SETTINGS = {"n_generations": 4, "n_candidates": 5, "n_best": 2, "n_fires": 2, "n_steps_max": 12}
+WORDS = ("train", "tiny.yaml", "--method", "search", *(w for k, v in SETTINGS.items() for w in ("--set", f"{k}={v}")))
 
 
 @pytest.fixture(scope="module")
@@ -25,34 +25,34 @@ def cities():
 
 @pytest.fixture
 def make(here, curriculum, cities):
-    def make(name="team.npz", *, seed=1, force=False, **figures):
-        searcher = Searcher(curriculum, Search(**{**FIGURES, **figures}), seed=seed, cities=cities)
-        return SearchRun(searcher, here / name, force)
+    def make(name="team.npz", *, seed=1, force=False, **changes):
+        trainer = Search(**{**SETTINGS, **changes}).trainer(curriculum, seed=seed, cities=cities)
+        return Training(trainer, here / name, force=force)
 
     return make
 
 
 def carry_out(run, *, until=10):
     """Search, and ask to stop after a number of generations."""
-    stop, seen = Event(), []
+    workers, seen = threads(1), []
 
     def report(_, generation):
         seen.append(generation.generation)
         if len(seen) == until:
-            stop.set()
+            workers.stop.set()
 
-    run.run(stop, n_threads=1, report=report)
+    run.run(workers, [report])
     return seen
 
 
-def test_an_interrupted_search_goes_on_bit_for_bit(make, here):
+def test_an_interrupted_search_continues_bit_for_bit(make, here):
     whole = make("whole.npz")
     whole.begin()
     assert carry_out(whole) == [0, 1, 2, 3]
     first = make()
     first.begin()
     assert carry_out(first, until=2) == [0, 1]
-    assert first.ranking is None
+    assert first.team is None
     assert first.checkpoint.exists()
     assert not first.path.exists()
     second = make()
@@ -65,7 +65,7 @@ def test_an_interrupted_search_goes_on_bit_for_bit(make, here):
     assert carry_out(third) == [], "it is done"
 
 
-def test_nothing_to_go_on_from(make):
+def test_nothing_to_continue_from(make):
     assert not make().resume()
 
 
@@ -84,7 +84,7 @@ def test_a_checkpoint_of_another_search_is_refused(make, change, wanted):
 
 def test_a_checkpoint_is_in_the_way_of_another_beginning(make):
     carry_out(make(), until=1)
-    with pytest.raises(OutputError, match="go on from it with --resume"):
+    with pytest.raises(OutputError, match="continue from it with --resume"):
         make().begin()
     make(force=True).begin()
 
@@ -100,13 +100,10 @@ def test_a_checkpoint_is_in_the_way_of_another_beginning(make):
     ],
 )
 def test_a_checkpoint_that_makes_no_sense(make, monkeypatch, name, array, wanted):
-    from fireworld.training import searches
-
-    save = searches.save_ranking
     monkeypatch.setattr(
-        searches,
-        "save_ranking",
-        lambda *words, extra, **options: save(*words, extra={**extra, name: array}, **options),
+        training_module,
+        "write_team",
+        lambda *words, extra, **options: write_team(*words, extra={**extra, name: array}, **options),
     )
     carry_out(make(), until=1)
     with pytest.raises(TrainingError, match=wanted):
@@ -122,18 +119,14 @@ def test_a_cut_off_checkpoint(make):
 
 
 def test_a_full_disk_keeps_the_checkpoint(make, monkeypatch):
-    from fireworld.training import searches
-
-    save = searches.save_ranking
-
-    def fail(ranking, path, **options):
+    def fail(team, path, **options):
         if path.name == "team.npz":
             raise OutputError(f"{path}: cannot be written: No space left on device")
-        save(ranking, path, **options)
+        write_team(team, path, **options)
 
-    monkeypatch.setattr(searches, "save_ranking", fail)
+    monkeypatch.setattr(training_module, "write_team", fail)
     run = make()
-    with pytest.raises(OutputError, match=r"No space left on device; .*team\.npz\.checkpoint is kept"):
+    with pytest.raises(OutputError, match=r"No space left on device; continue from .*team\.npz\.checkpoint with"):
         carry_out(run)
     monkeypatch.undo()
     again = make()
@@ -145,7 +138,7 @@ def test_a_full_disk_keeps_the_checkpoint(make, monkeypatch):
 def test_from_the_command_line(here, fireworld):
     done = fireworld(*WORDS, "-o", "a.npz", "--repetitions", 2, "--set", "own_targets=false")
     assert done.code == 0, done.err
-    one, two = (load_team_file(here / f"a-{number}.npz") for number in (1, 2))
+    one, two = (load_team(here / f"a-{number}.npz") for number in (1, 2))
     assert done.out.splitlines() == [
         f"a-{number}.npz: seed {number}, a ranking of the paper's actions, digest {team.digest}"
         for number, team in ((1, one), (2, two))
@@ -158,12 +151,11 @@ def test_from_the_command_line(here, fireworld):
 @pytest.mark.parametrize(
     ("words", "wanted"),
     [
-        (("-o", "a.npz", "--log", "a.csv"), "--log: a search has no episodes"),
         (("-o", "a.npz", "--set", "alpha=0.1"), "expected one of own_targets, cooperation"),
         (("-o", "a.npz", "--set", "n_fires=many"), "n_fires: expected a whole number, got 'many'"),
         (("-o", "a.npz", "--set", "cooperation=maybe"), "cooperation: expected true or false, got 'maybe'"),
         (("-o", "a.npz", "--set", "n_best=60"), "n_best: expected at most n_candidates, 48"),
-        (("-o", "a.npz", "--resume"), "expected a checkpoint to go on from"),
+        (("-o", "a.npz", "--resume"), "expected a checkpoint to continue from"),
         (("-o", "nowhere/a.npz"), "expected an existing folder"),
     ],
 )

@@ -10,16 +10,13 @@ from fireworld_recorder.reader import open_log
 
 from benchmarks.shipped import COMMANDS
 from fireworld.errors import PolicyError
-from fireworld.policy.files import load_team_file
 from fireworld.policy.names import load_policy
-from fireworld.policy.shipped import team_names, team_path
-from fireworld.policy.team import Team, load_team, save_team
-from fireworld.simulation.built import CityCache
+from fireworld.policy.teams.shipped import team_names, team_path
+from fireworld.policy.teams.table_team import TableTeam
+from fireworld.policy.teams.team import load_team
 from fireworld.training.curriculum import load_curriculum
-from fireworld.training.method import PAPER
-from fireworld.training.search import Search, Searcher
-from fireworld.training.searches import IDENTITY
-from fireworld.training.trainer import Trainer
+from fireworld.training.methods.sarsa import PAPER
+from fireworld.training.methods.search import Search
 
 SHAPES = {"paper-cooperative": (4, 4320, 4), "paper-noncooperative": (1, 270, 4)}
 CURRICULA = {
@@ -33,9 +30,9 @@ def test_the_papers_teams_are_there():
 
 
 def test_the_best_comes_from_the_shipped_curriculum():
-    ranking = load_team_file(team_path("best"))
-    wanted = Searcher(load_curriculum("contested"), Search(), seed=1, cities=CityCache()).ranking().provenance
-    assert {key: ranking.provenance[key] for key in IDENTITY} == {key: wanted[key] for key in IDENTITY}
+    ranking = load_team("best")
+    wanted = Search().trainer(load_curriculum("contested"), seed=1).identity
+    assert {key: ranking.provenance[key] for key in wanted} == wanted
     assert ranking.provenance["generations_done"] == Search().n_generations
     assert ranking.own_targets
 
@@ -43,9 +40,9 @@ def test_the_best_comes_from_the_shipped_curriculum():
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_team_comes_from_the_shipped_curriculum(name):
     """Training again takes half a minute: `python -m benchmarks.shipped` does. This finds a curriculum that changed."""
-    team = load_team(team_path(name))
+    team = load_team(name)
     assert team.tables.shape == SHAPES[name]
-    wanted = Trainer(CURRICULA[name], PAPER, seed=1).identity
+    wanted = PAPER.trainer(CURRICULA[name], seed=1).identity
     origin = team.provenance
     assert {key: origin["curriculum"][key] for key in ("name", "digest")} == wanted["curriculum"]
     assert (origin["method"], origin["seed"]) == (wanted["method"], 1)
@@ -81,8 +78,8 @@ def test_help_and_hints_name_them(fireworld):
 
 
 def test_any_team_in_the_folder_is_found(tmp_path, monkeypatch):
-    monkeypatch.setattr("fireworld.policy.shipped._FOLDER", tmp_path)
+    monkeypatch.setattr("fireworld.policy.teams.shipped._FOLDER", tmp_path)
     assert team_names() == []
-    save_team(Team(np.zeros((1, 270, 4)), np.zeros((1, 270, 4), dtype=np.int64)), tmp_path / "mine.npz")
+    TableTeam(np.zeros((1, 270, 4)), np.zeros((1, 270, 4), dtype=np.int64)).save(tmp_path / "mine.npz")
     assert team_names() == ["mine"]
     assert load_policy("mine").policy.tables.shape == (1, 270, 4)

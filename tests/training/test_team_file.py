@@ -10,18 +10,19 @@ import pytest
 
 from fireworld.errors import TrainingError
 from fireworld.policy.names import load_policy, note_on_team
-from fireworld.policy.team import FORMAT, Team, load_team, save_team
+from fireworld.policy.teams.table_team import TableTeam
+from fireworld.policy.teams.team import FORMAT, load_team
 
 
 def make_team(n_tables=2, n_states=270, **provenance):
     tables = np.random.default_rng(3).normal(size=(n_tables, n_states, 4))
-    return Team(tables, (tables > 0).astype(np.int64), provenance)
+    return TableTeam(tables, (tables > 0).astype(np.int64), provenance)
 
 
 def test_written_and_read_again(tmp_path):
     team = make_team(seed=4, method={"commit": 3})
-    save_team(team, tmp_path / "a.npz")
-    save_team(team, tmp_path / "b.npz")
+    team.save(tmp_path / "a.npz")
+    team.save(tmp_path / "b.npz")
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
     read = load_team(tmp_path / "a.npz")
     np.testing.assert_array_equal(read.tables, team.tables)
@@ -33,7 +34,7 @@ def test_written_and_read_again(tmp_path):
 
 
 def test_it_is_a_policy_by_its_path(tmp_path):
-    save_team(make_team(method={"commit": 3}), tmp_path / "team.npz")
+    make_team(method={"commit": 3}).save(tmp_path / "team.npz")
     named = load_policy(str(tmp_path / "team.npz"))
     assert named.name == "team.npz", "a recording names no folder"
     assert named.policy.commit == 3
@@ -52,7 +53,7 @@ def test_it_is_a_policy_by_its_path(tmp_path):
 )
 def test_tables_are_spread_over_brigades(tmp_path, n_tables, n_brigades, note):
     team = make_team(n_tables)
-    save_team(team, tmp_path / "team.npz")
+    team.save(tmp_path / "team.npz")
     named = load_policy(str(tmp_path / "team.npz"))
     assert note_on_team(named, n_brigades) == note
     spread = named.policy.for_brigades(n_brigades)
@@ -63,10 +64,13 @@ def test_no_note_on_other_policies():
     assert note_on_team(load_policy("each-another"), 7) == ""
 
 
+HEADER = {"format": FORMAT, "kind": "tables", "provenance": {}}
+
+
 def write(path, header=None, **arrays):
     """Write a team file with something else in it."""
     team = make_team()
-    text = json.dumps({"format": FORMAT} if header is None else header).encode()
+    text = json.dumps(HEADER if header is None else header).encode()
     content = {"header": np.frombuffer(text, dtype=np.uint8), "tables": team.tables, "visits": team.visits, **arrays}
     np.savez(path, **{name: array for name, array in content.items() if array is not None})
 
@@ -80,16 +84,19 @@ def with_nan():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        (
-            {"header": {"format": "fireworld-team/2"}},
-            "format: expected 'fireworld-team/1'|format: expected fireworld-team/1",
-        ),
-        ({"header": {"format": "fireworld-team/2"}}, r"got 'fireworld-team/2'; made by a later fireworld\?$"),
-        ({"header": {}}, "format: expected fireworld-team/1, got None$"),
+        ({"header": {"format": "fireworld-team/3"}}, "format: expected fireworld-team/2"),
+        ({"header": {"format": "fireworld-team/3"}}, r"got 'fireworld-team/3'; made by a later fireworld\?$"),
+        ({"header": {}}, "format: expected fireworld-team/2, got None$"),
         ({"header": [1]}, "got None$"),
-        ({"header": {"format": FORMAT, "method": {"commit": "x"}}}, "method.commit: expected a whole number"),
-        ({"header": {"format": FORMAT, "method": {"commit": 0}}}, "method.commit: .*got 0$"),
-        ({"header": {"format": FORMAT, "method": 7}}, "method.commit: .*got None$"),
+        ({"header": HEADER | {"kind": "network"}}, "kind: expected one of ranking, tables, got 'network'; made by"),
+        ({"header": HEADER | {"kind": ["tables"]}}, r"kind: expected one of ranking, tables, got \['tables'\]"),
+        ({"header": HEADER | {"provenance": 3}}, "provenance: expected keys and values, got 3$"),
+        ({"header": HEADER | {"provenance": {"method": {"commit": "x"}}}}, "method.commit: expected a whole number"),
+        ({"header": HEADER | {"provenance": {"method": {"commit": 0}}}}, "method.commit: .*got 0$"),
+        ({"header": HEADER | {"provenance": {"method": 7}}}, "method.commit: .*got None$"),
+        ({"header": {"format": "fireworld-team/1", "method": {"commit": "x"}}}, "method.commit: expected a whole"),
+        ({"header": {"format": "fireworld-team/1", "method": {"commit": 0}}}, "method.commit: .*got 0$"),
+        ({"header": {"format": "fireworld-team/1", "method": 7}}, "method.commit: .*got None$"),
         ({"tables": with_nan()}, r"tables\[1, 17, 2\]: expected a finite number, got nan$"),
         ({"tables": np.zeros((2, 4320, 3))}, r"tables: expected float64 tables of .*, got float64 \(2, 4320, 3\)"),
         ({"tables": np.zeros((2, 1000, 4))}, r"got float64 \(2, 1000, 4\)"),
@@ -121,7 +128,7 @@ def test_no_team_file_at_all(tmp_path, content):
 
 
 def test_a_damaged_team_file(tmp_path):
-    save_team(make_team(), tmp_path / "a.npz")
+    make_team().save(tmp_path / "a.npz")
     good = bytearray((tmp_path / "a.npz").read_bytes())
     for place in range(60, len(good) - 60, 97):
         bad = good.copy()

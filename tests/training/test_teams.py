@@ -5,30 +5,28 @@ from __future__ import annotations
 import errno
 import zipfile
 from pathlib import Path
-from threading import Event
 
 import numpy as np
 import pytest
 
 from fireworld.errors import OutputError, TrainingError
-from fireworld.policy.team import load_team, read_team, save_team
-from fireworld.training.teams import Training, log_heading, numbered, train_all
+from fireworld.executors import threads
+from fireworld.policy.teams.team import load_team, read_team, write_team
+from fireworld.training.methods.sarsa import EpisodeReport
+from fireworld.training.training import Training, train_all
 
 
-def quiet(training, episode):
-    """Report nothing."""
+def run(training, *, until=None):
+    """Train, and ask to stop after a number of episodes."""
+    workers, seen = threads(1), []
 
+    def report(_, episode):
+        seen.append(episode)
+        if len(seen) == until:
+            workers.stop.set()
 
-def stop_after(n_episodes, stop):
-    """Return a report that asks to stop after so many episodes."""
-    left = [n_episodes]
-
-    def report(training, episode):
-        left[0] -= 1
-        if left[0] == 0:
-            stop.set()
-
-    return report
+    training.run(workers, [report])
+    return seen
 
 
 @pytest.fixture
@@ -44,7 +42,7 @@ def make_training(make_trainer, here):
 def whole(make_training):
     """A training without an interruption."""
     training = make_training("whole.npz")
-    training.run(Event(), quiet)
+    run(training)
     return training
 
 
@@ -52,15 +50,15 @@ def whole(make_training):
 def test_resumed_bit_for_bit(make_training, whole, here, stops):
     n_done = 0
     for n_episodes in stops:
-        training, stop = make_training(), Event()
+        training = make_training()
         assert training.resume() == (n_done > 0)
-        training.run(stop, stop_after(n_episodes, stop))
+        run(training, until=n_episodes)
         n_done += n_episodes
         assert sorted(path.name for path in here.glob("team*")) == ["team.npz.checkpoint"]
         assert len(training.log.splitlines()) == n_done
     training = make_training()
     assert training.resume()
-    training.run(Event(), quiet)
+    run(training)
     assert training.team.digest == whole.team.digest
     for suffix in (".npz", ".csv"):
         assert (here / f"team{suffix}").read_bytes() == (here / f"whole{suffix}").read_bytes()
@@ -69,15 +67,15 @@ def test_resumed_bit_for_bit(make_training, whole, here, stops):
 
 def test_the_log_has_a_line_for_every_episode(whole, make_trainer):
     lines = whole.log_path.read_text().splitlines()
-    assert lines[0] == log_heading().strip()
+    assert lines[0] == ",".join(EpisodeReport.columns())
     assert len(lines) == 1 + len(list(make_trainer()))
     row = dict(zip(lines[0].split(","), lines[1].split(","), strict=True))
     assert (row["scenario"], row["episode"], row["epsilon"], row["converged"]) == ("alone-1", "0", "1.0", "False")
 
 
 def test_several_at_a_time_are_those_one_by_one(make_training, whole, here):
-    trainings = [make_training(numbered(here / "t.npz", k, n_all=3).name, seed=k) for k in (1, 2, 3)]
-    train_all(trainings, n_jobs=2, stop=Event(), report=quiet)
+    trainings = [make_training(f"t-{k}.npz", seed=k) for k in (1, 2, 3)]
+    train_all(trainings, jobs=2)
     assert sorted(path.name for path in here.glob("t-*.npz")) == ["t-1.npz", "t-2.npz", "t-3.npz"]
     assert (here / "t-1.npz").read_bytes() == (here / "whole.npz").read_bytes()
     assert len({training.team.digest for training in trainings}) == 3
@@ -93,14 +91,13 @@ def test_one_that_fails_stops_the_others_gently(make_training, here):
             raise OutputError("disk full")
 
     with pytest.raises(OutputError, match="disk full"):
-        train_all(trainings, n_jobs=2, stop=Event(), report=report)
+        train_all(trainings, jobs=2, callbacks=[report])
     assert trainings[1].checkpoint.exists()
     assert trainings[1].team is None
 
 
 def stopped(training):
-    stop = Event()
-    training.run(stop, stop_after(8, stop))
+    run(training, until=8)
     return training.checkpoint
 
 
@@ -132,7 +129,7 @@ def test_a_checkpoint_of_another_curriculum_or_version(make_training, key, value
     checkpoint = stopped(make_training())
     team, extra = read_team(checkpoint)
     team.provenance[key] = value
-    save_team(team, checkpoint, force=True, extra=extra)
+    write_team(team, checkpoint, force=True, extra=extra)
     with pytest.raises(TrainingError, match=message):
         make_training().resume()
 
@@ -155,7 +152,7 @@ def test_a_checkpoint_that_makes_no_sense(make_training, extra, message):
     checkpoint = stopped(make_training())
     team, _ = read_team(checkpoint)
     log = {"log": np.zeros(0, dtype=np.uint8)} if extra else {}
-    save_team(team, checkpoint, force=True, extra={**log, **extra})
+    write_team(team, checkpoint, force=True, extra={**log, **extra})
     with pytest.raises(TrainingError, match=message):
         make_training().resume()
 
@@ -170,7 +167,7 @@ def test_a_cut_off_checkpoint(make_training):
 def test_a_finished_team_is_left_as_it_is(make_training, whole):
     again = make_training("whole.npz")
     assert again.resume()
-    again.run(Event(), quiet)
+    run(again)
     assert again.team.digest == whole.team.digest
     with pytest.raises(TrainingError, match="seed"):
         make_training("whole.npz", seed=2).resume()
@@ -185,7 +182,7 @@ def test_what_is_in_the_way(make_training, whole, here):
         make_training().begin()
     forced = make_training(force=True)
     forced.begin()
-    forced.run(Event(), quiet)
+    run(forced)
     assert not checkpoint.exists()
     with pytest.raises(OutputError, match=r"an existing folder .*, got 'none'; make it first$"):
         Training(whole.trainer, here / "absent" / "a.npz").begin()
@@ -201,7 +198,7 @@ def test_a_checkpoint_after_every_scenario(make_training, curriculum):
         if training.checkpoint.exists():
             places.append(read_team(training.checkpoint)[1]["place"].tolist())
 
-    training.run(Event(), report)
+    training.run(threads(1), [report])
     expected = [[number, 0, 0] for number in range(1, curriculum.n_scenarios)]
     assert [list(place) for place in dict.fromkeys(map(tuple, places))] == expected
 
@@ -222,16 +219,15 @@ def test_a_full_disk_loses_no_training(make_training, whole, here, monkeypatch):
     training = make_training()
     with monkeypatch.context() as full:
         full.setattr(zipfile, "ZipFile", FullDisk)
-        message = r"team.npz: cannot be written: No space left on device; .*checkpoint .*is kept: go on with --resume$"
+        message = r"team.npz: cannot be written: No space left on device; continue from .*checkpoint with --resume$"
         with pytest.raises(OutputError, match=message):
-            training.run(Event(), quiet)
+            run(training)
     assert training.team is None
     assert sorted(path.name for path in here.glob("team*")) == ["team.npz.checkpoint"]
-    again, episodes = make_training(), []
+    again = make_training()
     assert again.resume()
     assert again.trainer.done
-    again.run(Event(), lambda *episode: episodes.append(episode))
-    assert not episodes, "nothing is trained again"
+    assert not run(again), "nothing is trained again"
     assert sorted(path.name for path in here.glob("team*")) == ["team.csv", "team.npz"]
     for suffix in (".npz", ".csv"):
         assert (here / f"team{suffix}").read_bytes() == (here / f"whole{suffix}").read_bytes()
@@ -240,8 +236,8 @@ def test_a_full_disk_loses_no_training(make_training, whole, here, monkeypatch):
 def test_a_log_that_cannot_be_written_loses_no_training(make_training, whole, here, monkeypatch):
     training = make_training()
     training.log_path = here / "absent" / "log.csv"
-    with pytest.raises(OutputError, match=r"log.csv: cannot be written: No such file or directory; .* is kept"):
-        training.run(Event(), quiet)
+    with pytest.raises(OutputError, match=r"log.csv: cannot be written: No such file or directory; continue from "):
+        run(training)
     assert not training.path.exists()
     assert load_team(training.checkpoint).digest == whole.team.digest
 
@@ -255,12 +251,12 @@ def test_a_disk_that_fills_up_leaves_the_checkpoint_before(make_training, whole,
                 full.setattr(FullDisk, "fails_at", lambda *_: True)
 
         full.setattr(zipfile, "ZipFile", FullDisk)
-        with pytest.raises(OutputError, match=r"checkpoint: cannot be written: .*; .* is kept: go on with --resume$"):
-            training.run(Event(), report)
+        with pytest.raises(OutputError, match=r"checkpoint: cannot be written: .*; continue from .* with --resume$"):
+            training.run(threads(1), [report])
     again = make_training()
     assert again.resume()
     assert again.trainer.progress.scenario_number == 1
-    again.run(Event(), quiet)
+    run(again)
     assert again.team.digest == whole.team.digest
 
 
@@ -278,16 +274,16 @@ def test_a_kill_while_a_checkpoint_is_written_leaves_the_one_before(make_trainin
             raise Killed
         write_array(*words, **more)
 
-    going_on, stop = make_training(), Event()
-    assert going_on.resume()
+    resumed = make_training()
+    assert resumed.resume()
     with monkeypatch.context() as dying:
         dying.setattr(np.lib.format, "write_array", write_some)
         with pytest.raises(Killed):
-            going_on.run(stop, stop_after(2, stop))
+            run(resumed, until=2)
     assert checkpoint.read_bytes() == content
     (here / "team.npz.checkpoint.partial").write_bytes(b"what a kill leaves behind")
     training = make_training()
     assert training.resume()
-    training.run(Event(), quiet)
+    run(training)
     assert training.team.digest == whole.team.digest
     assert sorted(path.name for path in here.glob("team*")) == ["team.csv", "team.npz"]

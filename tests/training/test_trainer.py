@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fireworld.draws import TABLE, below
-from fireworld.training.trainer import Progress
+from fireworld.training.methods.sarsa import Progress
 
 
 def test_the_whole_curriculum(make_trainer, curriculum):
@@ -70,7 +70,7 @@ def test_between_scenarios_one_table_is_drawn_for_all(make_trainer):
     for seed in range(40):
         trainer = make_trainer(seed)
         tables = with_tables(trainer, 2, 3, 4320)
-        trainer._go_on()
+        trainer._next_scenario()
         progress = trainer.progress
         assert (progress.scenario_number, progress.episode, progress.n_unchanged) == (3, 0, 0)
         number = below(seed, TABLE, 2, 0, bound=3)
@@ -86,7 +86,7 @@ def test_between_scenarios_one_table_is_drawn_for_all(make_trainer):
 def test_what_was_learned_alone_holds_whatever_the_others_do(make_trainer):
     trainer = make_trainer()
     tables = with_tables(trainer, 1, 1, 270)
-    trainer._go_on()
+    trainer._next_scenario()
     progress = trainer.progress
     assert progress.tables.shape == (3, 4320, 4)
     for state in (0, 15, 16, 1193, 4319):
@@ -101,7 +101,7 @@ def test_a_shared_table(make_trainer):
     assert trainer.team().tables.shape == (1, 4320, 4)
 
 
-def test_luck(make_trainer):
+def test_random_draws(make_trainer):
     def scores(**changes):
         trainer = make_trainer(alpha="0", epsilon_decay="0", n_episodes_unchanged="6", **changes)
         return [(report.n_steps, report.total_reward) for report in trainer]
@@ -125,9 +125,8 @@ def test_other_seeds_and_methods_other_tables(make_trainer):
 
 PRINT_DIGEST = """
 from fireworld.training.curriculum import load_curriculum
-from fireworld.training.trainer import Trainer
 from tests.training.conftest import SHORT
-trainer = Trainer(load_curriculum("tiny.yaml"), SHORT, seed=5)
+trainer = SHORT.trainer(load_curriculum("tiny.yaml"), seed=5)
 list(trainer)
 print(trainer.team().digest)
 """

@@ -17,9 +17,8 @@ from fireworld_viewer.rerun_view import app, live, live_sender
 from fireworld_viewer.rerun_view.live_sender import BackgroundSender
 
 from fireworld.errors import ViewError
-from fireworld.policy.files import load_team_file
-from fireworld.policy.preferences import sentences
-from fireworld.policy.ranking import OF_BRIGADE, OF_BUILDING, OF_TEAM, WEIGHTS
+from fireworld.policy.teams.ranking_words import OF_BRIGADE, OF_BUILDING, OF_TEAM, WEIGHTS
+from fireworld.policy.teams.team import load_team
 from tests.cli.conftest import here  # noqa: F401 - a folder with policies in it
 from tests.command_line import call
 from tests.training.conftest import SHORT_WORDS, TINY
@@ -301,12 +300,12 @@ def test_a_watched_search_is_the_same_search(here, fireworld, window):  # noqa: 
         drawn = seen[path]["Scalars:scalars"]
         assert [f"{row.as_py()[0]:.{digits}f}" for _, row in drawn] == words, path
         assert [number for number, _ in drawn] == [1, 2, 3], path
-    team = load_team_file(here / "seen.npz")
+    team = load_team(here / "seen.npz")
     names = [*OF_BUILDING, *OF_BRIGADE, *OF_TEAM]
     assert weights_drawn(seen, seed=1) == dict(zip((one.name for one in names), team.weights[0], strict=False))
     pages = [row.as_py()[0] for _, row in seen["/page/1"]["TextDocument:text"]]
     assert [page.splitlines()[0] for page in pages] == [f"# Generation {k} of 3" for k in (1, 2, 3)]
-    assert all(f"* {sentence}\n" in pages[-1] for sentence in sentences(team, row=0))
+    assert all(f"* {sentence}\n" in pages[-1] for sentence in team.sentences(row=0))
     assert all(f"* **{one.name}**: {one.meaning}\n" in pages[-1] for one in names)
 
 
@@ -324,7 +323,7 @@ def test_only_weights_that_are_searched_for_are_drawn(here, fireworld, window): 
     assert fireworld(*SEARCH, *words, "-o", "seen.npz", "--view").code == 0
     seen = read_all(window)
     for seed in (1, 2):
-        weights = load_team_file(here / f"seen-{seed}.npz").weights[0]
+        weights = load_team(here / f"seen-{seed}.npz").weights[0]
         names = [weight.name for weight in WEIGHTS]
         free = dict(zip(names, weights, strict=True))
         for one in OF_TEAM:

@@ -16,10 +16,10 @@ from fireworld import __version__
 from fireworld.errors import LogError, PolicyError, expected
 from fireworld.parameters import PRESETS
 from fireworld.policy.asking import describe, name_of
-from fireworld.policy.files import parse_team_file
 from fireworld.policy.names import TEAM_ATTACHMENT, NamedPolicy, load_policy
-from fireworld.policy.npz import SUFFIX
 from fireworld.policy.protocol import Policy
+from fireworld.policy.teams.npz import SUFFIX
+from fireworld.policy.teams.team import parse_team
 from fireworld.recording.replay import build_recorded
 from fireworld.records import RunHeader
 from fireworld.scenario import Scenario, load_scenario, parse_scenario, scenario_names
@@ -209,7 +209,7 @@ def _prepare_recorded(order: Order, recorded: RunHeader | None) -> PreparedRun:
     if content is None:
         named = load_policy(order.policy)
     else:
-        team = parse_team_file(content, source=f"recording: {TEAM_ATTACHMENT}")
+        team = parse_team(content, source=f"recording: {TEAM_ATTACHMENT}")
         policy = team.policy()
         named = NamedPolicy(order.policy, policy.digest, policy)
     built = build_recorded(recorded)

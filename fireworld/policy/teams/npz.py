@@ -1,4 +1,4 @@
-"""Files of arrays with a header: what teams, rankings and checkpoints are kept in; .npz files that numpy opens too."""
+"""Files of arrays with a header: of teams and checkpoints; .npz files that numpy opens too."""
 
 from __future__ import annotations
 
@@ -42,7 +42,11 @@ def write_arrays(path: Path, header: Mapping[str, Any], arrays: Mapping[str, Arr
 
 
 def read_bytes(path: Path) -> bytes:
-    """Read a file that is meant to be a team file; TrainingError if it cannot be read."""
+    """Read a file that is meant to be a team file.
+
+    Raises:
+        TrainingError: it cannot be read, or is too large.
+    """
     try:
         if path.stat().st_size > SIZE_MAX_BYTES:
             raise TrainingError(
@@ -70,7 +74,7 @@ def parse_arrays(content: bytes, *, source: str) -> tuple[dict[str, Any], dict[s
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             size = sum(item.file_size for item in archive.infolist())
             if size > SIZE_MAX_BYTES:
-                raise ValueError(f"{size} bytes of arrays")  # noqa: TRY301 - the same complaint as for all damage
+                raise ValueError(f"{size} bytes of arrays")  # noqa: TRY301 - reported as all damage is
             for item in archive.namelist():
                 with archive.open(item) as file:
                     arrays[item.removesuffix(".npy")] = np.lib.format.read_array(file, allow_pickle=False)
@@ -100,7 +104,7 @@ def check_finite(array: Array, name: str, *, source: str) -> None:
 
 
 def _entry(name: str) -> zipfile.ZipInfo:
-    """Return the directory entry of an array: nothing in it tells when and where the file was made."""
+    """Return the directory entry of an array: it holds no time and place."""
     entry = zipfile.ZipInfo(f"{name}.npy", FIXED_TIME)
     entry.compress_type = zipfile.ZIP_DEFLATED
     entry.create_system = 3  # Unix, wherever it is written

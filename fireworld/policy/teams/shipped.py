@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-_FOLDER: Final = Path(__file__).parents[1] / "shipped" / "teams"
+_FOLDER: Final = Path(__file__).parents[2] / "shipped" / "teams"
 _SUFFIX: Final = ".npz"
 
 
 def team_names() -> list[str]:
-    """Name the teams."""
+    """Return the names of the teams."""
     return sorted(path.stem for path in _FOLDER.glob(f"*{_SUFFIX}"))
 
 

@@ -1,0 +1,159 @@
+"""Teams with a ranking: the weights by which brigades value burning buildings."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from fireworld.errors import TrainingError, expected
+from fireworld.kernels.arrays import Array
+from fireworld.policy.kernel import KernelPolicy, from_rankings
+from fireworld.policy.teams.npz import check_arrays, check_finite
+from fireworld.policy.teams.ranking_words import (
+    HINT,
+    N_TARGET_WEIGHTS,
+    WEIGHTS,
+    Preference,
+    RankingDifference,
+    Weight,
+    WeightChange,
+    preferences,
+    sentences,
+    targets_in_words,
+)
+from fireworld.policy.teams.shown import SHOWN_MAX, Block, TextTable
+from fireworld.policy.teams.team import Team, no_states
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RankingTeam(Team):
+    """Weights that brigades follow, one row each (or one for all), and where they come from."""
+
+    kind: ClassVar[str] = "ranking"
+    what: ClassVar[str] = "a ranking of targets"
+
+    weights: Array  # (rows, 17) float64
+    own_targets: bool
+    """Brigades go for any burning building of their site, not only for the four that the paper's actions name."""
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    """Curriculum, method, seed, version: plain values."""
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of what the brigades follow."""
+        content = hashlib.sha256(repr((self.weights.shape, self.own_targets)).encode())
+        content.update(np.ascontiguousarray(self.weights, dtype="<f8").tobytes())
+        return content.hexdigest()
+
+    @property
+    def summary(self) -> str:
+        """What is ranked."""
+        return "a ranking of " + ("own targets" if self.own_targets else "the paper's actions")
+
+    @property
+    def counted(self) -> Sequence[Weight]:
+        """The weights that count: without those of the actions, where brigades name targets of their own."""
+        return WEIGHTS[:N_TARGET_WEIGHTS] if self.own_targets else WEIGHTS
+
+    @property
+    def by_size(self) -> list[tuple[Weight, list[float]]]:
+        """The weights that count and their values in every row, the largest of any brigade first."""
+        pairs = zip(self.counted, self.weights.T.tolist(), strict=False)
+        return sorted(pairs, key=lambda pair: -max(map(abs, pair[1])))
+
+    def policy(self) -> KernelPolicy:
+        """Return the policy of the team."""
+        return from_rankings(self.weights, own_targets=self.own_targets)
+
+    def arrays(self) -> dict[str, Array]:
+        """Return the weights."""
+        return {"weights": np.ascontiguousarray(self.weights, dtype="<f8")}
+
+    def header(self) -> dict[str, Any]:
+        """Return the names of the weights, and what is ranked."""
+        return {"weights": [weight.name for weight in WEIGHTS], "own_targets": self.own_targets}
+
+    @classmethod
+    def from_file(
+        cls, header: dict[str, Any], arrays: dict[str, Array], *, provenance: Mapping[str, Any], source: str
+    ) -> Self:
+        """Make a team of what its file holds; see `Team.from_file`."""
+        names, own_targets = header.pop("weights", None), header.pop("own_targets", None)
+        wanted = [weight.name for weight in WEIGHTS]
+        if names != wanted:
+            raise TrainingError(expected(source, "weights", ", ".join(wanted), str(names)))
+        if not isinstance(own_targets, bool):
+            raise TrainingError(expected(source, "own_targets", "true or false", own_targets))
+        check_arrays(arrays, "weights", source=source)
+        weights = arrays.pop("weights")
+        if weights.ndim != 2 or not len(weights) or weights.shape[1] != len(WEIGHTS) or weights.dtype != np.float64:
+            shape = f"float64 weights of shape (brigades, {len(WEIGHTS)})"
+            raise TrainingError(expected(source, "weights", shape, f"{weights.dtype} {weights.shape}"))
+        check_finite(weights, "weights", source=source)
+        return cls(np.ascontiguousarray(weights), own_targets, provenance)
+
+    def preferences(self, *, row: int) -> list[Preference]:
+        """Return what the brigades that follow a row prefer, the largest weight first; weights of 0 are left out."""
+        return preferences(zip(self.counted, self.weights[row].tolist(), strict=False))
+
+    def sentences(self, *, row: int) -> Iterator[str]:
+        """Yield what the brigades that follow a row do, a sentence for each strength."""
+        return sentences(self.preferences(row=row))
+
+    def difference(self, other: Self) -> RankingDifference:
+        """Compare the weights of another team with these.
+
+        Raises:
+            TrainingError: they have another number of rows.
+        """
+        if len(self.weights) != len(other.weights):
+            wanted = f"as many rows as in A, {len(self.weights)}"
+            raise TrainingError(expected("B", "weights", wanted, f"{len(other.weights)} of them"))
+        changed: list[WeightChange] = []
+        for row, (of_a, of_b) in enumerate(zip(self.weights.tolist(), other.weights.tolist(), strict=True)):
+            found = [
+                WeightChange(row, weight.name, a, b) for weight, a, b in zip(WEIGHTS, of_a, of_b, strict=True) if a != b
+            ]
+            changed += sorted(found, key=lambda change: -abs(change.b - change.a))
+        return RankingDifference(len(self.weights), tuple(changed), (self.own_targets, other.own_targets))
+
+    def describe(self, *, states: Sequence[str] = (), limit: int = SHOWN_MAX) -> Iterator[Block]:
+        """Yield the weights, and what they come to in words."""
+        del limit
+        no_states(self.what, states)
+        n = len(self.weights)
+        whose = (
+            "one row of weights for all brigades" if n == 1 else f"{n} rows of weights, one for each brigade in turn"
+        )
+        yield f"a ranking of {targets_in_words(own_targets=self.own_targets)}, {whose}"
+        yield from (*self.origin, f"digest {self.digest}", "")
+        columns = ["value"] if n == 1 else [f"brigade {row}" for row in range(n)]
+        rows = [
+            [weight.name, weight.meaning, *(f"{value:+.3f}" if value else "0" for value in values)]
+            for weight, values in self.by_size
+        ]
+        yield TextTable(["weight", "of what", *columns], rows, n_left=2)
+        yield from ("", HINT)
+        for row in range(n):
+            yield from ("", *([f"brigade {row}"] if n > 1 else []), *self.sentences(row=row))
+
+    def as_dict(self, *, states: Sequence[str] = (), limit: int = SHOWN_MAX) -> dict[str, Any]:
+        """Return what `describe` shows as plain values."""
+        del limit
+        no_states(self.what, states)
+        idle = [*zip(WEIGHTS, self.weights.T.tolist(), strict=True)][len(self.counted) :]
+        return {
+            "digest": self.digest,
+            "own_targets": self.own_targets,
+            "n_rows": len(self.weights),
+            "provenance": self.short_provenance,
+            "weights": [
+                {"name": weight.name, "meaning": weight.meaning, "counts": weight in self.counted, "values": values}
+                for weight, values in (*self.by_size, *idle)
+            ],
+            "preferences": [[one.as_dict() for one in self.preferences(row=row)] for row in range(len(self.weights))],
+        }

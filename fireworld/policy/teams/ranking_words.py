@@ -1,0 +1,220 @@
+"""What the weights of a ranking mean and come to, in words; where two rankings differ."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
+
+from fireworld.errors import TrainingError, expected
+from fireworld.policy.teams.shown import SHOWN_MAX, Block, TextTable, more
+from fireworld.policy.teams.team import TeamDifference
+from fireworld.records import ACTIONS
+
+HINT: Final = "a weight counts by its size and by how much what it weighs differs from target to target; mind the units"
+
+
+class Weight(NamedTuple):
+    """One thing that a brigade sees of a target and gives a weight."""
+
+    name: str
+    meaning: str
+    """With the unit in which it is counted."""
+    more: str
+    """What a weight above 0 comes to."""
+    less: str
+    """What a weight below 0 comes to."""
+
+
+OF_BUILDING: Final = (
+    Weight(
+        "temperature",
+        "temperature of the building, in 500 degrees above ambient",
+        "prefers hotter buildings",
+        "prefers cooler buildings",
+    ),
+    Weight(
+        "volume", "its size: root of the volume in 1000 m3", "prefers larger buildings", "prefers smaller buildings"
+    ),
+    Weight(
+        "fuel_left",
+        "share of its fuel that is left",
+        "prefers what has much fuel left",
+        "prefers what has little fuel left",
+    ),
+    Weight(
+        "civilian_distance",
+        "way to the nearest civilian not yet reached by fire, in 100 m, 3 at most",
+        "prefers what is far from civilians",
+        "prefers what is close to civilians",
+    ),
+    Weight(
+        "exposure",
+        "share of its radiation that falls on buildings that never burned, times 3",
+        "goes for what endangers unburnt buildings",
+        "leaves what endangers unburnt buildings",
+    ),
+    Weight(
+        "kindling",
+        "radiation on buildings that never burned, each counted by how near ignition it is, times 5",
+        "goes for what is about to kindle others",
+        "leaves what is about to kindle others",
+    ),
+    Weight(
+        "steps_needed",
+        "root of the steps that one brigade would have to spray it",
+        "prefers what takes long to put out",
+        "prefers what is soon put out",
+    ),
+)
+OF_BRIGADE: Final = (
+    Weight(
+        "in_range",
+        "1 if the brigade can spray it from where it is",
+        "prefers what it can spray at once",
+        "prefers what it has to drive to",
+    ),
+    Weight(
+        "beyond_range", "how far beyond its range it is, in 100 m, 3 at most", "prefers a long way", "avoids a long way"
+    ),
+    Weight("mine", "1 if the brigade went for it in the last step", "stays with its target", "changes its target"),
+)
+OF_TEAM: Final = (
+    Weight(
+        "others_here",
+        "how many other brigades go for it",
+        "joins those who go for the same",
+        "avoids what others go for",
+    ),
+    Weight(
+        "others_near",
+        "other brigades' targets around it: 1 each, 1/2 at 50 m, 1/5 at 100 m",
+        "stays near what others go for",
+        "keeps away from what others go for",
+    ),
+    Weight(
+        "enough",
+        "1 if those that go for it put it out in this step",
+        "goes along where the others are enough",
+        "leaves what the others put out anyway",
+    ),
+)
+OF_ACTION: Final = tuple(
+    Weight(action, f"1 if the action {action} names it", f"prefers what {action} names", f"avoids what {action} names")
+    for action in ACTIONS
+)
+WEIGHTS: Final = (*OF_BUILDING, *OF_BRIGADE, *OF_TEAM, *OF_ACTION)
+"""The weights of a ranking in their order; those of the actions count only where the brigades choose among actions."""
+N_TARGET_WEIGHTS: Final = len(WEIGHTS) - len(OF_ACTION)
+
+STRENGTHS: Final = (("above all", 0.5), ("also", 0.2), ("a little", 0.05))
+"""Words for the size of a weight, and the least share of the largest weight for which they are used."""
+
+
+@dataclass(frozen=True)
+class Preference:
+    """What one weight of a brigade comes to."""
+
+    weight: Weight
+    value: float
+    strength: str
+    """One of STRENGTHS; empty if it hardly counts."""
+
+    @property
+    def words(self) -> str:
+        """What the brigade does because of it."""
+        return self.weight.more if self.value > 0 else self.weight.less
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the preference as plain values."""
+        return {"weight": self.weight.name, "strength": self.strength, "words": self.words}
+
+
+def preferences(row: Iterable[tuple[Weight, float]]) -> list[Preference]:
+    """Return what weights and their values come to, the largest first; values of 0 are left out."""
+    chosen = sorted(row, key=lambda pair: -abs(pair[1]))
+    largest = abs(chosen[0][1])
+    found = []
+    for weight, value in chosen:
+        if value != 0.0:
+            strength = next((word for word, share in STRENGTHS if abs(value) >= share * largest), "")
+            found.append(Preference(weight, value, strength))
+    return found
+
+
+def sentences(found: Sequence[Preference]) -> Iterator[str]:
+    """Yield what a brigade with these preferences does, a sentence for each strength."""
+    if not found:
+        yield "all weights are 0: every target is worth the same, and the first one is taken"
+    for strength, _ in STRENGTHS:
+        words = [preference.words for preference in found if preference.strength == strength]
+        if words:
+            yield f"{strength}: {', '.join(words)}"
+
+
+def targets_in_words(*, own_targets: bool) -> str:
+    """Return among what a ranking chooses."""
+    return "all burning buildings of the fire site" if own_targets else "the targets of the paper's four actions"
+
+
+class WeightChange(NamedTuple):
+    """A weight that differs."""
+
+    row: int
+    name: str
+    a: float
+    b: float
+
+
+@dataclass(frozen=True)
+class RankingDifference(TeamDifference):
+    """Where two rankings differ."""
+
+    n_rows: int
+    changed: tuple[WeightChange, ...]
+    """Row by row, in each the largest change first."""
+    own_targets: tuple[bool, bool]
+
+    @property
+    def same(self) -> bool:
+        """Whether the brigades of both do the same."""
+        return not self.changed and self.own_targets[0] == self.own_targets[1]
+
+    @property
+    def same_actions(self) -> bool:
+        """Raise TrainingError: a ranking tells no actions from values."""
+        raise TrainingError(expected("--actions-only", "", "two teams with tables of actions", "two rankings"))
+
+    def describe(self, *, limit: int = SHOWN_MAX) -> Iterator[Block]:
+        """Yield which weights differ."""
+        if self.same:
+            yield f"the same: {self.n_rows} row{'s' if self.n_rows > 1 else ''} of weights"
+            return
+        a, b = (targets_in_words(own_targets=own) for own in self.own_targets)
+        if a != b:
+            yield f"A ranks {a}, B {b}"
+        n = len(self.changed)
+        yield f"{n} weight{'' if n == 1 else 's'} differ{'s' if n == 1 else ''}"
+        if not n:
+            return
+        whose = ["of"] if self.n_rows > 1 else []
+        rows = [
+            [
+                one.name,
+                *([f"brigade {one.row}"] if whose else []),
+                *(f"{value:+.6g}" for value in (one.a, one.b, one.b - one.a)),
+            ]
+            for one in self.changed[:limit]
+        ]
+        yield ""
+        yield TextTable(["weight", *whose, "A", "B", "B - A"], rows, n_left=1 + len(whose))
+        yield from more(n, limit)
+
+    def as_dict(self, *, limit: int = SHOWN_MAX) -> dict[str, Any]:
+        """Return what differs as plain values."""
+        return {
+            "n_rows": self.n_rows,
+            "n_changed": len(self.changed),
+            "own_targets": list(self.own_targets),
+            "changed": [{"row": one.row, "weight": one.name, "a": one.a, "b": one.b} for one in self.changed[:limit]],
+        }

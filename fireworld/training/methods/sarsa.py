@@ -1,0 +1,305 @@
+"""SARSA in tables, the paper's method, and its declared variants: a value for each action in each state."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, ClassVar, Final, Literal, get_args
+
+import msgspec
+import numpy as np
+
+from fireworld.draws import EPISODE, TABLE, below, hash_key
+from fireworld.errors import TrainingError, expected
+from fireworld.executors import Workers
+from fireworld.kernels.arrays import Array
+from fireworld.policy.kernel import from_tables
+from fireworld.policy.teams.table_team import COMMIT_MAX, TableTeam
+from fireworld.policy.teams.team import Team
+from fireworld.policy.words import N_FLAG_VALUES, N_STATES, N_STATES_ALONE
+from fireworld.records import ACTIONS
+from fireworld.scenario import Scenario
+from fireworld.simulation.built import BuiltScenario, CityCache
+from fireworld.simulation.state import fresh_learner
+from fireworld.training.curriculum import Curriculum, CurriculumStage
+from fireworld.training.method import Count, Limits, Method, NotNegative, Play, Report, Share, Trainer
+
+Rule = Literal["sarsa", "expected-sarsa", "q-learning"]
+RULES: Final[tuple[str, ...]] = get_args(Rule)
+"""In the order of the kernels' numbers."""
+Commit = Annotated[int, Limits(f"a whole number from 1 to {COMMIT_MAX}", 1, COMMIT_MAX)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sarsa(Method):
+    """Learning of a table for each brigade; the defaults are the paper's."""
+
+    name: ClassVar[str] = "paper"
+    curriculum: ClassVar[str] = "paper"
+
+    rule: Rule = "sarsa"
+    alpha: Share = 0.7
+    """Learning rate."""
+    alpha_decay: NotNegative = 0.0
+    """The n-th visit of a state and action learns at alpha / (1 + alpha_decay * (n - 1))."""
+    gamma: Share = 0.5
+    """Discount of the next step."""
+    epsilon_decay: Share = 0.9
+    """Episode k of a scenario explores with probability epsilon_decay ** k, k from 0."""
+    n_episodes_max: Count = 130
+    """Episodes of a scenario at most."""
+    n_episodes_unchanged: Count = 20
+    """A scenario ends when no greedy action has changed for so many episodes."""
+    shared_table: bool = False
+    """All brigades learn into one table."""
+    fixed_noise: bool = False
+    """Every episode of a scenario has the same random draws."""
+    reward: Literal["stock", "change"] = "stock"
+    """The state's cost at every step, as in the paper; or how it changed."""
+    choices: Literal["in-turn", "simultaneous"] = "in-turn"
+    """Whether brigades see what those before them chose in this step."""
+    commit: Commit = 1
+    """Steps that a choice is kept for."""
+
+    def trainer(self, curriculum: Curriculum, *, seed: int, cities: CityCache | None = None) -> SarsaTrainer:
+        """Return what trains one team; see `Method.trainer`."""
+        return SarsaTrainer(curriculum, self, seed=seed, cities=cities)
+
+
+METHOD: Final = Sarsa()
+PAPER: Final = METHOD
+
+
+@dataclass(frozen=True, kw_only=True)
+class EpisodeReport(Report):
+    """How an episode of training ended."""
+
+    stage: str
+    scenario: str
+    scenario_number: int
+    """Counted through the whole curriculum, from 0."""
+    episode: int
+    """Counted through the scenario, from 0."""
+    epsilon: float
+    n_steps: int
+    score: float
+    score_max: float
+    total_reward: float
+    n_burnt_out: int
+    n_changed: int
+    """States in which the greedy action of a brigade changed."""
+    n_unchanged: int
+    """Episodes in a row without such a change."""
+    converged: bool
+    """The scenario ends because the policy has settled."""
+
+    @property
+    def text(self) -> str:
+        """The episode, or the scenario that it ends, in one line."""
+        if not self.milestone:
+            return (
+                f"{self.scenario}, episode {self.episode + 1}, epsilon {self.epsilon:.3f}, "
+                f"return {self.total_reward:,.0f}, {self.n_changed} changes"
+            )
+        settled = "settled" if self.converged else "not settled"
+        return (
+            f"{self.scenario}: {self.episode + 1} episodes, {settled}, "
+            f"score {self.score:.2f} of {self.score_max:.0f}, return {self.total_reward:,.0f}"
+        )
+
+
+@dataclass
+class Progress:
+    """Where a training stands; all of it is in a checkpoint."""
+
+    scenario_number: int = 0
+    episode: int = 0
+    n_unchanged: int = 0
+    tables: Array = field(default_factory=lambda: np.zeros((1, N_STATES_ALONE, 4)))
+    visits: Array = field(default_factory=lambda: np.zeros((1, N_STATES_ALONE, 4), dtype=np.int64))
+
+
+class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
+    """Trains one team through a curriculum, an episode at a time.
+
+    Args:
+        curriculum: what to learn in.
+        method: how to learn.
+        seed: of all random draws of this training.
+        progress: where an earlier training stopped.
+        cities: cities built before, shared between trainings.
+    """
+
+    report_type: ClassVar[type[Report]] = EpisodeReport
+    unit: ClassVar[str] = "episode"
+    plots: ClassVar[Mapping[str, str]] = {
+        "return": "Return",
+        "score": "Score, as a share of the best",
+        "epsilon": "Epsilon",
+        "n_changed": "States in which the greedy action changed",
+        "n_burnt_out": "Burnt out",
+        "n_steps": "Steps",
+    }
+
+    def __init__(
+        self,
+        curriculum: Curriculum,
+        method: Sarsa,
+        *,
+        seed: int,
+        progress: Progress | None = None,
+        cities: CityCache | None = None,
+    ) -> None:
+        super().__init__(curriculum, method, seed=seed)
+        self._cities = cities if cities is not None else CityCache()
+        self._plan = [(stage, scenario) for stage in curriculum.stages for scenario in stage.scenarios]
+        self.progress = progress if progress is not None else self._begin()
+        self.graduate: TableTeam | None = None
+        """The team at the end of the last scenario finished here, before one of its tables was drawn for all."""
+
+    @property
+    def share_done(self) -> float:
+        """How many of the scenarios are done; an episode counts as if the scenario needed all it may have."""
+        progress = self.progress
+        return (progress.scenario_number + progress.episode / self.method.n_episodes_max) / len(self._plan)
+
+    def run(self, workers: Workers) -> Iterator[EpisodeReport]:
+        """Train, yielding a report after every episode; all in this thread."""
+        del workers
+        while not self.done:
+            number = self.progress.scenario_number
+            stage, scenario = self._plan[number]
+            built = self._build(scenario)
+            while self.progress.scenario_number == number:
+                yield self._run_episode(stage, built)
+
+    def team(self) -> TableTeam:
+        """Return the team as it is now."""
+        progress = self.progress
+        provenance = {
+            **self.identity,
+            "curriculum": self.curriculum.as_dict(),
+            "scenarios_done": progress.scenario_number,
+        }
+        return TableTeam(tables=progress.tables.copy(), visits=progress.visits.copy(), provenance=provenance)
+
+    def state(self) -> dict[str, Array]:
+        """Return `place`: [scenario, episode, episodes without a change]."""
+        progress = self.progress
+        return {"place": np.array([progress.scenario_number, progress.episode, progress.n_unchanged], dtype=np.int64)}
+
+    def restore(self, team: Team, state: Mapping[str, Array], *, source: str) -> None:
+        """Continue where another trainer stood; see `Trainer.restore`."""
+        place = state.get("place")
+        if not isinstance(team, TableTeam) or place is None or place.shape != (3,) or place.dtype != np.int64:
+            raise TrainingError(expected(source, "", "a checkpoint", "a team file without a place in its training"))
+        number, episode, n_unchanged = (int(value) for value in place)
+        in_curriculum = 0 <= number < len(self._plan) or (number, episode) == (len(self._plan), 0)
+        if not (in_curriculum and 0 <= n_unchanged <= episode < self.method.n_episodes_max):
+            wanted = "[scenario, episode, episodes without a change] within the curriculum"
+            raise TrainingError(expected(source, "place", wanted, str(place.tolist())))
+        if team.tables.shape != self.shape(number):
+            raise TrainingError(expected(source, "tables", f"shape {self.shape(number)}", str(team.tables.shape)))
+        self.progress = Progress(number, episode, n_unchanged, team.tables, team.visits)
+
+    def points(self, report: EpisodeReport) -> Mapping[str, Mapping[str, float]]:
+        """Return what is drawn of the last episode."""
+        values = report.as_dict()
+        values |= {"return": values["total_reward"], "score": values["score"] / values["score_max"]}
+        return {name: {"": values[name]} for name in self.plots}
+
+    def play(self, report: EpisodeReport) -> Play | None:
+        """Return the last scenario of a stage, played greedily by the team that has just finished it."""
+        lasts = itertools.accumulate(len(stage.scenarios) for stage in self.curriculum.stages)
+        if not report.milestone or self.progress.scenario_number not in lasts or self.graduate is None:
+            return None
+        stage, scenario = self._plan[self.progress.scenario_number - 1]
+        as_trained = msgspec.structs.replace(scenario, choices=self.method.choices)
+        return Play(f"after stage {stage.name}: {scenario.name}, seed {self.seed}", as_trained, self.graduate)
+
+    def shape(self, scenario_number: int) -> tuple[int, int, int]:
+        """Return the shape of the tables (tables, states, actions) that a scenario of the curriculum trains.
+
+        After the last scenario the tables are those it has trained.
+        """
+        stage, scenario = self._plan[min(scenario_number, len(self._plan) - 1)]
+        n_tables = 1 if self.method.shared_table else scenario.brigades.n
+        return n_tables, N_STATES if stage.cooperation else N_STATES_ALONE, len(ACTIONS)
+
+    def _begin(self) -> Progress:
+        """Return untrained tables for the first stage."""
+        shape = self.shape(0)
+        return Progress(tables=np.zeros(shape), visits=np.zeros(shape, dtype=np.int64))
+
+    def _build(self, scenario: Scenario) -> BuiltScenario:
+        varied = msgspec.structs.replace(scenario, reward=self.method.reward, choices=self.method.choices)
+        return self._cities.build(varied)
+
+    def _run_episode(self, stage: CurriculumStage, built: BuiltScenario) -> EpisodeReport:
+        method, progress = self.method, self.progress
+        number, episode = progress.scenario_number, progress.episode
+        epsilon = _power(method.epsilon_decay, episode)
+        seed = hash_key(self.seed, EPISODE, number, 0 if method.fixed_noise else episode) >> 1
+        before = progress.tables.argmax(axis=2)
+        policy = from_tables(progress.tables, epsilon=epsilon, commit=method.commit).for_brigades(built.n_brigades)
+        learner = fresh_learner(
+            policy.tables,
+            built.n_brigades,
+            rule=RULES.index(method.rule),
+            alpha=method.alpha,
+            alpha_decay=method.alpha_decay,
+            gamma=method.gamma,
+        )._replace(visits=progress.visits)
+        world = built.world(seed=seed)
+        n_steps = world.run(policy, learner)
+        progress.tables = policy.tables
+        n_changed = int((progress.tables.argmax(axis=2) != before).sum())
+        n_unchanged = progress.n_unchanged = 0 if n_changed else progress.n_unchanged + 1
+        progress.episode += 1
+        converged = n_unchanged >= method.n_episodes_unchanged
+        ended = converged or progress.episode >= method.n_episodes_max
+        if ended:
+            self._next_scenario()
+        outcome = world.state.outcome
+        return EpisodeReport(
+            milestone=ended,
+            stage=stage.name,
+            scenario=built.scenario.name,
+            scenario_number=number,
+            episode=episode,
+            epsilon=epsilon,
+            n_steps=n_steps,
+            score=float(outcome.score[0]),
+            score_max=float(outcome.score[1]),
+            total_reward=float(outcome.reward[5]),
+            n_burnt_out=int(outcome.counts[2]),
+            n_changed=n_changed,
+            n_unchanged=n_unchanged,
+            converged=converged,
+        )
+
+    def _next_scenario(self) -> None:
+        """Begin the next scenario: one table, drawn at random among the brigades', for all of them."""
+        progress = self.progress
+        number = progress.scenario_number
+        progress.scenario_number, progress.episode, progress.n_unchanged = number + 1, 0, 0
+        self.graduate = self.team()
+        if self.done:
+            return
+        n_tables, n_states, _ = self.shape(progress.scenario_number)
+        drawn = below(self.seed, TABLE, number, 0, bound=len(progress.tables))
+        table, visits = progress.tables[drawn], progress.visits[drawn]
+        if n_states > len(table):
+            table = np.repeat(table, N_FLAG_VALUES, axis=0)  # the same for all values of the cooperation flags
+            visits = np.zeros(table.shape, dtype=np.int64)
+        progress.tables = np.repeat(table[np.newaxis], n_tables, axis=0)
+        progress.visits = np.repeat(visits[np.newaxis], n_tables, axis=0)
+
+
+def _power(base: float, exponent: int) -> float:
+    """Return base ** exponent by multiplication: the same on every machine."""
+    result = 1.0
+    for _ in range(exponent):
+        result *= base
+    return result

@@ -1,0 +1,299 @@
+"""Search: find the weights of a ranking of targets by the cross-entropy method, on many fires at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from threading import Event
+from typing import ClassVar, Final
+
+import numpy as np
+
+from fireworld.draws import EPISODE, FIRE, WEIGHT, hash_key
+from fireworld.errors import TrainingError, expected
+from fireworld.executors import Workers
+from fireworld.kernels.arrays import Array
+from fireworld.kernels.draws import fill_normals
+from fireworld.kernels.ranking import N_OF_TEAM, N_TARGET_FEATURES, N_WEIGHTS
+from fireworld.policy.kernel import KernelPolicy, from_rankings
+from fireworld.policy.teams.npz import check_arrays, check_finite
+from fireworld.policy.teams.ranking_team import RankingTeam
+from fireworld.policy.teams.ranking_words import OF_ACTION, OF_BRIGADE, OF_BUILDING, OF_TEAM, WEIGHTS, Weight
+from fireworld.policy.teams.team import Team
+from fireworld.simulation.built import BuiltScenario, CityCache
+from fireworld.training.curriculum import Curriculum
+from fireworld.training.method import Count, Method, Positive, PositiveShare, Report, Trainer
+
+SEED_BITS: Final = 32
+GROUPS: Final[Mapping[str, Sequence[Weight]]] = {
+    "the building": OF_BUILDING,
+    "the brigade": OF_BRIGADE,
+    "the team": OF_TEAM,
+    "the action": OF_ACTION,
+}
+"""The weights by what they are about, in their order."""
+HELP: Final = """\
+## How to read this
+
+A point for every generation: the mean score of all rankings that were tried in it; that of the best, on the fires by
+which they were found to be the best; and how far the rankings of the next generation lie apart.
+
+The team is the mean of the weights. What a weight counts:
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Search(Method):
+    """Search for the weights of a ranking."""
+
+    name: ClassVar[str] = "search"
+    curriculum: ClassVar[str] = "contested"
+
+    own_targets: bool = True
+    """Brigades go for any burning building of their site, not only for the four that the paper's actions name."""
+    cooperation: bool = True
+    """Brigades see what the others go for; if not, the weights of that are 0."""
+    n_generations: Count = 14
+    n_candidates: Count = 48
+    """Rankings tried in a generation."""
+    n_best: Count = 12
+    """Of them, those that the next generation is drawn around."""
+    n_fires: Count = 48
+    """Fires of the curriculum that each ranking fights in a generation: the same fires, the same random draws."""
+    n_steps_max: Count = 150
+    """Steps of a fight at most: which fights are lost shows early, and lost ones are the slow ones."""
+    step: PositiveShare = 0.8
+    """Share of the way that mean and spread move towards those of the best."""
+    spread: Positive = 1.0
+    """Standard deviation of every weight at first; the means are 0."""
+    spread_least: Positive = 0.1
+    """What it does not fall below, before the last generation."""
+
+    def __post_init__(self) -> None:
+        """Raise TrainingError if a hyperparameter is not what it may be."""
+        super().__post_init__()
+        if self.n_best > self.n_candidates:
+            raise TrainingError(expected("method", "n_best", f"at most n_candidates, {self.n_candidates}", self.n_best))
+
+    def trainer(self, curriculum: Curriculum, *, seed: int, cities: CityCache | None = None) -> SearchTrainer:
+        """Return what searches for one team; see `Method.trainer`."""
+        return SearchTrainer(curriculum, self, seed=seed, cities=cities)
+
+
+METHOD: Final = Search()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Generation(Report):
+    """What came of one generation."""
+
+    milestone: bool = True
+    generation: int
+    """From 0."""
+    n_generations: int
+    """In all."""
+    score_mean: float
+    """Of all rankings, as a share of the maximum."""
+    score_best: float
+    """Of the best ones, on the fires by which they were found to be the best."""
+    spread: float
+    """Mean standard deviation of the weights from now on."""
+
+    @property
+    def text(self) -> str:
+        """The generation in one line."""
+        return (
+            f"generation {self.generation + 1} of {self.n_generations}, score {self.score_mean:.3f}, "
+            f"of the best {self.score_best:.3f}, spread {self.spread:.2f}"
+        )
+
+
+@dataclass
+class Progress:
+    """How far a search has come: all that it needs to continue."""
+
+    generation: int
+    mean: Array  # (17,) float64
+    spread: Array  # (17,) float64
+
+
+class SearchTrainer(Trainer[Search, Generation]):
+    """Searches for one ranking; a report is yielded after every generation.
+
+    Args:
+        curriculum: its scenarios are the fires, whatever their stage.
+        method: how to search.
+        seed: of all random draws of this search.
+        cities: cities built before, shared between trainings.
+    """
+
+    report_type: ClassVar[type[Report]] = Generation
+    unit: ClassVar[str] = "generation"
+    plots: ClassVar[Mapping[str, str]] = {
+        "score": "Score, as a share of the maximum",
+        "spread": "Spread: mean standard deviation of the weights",
+    }
+    uses_workers: ClassVar[bool] = True
+
+    def __init__(self, curriculum: Curriculum, method: Search, *, seed: int, cities: CityCache | None = None) -> None:
+        super().__init__(curriculum, method, seed=seed)
+        self._cities = cities if cities is not None else CityCache()
+        self._fires: list[BuiltScenario] = []
+        self._free = self.free_weights()
+        self.progress = Progress(0, np.zeros(len(self._free)), np.where(self._free, method.spread, 0.0))
+
+    @property
+    def share_done(self) -> float:
+        """How many of the generations are done."""
+        return self.progress.generation / self.method.n_generations
+
+    def run(self, workers: Workers) -> Iterator[Generation]:
+        """Search, yielding a report after every generation.
+
+        Args:
+            workers: who fights, in threads. When their `stop` is set, the generation under way is left, as if it had
+                not begun.
+        """
+        self._build()
+        with workers.make_pool(workers.n) as pool:
+            while not self.done and not workers.stop.is_set():
+                report = self._generation(pool, workers.stop)
+                if report is not None:
+                    yield report
+
+    def team(self) -> RankingTeam:
+        """Return what has been found so far: the mean of the distribution that candidates are drawn from."""
+        provenance = {**self.identity, "generations_done": self.progress.generation}
+        return RankingTeam(self.progress.mean[np.newaxis].copy(), self.method.own_targets, provenance)
+
+    def state(self) -> dict[str, Array]:
+        """Return the generation, and the standard deviation of every weight."""
+        generation = np.array([self.progress.generation], dtype=np.int64)
+        return {"spread": self.progress.spread, "generation": generation}
+
+    def restore(self, team: Team, state: Mapping[str, Array], *, source: str) -> None:
+        """Continue where another trainer stood; see `Trainer.restore`."""
+        check_arrays(state, "spread", "generation", source=source)
+        spread, generation = state["spread"], state["generation"]
+        if spread.shape != (N_WEIGHTS,) or spread.dtype != np.float64 or (spread < 0).any():
+            wanted = f"{N_WEIGHTS} numbers >= 0"
+            raise TrainingError(expected(source, "spread", wanted, f"{spread.dtype} {spread.shape}"))
+        check_finite(spread, "spread", source=source)
+        n = self.method.n_generations
+        if generation.shape != (1,) or generation.dtype != np.int64 or not 0 <= generation[0] <= n:
+            raise TrainingError(expected(source, "generation", f"a whole number up to {n}", str(generation.tolist())))
+        if not isinstance(team, RankingTeam):
+            raise TrainingError(expected(source, "", RankingTeam.what, team.what))
+        self.progress = Progress(int(generation[0]), team.weights[0].copy(), spread.copy())
+
+    def own_plots(self) -> Mapping[str, str]:
+        """Return a plot for every group of weights that are searched for."""
+        return {self._plot(group): f"Weights of {group}" for group in self._groups()}
+
+    def points(self, report: Generation) -> Mapping[str, Mapping[str, float]]:
+        """Return what is drawn of the last generation."""
+        mean = self.progress.mean.tolist()
+        return {
+            "score": {"all": report.score_mean, "the best": report.score_best},
+            "spread": {"": report.spread},
+            **{
+                self._plot(group): {weight.name: mean[place] for place, weight in members.items()}
+                for group, members in self._groups().items()
+            },
+        }
+
+    def page(self) -> str:
+        """Return what the weights come to by now, and what each of them counts."""
+        prefers = "\n".join(f"* {sentence}" for sentence in self.team().sentences(row=0))
+        members = [weight for group in self._groups().values() for weight in group.values()]
+        meanings = "\n".join(f"* **{weight.name}**: {weight.meaning}" for weight in members)
+        n = f"{self.progress.generation} of {self.method.n_generations}"
+        return f"# Generation {n}\n\n{prefers}\n\n{HELP}\n{meanings}\n"
+
+    def free_weights(self) -> Array:
+        """Return which weights are searched for, (17,) bool; the others stay 0."""
+        free = np.ones(N_WEIGHTS, dtype=np.bool_)
+        if not self.method.cooperation:
+            free[N_TARGET_FEATURES - N_OF_TEAM : N_TARGET_FEATURES] = False
+        if self.method.own_targets:
+            free[N_TARGET_FEATURES:] = False
+        return free
+
+    def policy_of(self, weights: Array) -> KernelPolicy:
+        """Return the policy of a team whose brigades all follow these weights."""
+        return from_rankings(weights[np.newaxis], own_targets=self.method.own_targets)
+
+    def _plot(self, group: str) -> str:
+        return f"weights/{self.seed}/{group.replace(' ', '-')}"
+
+    def _groups(self) -> Mapping[str, Mapping[int, Weight]]:
+        """Return the weights that are searched for, by their place among all, in groups of what they are about."""
+        place = {weight.name: k for k, weight in enumerate(WEIGHTS)}
+        groups = {
+            name: {place[one.name]: one for one in members if self._free[place[one.name]]}
+            for name, members in GROUPS.items()
+        }
+        return {name: members for name, members in groups.items() if members}
+
+    def _build(self) -> None:
+        if self._fires:
+            return
+        n = self.method.n_steps_max
+        scenarios = [scenario for stage in self.curriculum.stages for scenario in stage.scenarios]
+        short = [one.with_values({"steps": n}) if one.steps > n else one for one in scenarios]
+        self._fires = [self._cities.build(scenario) for scenario in short]
+
+    def _generation(self, pool: Executor, stop: Event) -> Generation | None:
+        method, progress = self.method, self.progress
+        candidates = progress.mean + progress.spread * self._noise()
+        fires = self._draw_fires()
+        shares = pool.map(
+            lambda pair: math.nan if stop.is_set() else self._fight(*pair),
+            ((candidate, fire) for candidate in candidates for fire in fires),
+        )
+        scores = np.array(list(shares)).reshape(len(candidates), len(fires))
+        if np.isnan(scores).any():
+            return None
+        means = [math.fsum(row) / len(fires) for row in scores]  # fsum: the same sum whatever the machine
+        best = sorted(range(len(means)), key=lambda k: -means[k])[: method.n_best]
+        self.progress = _moved(progress, candidates[best], method, self._free)
+        return Generation(
+            generation=progress.generation,
+            n_generations=method.n_generations,
+            score_mean=math.fsum(means) / len(means),
+            score_best=math.fsum(means[k] for k in best) / len(best),
+            spread=math.fsum(self.progress.spread[self._free]) / int(self._free.sum()),
+        )
+
+    def _noise(self) -> Array:
+        noise = np.zeros((self.method.n_candidates, len(self._free)))
+        fill_normals(self.seed, WEIGHT, self.progress.generation, noise)
+        return noise
+
+    def _draw_fires(self) -> list[int]:
+        """Draw the fires of a generation, without repetition while there are enough."""
+        generation = self.progress.generation
+        order = sorted(range(len(self._fires)), key=lambda fire: hash_key(self.seed, FIRE, fire, generation))
+        return order[: self.method.n_fires]
+
+    def _fight(self, weights: Array, fire: int) -> float:
+        """Return the score of a ranking on a fire, as a share of the maximum."""
+        key = hash_key(self.seed, EPISODE, fire, self.progress.generation)
+        world = self._fires[fire].world(seed=key >> (64 - SEED_BITS))
+        world.run(self.policy_of(weights).for_brigades(world.n_brigades))
+        return float(world.state.outcome.score[0] / world.state.outcome.score[1])
+
+
+def _moved(progress: Progress, best: Array, method: Search, free: Array) -> Progress:
+    """Move mean and spread towards those of the best candidates."""
+    n, step = len(best), method.step
+    mean, spread = progress.mean.copy(), progress.spread.copy()
+    for k in np.flatnonzero(free):
+        column: Sequence[float] = best[:, k].tolist()
+        center = math.fsum(column) / n
+        deviation = math.sqrt(math.fsum((weight - center) ** 2 for weight in column) / n)
+        mean[k] = (1.0 - step) * mean[k] + step * center
+        spread[k] = max((1.0 - step) * spread[k] + step * deviation, method.spread_least)
+    return Progress(progress.generation + 1, mean, spread)

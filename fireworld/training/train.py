@@ -1,0 +1,143 @@
+"""The front door to training: `train` makes one team, `prepare_trainings` several with their files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+from fireworld.arguments import SEED_MAX, path_of, seed_of, settings_of, whole_number
+from fireworld.errors import TrainingError, expected
+from fireworld.interrupt import Interrupted
+from fireworld.policy.teams.team import Team
+from fireworld.scenario import Scenario
+from fireworld.simulation.built import CityCache
+from fireworld.training.curriculum import Curriculum, find_curriculum
+from fireworld.training.method import Method
+from fireworld.training.methods import find_method
+from fireworld.training.training import Callback, Training, begin_all, train_all
+
+REPETITIONS_MAX: Final = 10_000
+JOBS_MAX: Final = 1000
+
+
+def train(
+    curriculum: str | Path | Curriculum | Scenario | None = None,
+    *,
+    method: str | Method = "paper",
+    seed: int = 1,
+    set: Mapping[str, object] | None = None,
+    stages: str | Sequence[str] | None = None,
+    output: str | Path | None = None,
+    log: str | Path | None = None,
+    resume: bool = False,
+    force: bool = False,
+    callbacks: Sequence[Callback] = (),
+    jobs: int | None = None,
+) -> Team:
+    """Train a team.
+
+    The same curriculum, method and seed give the same team, and the same bytes of its file.
+
+    Args:
+        curriculum: a name, a YAML file or a `Curriculum`; or a scenario by name, file or object, which is a curriculum
+            of that scenario alone (with cooperation if it has more than one brigade). None: the method's own.
+        method: a name, as in "paper" or "search", or a `Method` with its hyperparameters.
+        seed: of all random draws of the training, 0 to 2**32 - 1.
+        set: hyperparameters of the method by name, as in {"alpha": 0.1}.
+        stages: the curriculum's stages to train in, by name: a list, or text as in "alone,together". None: all.
+        output: the team file to write. While the training is unfinished, a checkpoint stands beside it.
+        log: a CSV file to write, with a line for every report.
+        resume: continue from the checkpoint of `output`; or, if its training is done, return that team.
+        force: replace existing files, checkpoints too.
+        callbacks: each is called as `callback(training, report)` after every report, in this thread. `training` is a
+            `Training` (`seed`, `n_reports`, `trainer.share_done`, `trainer.team()`); `report` is of the method, such
+            as `EpisodeReport` or `Generation`: its `as_dict()` is a line of the log, its `text` is for people. A
+            callback that raises `StopTraining` stops the training: `train` returns the team as it is, and leaves a
+            checkpoint instead of the output.
+        jobs: fights at a time, where the method has many at once; None: as many as there are cores.
+
+    Returns:
+        The trained team.
+
+    Raises:
+        TrainingError: no such curriculum, method, hyperparameter or stage, or a checkpoint of another training.
+        ScenarioError: a scenario that makes no sense.
+        OutputError: a file is in the way, or cannot be written.
+        Interrupted: Ctrl-C; the part under way has been finished, and a checkpoint stands beside the output.
+        ArgumentError: another kind of value than an argument may have.
+    """
+    jobs = None if jobs is None else whole_number("jobs", jobs, least=1, most=JOBS_MAX)
+    if not isinstance(callbacks, Sequence) or not all(map(callable, callbacks)):
+        raise TrainingError(expected("callbacks", "", "a list of functions of (training, report)", callbacks))
+    (training,) = prepare_trainings(
+        curriculum,
+        method=method,
+        seed=seed,
+        set=set,
+        stages=stages,
+        output=output,
+        log=log,
+        resume=resume,
+        force=force,
+    )
+    train_all([training], jobs=jobs, callbacks=callbacks)
+    if training.team is None and not training.stopped:
+        raise Interrupted(training.interruption)
+    return training.team if training.team is not None else training.trainer.team()
+
+
+def prepare_trainings(
+    curriculum: str | Path | Curriculum | Scenario | None = None,
+    *,
+    repetitions: int = 1,
+    method: str | Method = "paper",
+    seed: int = 1,
+    set: Mapping[str, object] | None = None,
+    stages: str | Sequence[str] | None = None,
+    output: str | Path | None = None,
+    log: str | Path | None = None,
+    resume: bool = False,
+    force: bool = False,
+) -> list[Training]:
+    """Check everything, and return trainings for `train_all`; arguments and errors are those of `train`.
+
+    There are as many as `repetitions`, with the seeds that follow `seed`; several have numbered files, TEAM-1.npz and
+    so on.
+    """
+    repetitions = whole_number("repetitions", repetitions, least=1, most=REPETITIONS_MAX)
+    seed = seed_of(seed)
+    if seed + repetitions - 1 > SEED_MAX:
+        got = f"up to {seed + repetitions - 1}"
+        raise TrainingError(expected("--repetitions", "", f"seeds up to {SEED_MAX}", got))
+    if resume and force:
+        raise TrainingError("--force and --resume exclude each other")
+    if resume and output is None:
+        raise TrainingError(expected("--resume", "", "an output whose checkpoint to continue from", "none"))
+    way = find_method(method) if isinstance(method, str) else method
+    if not isinstance(way, Method):
+        raise TrainingError(expected("--method", "", "a name or a Method", type(way).__name__))
+    way = way.with_settings(settings_of(set))
+    chosen = find_curriculum(way.curriculum if curriculum is None else curriculum)
+    if stages is not None:
+        chosen = chosen.only([name.strip() for name in stages.split(",")] if isinstance(stages, str) else stages)
+    cities = CityCache()
+    trainings = [
+        Training(
+            trainer=way.trainer(chosen, seed=seed + number - 1, cities=cities),
+            path=_numbered("output", output, number, repetitions),
+            log_path=_numbered("log", log, number, repetitions),
+            force=force,
+        )
+        for number in range(1, repetitions + 1)
+    ]
+    begin_all(trainings, resume=resume)
+    return trainings
+
+
+def _numbered(name: str, path: str | Path | None, number: int, repetitions: int) -> Path | None:
+    """Return the file of one of several trainings: TEAM-3.npz; TEAM.npz if it is the only one."""
+    if path is None:
+        return None
+    whole = path_of(name, path)
+    return whole if repetitions == 1 else whole.with_name(f"{whole.stem}-{number}{whole.suffix}")

@@ -1,0 +1,264 @@
+"""Training: a team on its way to its file. It can be stopped after any report, and continues bit for bit."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from fireworld.errors import OutputError, TrainingError, expected
+from fireworld.executors import Workers, threads
+from fireworld.files import check_output, check_outputs, write_file
+from fireworld.interrupt import gentle_interrupt
+from fireworld.policy.teams.npz import SUFFIX
+from fireworld.policy.teams.team import Team, read_team, write_team
+from fireworld.training.method import Report, Trainer
+
+CHECKPOINT_SUFFIX: Final = ".checkpoint"
+HINT: Final = "name what it was begun with, or begin again with --force"
+
+
+class StopTraining(Exception):  # noqa: N818 - not an error
+    """Raise it in a callback to stop a training: as Ctrl-C does, after what is under way, with a checkpoint."""
+
+
+@dataclass
+class Training:
+    """One team on its way to its file.
+
+    Attributes:
+        trainer: trains it.
+        path: the team file; None: nowhere, and then there is no checkpoint either.
+        log_path: the log, a CSV line for every report; None: nowhere.
+        force: existing files are replaced.
+        team: the trained team, once it is done and its file written.
+        n_reports: how often it has reported, interrupted trainings before this one included.
+        has_checkpoint: whether there is a checkpoint of this training.
+        stopped: whether a callback raised StopTraining.
+    """
+
+    trainer: Trainer[Any, Any]
+    path: Path | None = None
+    log_path: Path | None = None
+    force: bool = False
+    team: Team | None = None
+    n_reports: int = 0
+    has_checkpoint: bool = False
+    stopped: bool = False
+    log: str = field(default="", repr=False)
+    error: Exception | None = field(default=None, repr=False)
+
+    @property
+    def seed(self) -> int:
+        """Of all random draws of the training."""
+        return self.trainer.seed
+
+    @property
+    def checkpoint(self) -> Path | None:
+        """The checkpoint's file."""
+        return self.path and self.path.with_name(self.path.name + CHECKPOINT_SUFFIX)
+
+    @property
+    def interruption(self) -> str:
+        """How far an interrupted training has come, and how to continue."""
+        done = f"interrupted after {self.n_reports} {self.trainer.unit}s"
+        return f"{done}; continue from {self.checkpoint} with --resume" if self.has_checkpoint else done
+
+    def begin(self) -> None:
+        """Check that nothing would be overwritten, before any work is done.
+
+        Raises:
+            OutputError: a file is in the way, or a folder is missing.
+        """
+        check_outputs([path for path in (self.path, self.log_path) if path is not None], force=self.force)
+        if self.path is not None:
+            check_output(self.path, force=self.force, endings=(SUFFIX,))
+        if self.checkpoint is not None and self.checkpoint.exists() and not self.force:
+            hint = "continue from it with --resume, or begin again with --force"
+            got = "one of an earlier training"
+            raise OutputError(expected(str(self.checkpoint), "", "no checkpoint", got, hint))
+
+    def resume(self) -> bool:
+        """Continue where an earlier call stopped; return whether there was something to continue from.
+
+        Raises:
+            TrainingError: a file of another training.
+            OutputError: a file is in the way.
+        """
+        if self.path is not None and self.path.exists():
+            self.team = read_team(self.path)[0]
+            self._check_identity(self.team, self.path)
+            return True
+        if self.checkpoint is None or not self.checkpoint.exists():
+            self.begin()
+            return False
+        if self.log_path is not None:
+            check_output(self.log_path)
+        source = str(self.checkpoint)
+        team, state = read_team(self.checkpoint)
+        self._check_identity(team, self.checkpoint)
+        log = state.pop("log", np.zeros(0, dtype=np.uint8))
+        self.trainer.restore(team, state, source=source)
+        try:
+            self.log = log.tobytes().decode()
+        except UnicodeDecodeError:
+            raise TrainingError(expected(source, "log", "text", "other bytes")) from None
+        self.n_reports = len([*csv.reader(io.StringIO(self.log))])
+        self.has_checkpoint = True
+        return True
+
+    def run(self, workers: Workers, callbacks: Sequence[Callback] = ()) -> None:
+        """Train to the end, or until stopped; write a checkpoint at every milestone, the team at last.
+
+        Args:
+            workers: when their `stop` is set, the training stops after what is under way, with a checkpoint.
+            callbacks: called with this training and the report, after every report.
+
+        Raises:
+            OutputError: something cannot be written; the last checkpoint stays.
+        """
+        try:
+            self._run(workers, callbacks)
+        except Exception as error:
+            self.error = error
+            raise
+
+    def _run(self, workers: Workers, callbacks: Sequence[Callback]) -> None:
+        if self.team is not None or workers.stop.is_set():
+            return
+        for report in self.trainer.run(workers):
+            self.n_reports += 1
+            self.log += _csv_line(report.as_dict().values())
+            try:
+                for callback in callbacks:
+                    callback(self, report)
+            except StopTraining:
+                self.stopped = True
+            if report.milestone:
+                self._write_checkpoint()
+            if self.stopped or workers.stop.is_set():
+                break
+        if self.trainer.done:
+            self._finish()
+            return
+        self._write_checkpoint()
+        if self.path is None:
+            self._write_log()
+
+    def _write_checkpoint(self) -> None:
+        if self.checkpoint is None:
+            return
+        log = np.frombuffer(self.log.encode(), dtype=np.uint8)
+        try:
+            write_team(self.trainer.team(), self.checkpoint, force=True, extra={**self.trainer.state(), "log": log})
+        except OutputError as error:
+            raise self._with_checkpoint(error) from None
+        self.has_checkpoint = True
+
+    def _finish(self) -> None:
+        team = self.trainer.team()
+        try:
+            self._write_log()
+            try:
+                if self.path is not None:
+                    write_team(team, self.path, force=self.force)
+            except OutputError:
+                if self.log_path is not None:
+                    self.log_path.unlink(missing_ok=True)  # in the way of the next attempt
+                raise
+        except OutputError as error:
+            raise self._with_checkpoint(error) from None
+        if self.checkpoint is not None:
+            self.checkpoint.unlink(missing_ok=True)
+        self.team, self.has_checkpoint = team, False
+
+    def _write_log(self) -> None:
+        if self.log_path is not None:
+            write_file(self.log_path, (_csv_line(self.trainer.report_type.columns()) + self.log).encode())
+
+    def _with_checkpoint(self, error: OutputError) -> OutputError:
+        return OutputError(
+            f"{error}; continue from {self.checkpoint} with --resume" if self.has_checkpoint else str(error)
+        )
+
+    def _check_identity(self, team: Team, path: Path) -> None:
+        check_same(team.short_provenance, self.trainer.identity, path)
+
+
+Callback = Callable[[Training, Report], object]
+"""Called with a training and its last report."""
+
+
+def train_all(trainings: Sequence[Training], *, jobs: int | None = None, callbacks: Sequence[Callback] = ()) -> None:
+    """Train teams until all are done, or until Ctrl-C, which leaves checkpoints.
+
+    Args:
+        trainings: of one method.
+        jobs: trainings at a time, or parts of one training at a time where its method uses all workers; None: as many
+            as there are cores.
+        callbacks: called after every report: in this thread, where trainings come one after another; else in the
+            threads that train.
+
+    Raises:
+        FireworldError: one training failed; the others have stopped, with a checkpoint.
+    """
+    with gentle_interrupt() as stop:
+        workers = threads(jobs, stop=stop)
+        if len(trainings) == 1 or trainings[0].trainer.uses_workers:
+            for training in trainings:
+                training.run(workers, callbacks)
+            return
+        workers.run([partial(training.run, workers, callbacks) for training in trainings])
+        for training in trainings:
+            if training.error is not None:  # while all were stopping
+                raise training.error
+
+
+def begin_all(trainings: Sequence[Training], *, resume: bool) -> None:
+    """Check that nothing is in the way, or find what there is to continue from.
+
+    Raises:
+        TrainingError: there is nothing to continue from, or a file of another training.
+        OutputError: a file is in the way.
+    """
+    if not resume:
+        for training in trainings:
+            training.begin()
+        return
+    found = [training.resume() for training in trainings]  # all of them, each to be looked at
+    if not any(found):
+        got = f"no {trainings[0].checkpoint}"
+        raise TrainingError(expected("--resume", "", "a checkpoint to continue from", got, "leave out --resume"))
+
+
+def check_same(found: Mapping[str, Any], identity: Mapping[str, Any], path: Path) -> None:
+    """Check that work was begun with what is asked for now; name the first key that differs.
+
+    Args:
+        found: what the work was begun with, as plain values; keys that are not of the identity are ignored.
+        identity: what is asked for.
+        path: where it was found.
+
+    Raises:
+        TrainingError: they differ.
+    """
+    for key, wanted in identity.items():
+        got = found.get(key)
+        if got == wanted:
+            continue
+        if isinstance(got, dict) and isinstance(wanted, dict):
+            part = next(name for name in [*wanted, *got] if got.get(name) != wanted.get(name))
+            key, wanted, got = f"{key}.{part}", wanted.get(part), got.get(part)  # noqa: PLW2901 - the part at fault
+        raise TrainingError(expected(str(path), key, str(wanted), got, HINT))
+
+
+def _csv_line(values: Iterable[object]) -> str:
+    line = io.StringIO()
+    csv.writer(line, lineterminator="\n").writerow(values)
+    return line.getvalue()
