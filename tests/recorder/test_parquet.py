@@ -349,6 +349,16 @@ def test_opens_in_pandas(exported):
     assert frame.groupby("step")["energy"].sum().shape == (31,)
 
 
+def test_a_table_in_memory_is_the_same_in_pandas(exported, log_path):
+    pandas = pytest.importorskip("pandas")
+    for name, table in TABLES.items():
+        frame = pandas.DataFrame(table_arrays(open_log(log_path), name))
+        for column in table.columns:
+            if column.names:
+                frame[column.name] = pandas.Categorical(frame[column.name], categories=column.names)
+        pandas.testing.assert_frame_equal(frame, pandas.read_parquet(exported / f"{name}.parquet"))
+
+
 def test_opens_in_polars(exported):
     polars = pytest.importorskip("polars")
     frame = polars.read_parquet(exported / "decisions.parquet")
