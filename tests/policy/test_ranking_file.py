@@ -9,7 +9,7 @@ import pytest
 
 from fireworld.errors import TrainingError
 from fireworld.policy.files import load_team_file, parse_team_file
-from fireworld.policy.names import load_policy, note_on_team
+from fireworld.policy.names import find_policy, note_on_team
 from fireworld.policy.ranking import FORMAT, parse_ranking, save_ranking
 from fireworld.policy.team import Team, save_team
 from tests.policy.test_ranking import NAMES, make_ranking
@@ -44,14 +44,14 @@ def test_it_may_hold_more_arrays(tmp_path):
 def test_it_is_a_policy_by_its_path(tmp_path):
     path = tmp_path / "mine.npz"
     save_ranking(make_ranking(3), path)
-    named = load_policy(str(path))
+    named = find_policy(str(path))
     assert (named.name, named.trained_choices) == ("mine.npz", "")
     assert named.attachments == {"policy.npz": path.read_bytes()}
     assert named.digest == make_ranking(3).policy().digest
     assert note_on_team(named, 3) == ""
     assert "mine.npz: 3 " in note_on_team(named, 4)
     save_ranking(make_ranking(1), path, force=True)
-    assert note_on_team(load_policy(str(path)), 4) == "", "one row is for all"
+    assert note_on_team(find_policy(str(path)), 4) == "", "one row is for all"
 
 
 def test_team_files_of_tables_are_read_too(tmp_path):
@@ -104,7 +104,7 @@ def test_what_is_wrong_with_a_file(tmp_path, changes, message):
     for read in (
         lambda: parse_team_file((tmp_path / "bad.npz").read_bytes(), source="bad"),
         lambda: parse_ranking((tmp_path / "bad.npz").read_bytes(), source="bad"),
-        lambda: load_policy(str(tmp_path / "bad.npz")),
+        lambda: find_policy(str(tmp_path / "bad.npz")),
     ):
         with pytest.raises(TrainingError, match=message) as caught:
             read()
@@ -118,7 +118,7 @@ def test_a_file_of_a_later_format(tmp_path):
     with pytest.raises(TrainingError, match=message):
         parse_ranking((tmp_path / "bad.npz").read_bytes(), source="bad")
     with pytest.raises(TrainingError, match="got 'fireworld-ranking/2'"):
-        load_policy(str(tmp_path / "bad.npz"))
+        find_policy(str(tmp_path / "bad.npz"))
 
 
 @pytest.mark.parametrize("names", [NAMES[:-1], NAMES[::-1], [*NAMES, "smell"], "temperature", {"temperature": 1}])

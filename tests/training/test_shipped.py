@@ -11,7 +11,7 @@ from fireworld_recorder.reader import open_log
 from benchmarks.shipped import COMMANDS
 from fireworld.errors import PolicyError
 from fireworld.policy.files import load_team_file
-from fireworld.policy.names import load_policy
+from fireworld.policy.names import find_policy
 from fireworld.policy.shipped import team_names, team_path
 from fireworld.policy.team import Team, load_team, save_team
 from fireworld.simulation.built import CityCache
@@ -55,10 +55,10 @@ def test_a_team_comes_from_the_shipped_curriculum(name):
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_by_its_name(name):
-    named = load_policy(name)
+    named = find_policy(name)
     assert named.name == name
     assert named.attachments == {"policy.npz": team_path(name).read_bytes()}
-    assert named.digest == load_policy(str(team_path(name))).digest
+    assert named.digest == find_policy(str(team_path(name))).digest
 
 
 def test_run_and_recorded(here, fireworld):
@@ -77,7 +77,7 @@ def test_help_and_hints_name_them(fireworld):
     for name in team_names():
         assert name in text
     with pytest.raises(PolicyError, match=r"one of .*paper-noncooperative.*; try paper-cooperative$"):
-        load_policy("paper-coperative")
+        find_policy("paper-coperative")
 
 
 def test_any_team_in_the_folder_is_found(tmp_path, monkeypatch):
@@ -85,4 +85,4 @@ def test_any_team_in_the_folder_is_found(tmp_path, monkeypatch):
     assert team_names() == []
     save_team(Team(np.zeros((1, 270, 4)), np.zeros((1, 270, 4), dtype=np.int64)), tmp_path / "mine.npz")
     assert team_names() == ["mine"]
-    assert load_policy("mine").policy.tables.shape == (1, 270, 4)
+    assert find_policy("mine").policy.tables.shape == (1, 270, 4)
