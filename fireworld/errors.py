@@ -1,8 +1,15 @@
-"""Errors that are a user's to mend; each writes its own one-line message."""
+"""User-facing errors; each writes its own one-line message."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
+from typing import Final
+
+SHOWN_MAX: Final = 80
+"""Characters of a user's value that a message shows."""
+DETAIL_MAX: Final = 200
+"""Characters of another exception's message that a message shows."""
 
 
 class FireworldError(Exception):
@@ -49,7 +56,7 @@ class OutputError(FireworldError):
 
 
 def expected(where: str, key: str, wanted: str, got: object, hint: str = "") -> str:
-    """Word a complaint the way every fireworld error is worded.
+    """Return an error message in the form that all of fireworld's have.
 
     Args:
         where: the file (or flag) at fault.
@@ -58,11 +65,24 @@ def expected(where: str, key: str, wanted: str, got: object, hint: str = "") -> 
         got: what was found; shown as Python writes it, shortened.
         hint: what to try, if there is something to try.
     """
-    shown = got if isinstance(got, str) and " " in got else repr(got)
-    if len(shown) > 80:
-        shown = shown[:77] + "..."
     place = f"{where}: {key}" if key else where
-    return one_line(f"{place}: expected {wanted}, got {shown}" + (f"; {hint}" if hint else ""))
+    text = _cut(got, SHOWN_MAX) if isinstance(got, str) and " " in got else shown(got)
+    return one_line(f"{place}: expected {wanted}, got {text}" + (f"; {hint}" if hint else ""))
+
+
+def shown(value: object) -> str:
+    """Return a value as Python writes it, shortened; only its type, if its class cannot write it."""
+    with suppress(Exception, SystemExit):
+        return _cut(repr(value), SHOWN_MAX)
+    return f"something of type {type(value).__name__}"
+
+
+def described(error: BaseException) -> str:
+    """Return an exception in one line: "ValueError: no such state"; only its type, if its class cannot write it."""
+    text = ""
+    with suppress(Exception, SystemExit):
+        text = _cut(" ".join(str(error).split()), DETAIL_MAX)
+    return one_line(f"{type(error).__name__}: {text}" if text else type(error).__name__)
 
 
 def nearest(name: str, known: Iterable[str], *, n: int = 1, otherwise: str = "") -> str:
@@ -74,5 +94,9 @@ def nearest(name: str, known: Iterable[str], *, n: int = 1, otherwise: str = "")
 
 
 def one_line(message: str) -> str:
-    """Escape what cannot be printed: a line break in a name or key of the user's must not make two lines of it."""
+    """Escape what cannot be printed: a line break in a user's name or key must not make two lines of the message."""
     return "".join(character if character.isprintable() else repr(character)[1:-1] for character in message)
+
+
+def _cut(text: str, most: int) -> str:
+    return text if len(text) <= most else text[: most - 3] + "..."

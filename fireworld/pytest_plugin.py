@@ -111,14 +111,15 @@ class Recorder:
             The new run, for what else a test may expect: `run.column("score", "n_burnt_out")[-1] == 0`.
         """
         from fireworld.errors import FireworldError
-        from fireworld.recording.golden.order import given_policy, place_order
+        from fireworld.policy.names import find_policy
+        from fireworld.recording.golden.order import place_order
 
         path = self._path(name)
         if not (self._update or path.exists()):
             raise _failure(f"{_shown(path)}: there is no such recording; run with {UPDATE} to store it")
         settings = {key: _as_yaml(value) for key, value in (overrides or {}).items()}
         try:
-            named = None if isinstance(policy, str) else given_policy(policy)
+            named = None if isinstance(policy, str) else find_policy(policy)
             order = place_order(
                 path.parent,
                 scenario=scenario,

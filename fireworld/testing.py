@@ -13,14 +13,16 @@ pytest collects the inherited tests; nothing here needs pytest.
 from __future__ import annotations
 
 import random
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import lru_cache
 from typing import Final
 
 import numpy as np
 
-from fireworld.policy.asking import begin
-from fireworld.policy.protocol import Decision, Observation, Policy
+from fireworld.kernels.arrays import CityArrays
+from fireworld.policy.asking import ask, begin, complete, keeps
+from fireworld.policy.protocol import Action, Decision, Observation, Policy
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import BuiltScenario, build_scenario
 from fireworld.simulation.state import named_arrays
@@ -31,30 +33,50 @@ STEPS: Final = 30
 
 
 @lru_cache(maxsize=4)
-def _stage(n_brigades: int) -> BuiltScenario:
+def _built(n_brigades: int) -> BuiltScenario:
     """Build the scenario of the tests once for every size of team."""
     return build_scenario(load_scenario(SCENARIO).with_settings({"brigades.n": str(n_brigades)}))
 
 
-class _Watched:
-    """Passes a policy's decisions on, and checks that asking for them changes nothing but the policy."""
+class _Watched(Policy):
+    """Passes calls on to a policy, and checks that they change nothing but the policy."""
 
-    def __init__(self, policy: Policy) -> None:
+    def __init__(self, policy: Policy, world: World) -> None:
         self.policy = policy
+        self.arrays = [
+            *((f"city's {name}", array) for name, array in named_arrays(world.city_arrays)),
+            *((f"world's {name}", array) for name, array in named_arrays(world.state)),
+        ]
+
+    def begin(self, city: CityArrays, n_brigades: int, seed: int) -> None:
+        with self._unchanged("begin()"):
+            begin(self.policy, city, n_brigades=n_brigades, seed=seed)
+
+    def keeps(self, brigade: int, last_action: int, step: int) -> bool:
+        with self._unchanged("keeps()"):
+            answers = {keeps(self.policy, brigade, last_action, step) for _ in range(2)}
+        assert len(answers) == 1, "keeps() answers differently when it is called again for the same brigade and step"
+        return answers.pop()
 
     def decide(self, observation: Observation) -> Decision:
-        before = [(name, array.copy()) for name, array in named_arrays(observation.world)]
-        luck = (random.getstate(), np.random.get_state(legacy=True))  # noqa: NPY002 - the state that must not change
-        decision = self.policy.decide(observation)
-        for (name, held), (_, array) in zip(before, named_arrays(observation.world), strict=True):
-            assert np.array_equal(held, array, equal_nan=True), f"decide() changed the world's {name}"
+        with self._unchanged("decide()"):
+            return ask(self.policy, observation)
+
+    @contextmanager
+    def _unchanged(self, call: str) -> Iterator[None]:
+        before = [(name, array.copy()) for name, array in self.arrays]
+        drawn = (random.getstate(), np.random.get_state(legacy=True))  # noqa: NPY002 - the state that must not change
+        yield
+        for (name, held), (_, array) in zip(before, self.arrays, strict=True):
+            if not np.array_equal(held, array, equal_nan=True):
+                array[...] = held  # the city is shared with the tests that come after
+                raise AssertionError(f"{call} changed the {name}")
         now = (random.getstate(), np.random.get_state(legacy=True))  # noqa: NPY002
-        assert repr(now) == repr(luck), "decide() used global randomness; draw from fireworld.draws or a generator"
-        return decision
+        assert repr(now) == repr(drawn), f"{call} used global randomness; draw from fireworld.draws or a generator"
 
 
 class PolicyConformance:
-    """Inherit from this in a test and say how the policy is made."""
+    """Inherit from this in a test, with a `make_policy` of your own."""
 
     def make_policy(self) -> Policy:
         """Return a new policy."""
@@ -65,12 +87,12 @@ class PolicyConformance:
         assert isinstance(self.make_policy(), Policy), "a policy has a method decide(observation)"
 
     def test_decides_in_every_step(self) -> None:
-        """Decisions for teams of several sizes are Decisions, and making them changes nothing else."""
+        """Decisions for teams of several sizes are Decisions, and neither they nor `begin` change anything else."""
         for n_brigades in (1, 2, 5):
             assert _play(self.make_policy(), n_brigades=n_brigades), "nobody was ever asked"
 
     def test_same_seed_same_decisions(self) -> None:
-        """Two new policies decide alike: a run can be had again from its seed."""
+        """Two new policies decide alike: a run can be repeated from its seed."""
         assert _play(self.make_policy()) == _play(self.make_policy()), "one seed led to two runs"
 
     def test_begins_anew(self) -> None:
@@ -79,14 +101,27 @@ class PolicyConformance:
         _play(used, seed=2)
         assert _play(used) == _play(self.make_policy()), "something of the run before is left; see `begin`"
 
+    def test_keeps_from_any_step_on(self) -> None:
+        """`keeps` answers for any brigade, action and step after `begin`: a fork begins in the middle of a run."""
+        watched, world = _begun(self.make_policy(), n_brigades=5, seed=1)
+        for brigade in range(world.n_brigades):
+            for last_action in range(len(Action)):
+                for step in range(1, STEPS + 1):
+                    watched.keeps(brigade, last_action, step)
 
-def _play(policy: Policy, *, n_brigades: int = 3, seed: int = 1) -> Sequence[Decision]:
+
+def _begun(policy: object, *, n_brigades: int, seed: int) -> tuple[_Watched, World]:
+    """Return a watched policy for which a run begins, and the world of the run."""
+    world = _built(n_brigades).world(seed=seed, n_steps_max=STEPS)
+    watched = _Watched(complete(policy), world)
+    watched.begin(world.city_arrays, n_brigades, seed)
+    return watched, world
+
+
+def _play(policy: object, *, n_brigades: int = 3, seed: int = 1) -> Sequence[Decision]:
     """Run a short episode and return the decisions."""
-    world: World = _stage(n_brigades).world(seed=seed, n_steps_max=STEPS)
-    watched = _Watched(policy)
-    begin(policy, world.city_arrays, n_brigades=n_brigades, seed=seed)
+    watched, world = _begun(policy, n_brigades=n_brigades, seed=seed)
     decisions: list[Decision] = []
     while not (world.terminated or world.truncated):
-        choices = world.step(watched)
-        decisions += [decision for decision in choices.decisions if decision.action >= 0]
+        decisions += [decision for decision in world.step(watched).decisions if decision.action >= 0]
     return decisions

@@ -144,13 +144,13 @@ def recorded_up_to(log: Log, step: int) -> MemoryRecording:
 
 def _policy(log: Log, name: str | None) -> NamedPolicy:
     """Return who goes on."""
-    from fireworld.policy.names import NamedPolicy, load_policy
+    from fireworld.policy.names import NamedPolicy, find_policy
     from fireworld.recording.decisions import RecordedDecisions
     from fireworld.recording.resume import recorded_policy
 
     if RECORDED in {name, log.header.policy if name is None else None}:
         return NamedPolicy(RECORDED, log.digest, RecordedDecisions(log))
-    return load_policy(name) if name is not None else recorded_policy(log.header, source=str(log.path))
+    return find_policy(name) if name is not None else recorded_policy(log.header, source=str(log.path))
 
 
 def _decided(texts: tuple[str, ...], log: Log) -> dict[int, Decision]:

@@ -78,12 +78,12 @@ def command(
         raise click.UsageError("--scene goes with --record.")
     screen = find_screen(view=view, url=view_url)
     announce_compilation()
-    from fireworld.policy.names import load_policy, note_on_team
+    from fireworld.policy.names import find_policy, note_on_team
     from fireworld.scenario import load_scenario, split_settings
     from fireworld.simulation.built import build_scenario
     from fireworld.simulation.run import prepare_run
 
-    named = load_policy(policy)
+    named = find_policy(policy)
     chosen = load_scenario(scenario).with_settings(split_settings(settings))
     note = note_on_team(named, chosen.brigades.n, choices=chosen.choices)
     if note:

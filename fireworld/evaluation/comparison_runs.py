@@ -13,14 +13,14 @@ from pathlib import Path
 from threading import Event
 from typing import Any, Final
 
-from fireworld.errors import PolicyError, expected
+from fireworld.errors import PolicyError
 from fireworld.evaluation.results import Result, Results, RunKey, simulator_version
 from fireworld.evaluation.runs import Outcomes, Row, outcomes, row_of, run_compiled, run_step_by_step
 from fireworld.executors import AnyExecutor, Workers, n_cores, processes, threads, workers_for
 from fireworld.interrupt import Interrupted
 from fireworld.policy.asking import describe
 from fireworld.policy.kernel import KernelPolicy
-from fireworld.policy.names import NamedPolicy, load_policy
+from fireworld.policy.names import NamedPolicy, find_policy
 from fireworld.scenario import Scenario
 from fireworld.simulation.built import BuiltScenario, build_scenario
 
@@ -57,7 +57,7 @@ class RunnablePolicy:
         """Whether other processes can make it."""
         if isinstance(self.given, str | Path) or self.compiled:
             return True
-        if getattr(self.given, "__module__", "__main__") == "__main__" or not self.identity:
+        if not (self.identity and self.named.can_be_found_again):
             return False
         try:
             pickle.dumps(self.given)
@@ -76,8 +76,8 @@ def runnable(given: Any, place: int) -> RunnablePolicy:
     Raises:
         PolicyError, TrainingError: it cannot be found or made.
     """
-    named = _find(given)
-    identity = policy_identity(named)
+    named = find_policy(given)
+    identity = named.identity
     return RunnablePolicy(
         given=named.policy if isinstance(named.policy, KernelPolicy) else given,
         named=named,
@@ -106,7 +106,7 @@ class PolicyRun:
         if isinstance(self.policy, KernelPolicy):
             return row_of(run_compiled(self.built, self.policy, seed=self.seed))
         try:
-            return row_of(run_step_by_step(self.built, _find(_copied(self.policy)).policy, seed=self.seed))
+            return row_of(run_step_by_step(self.built, find_policy(_copied(self.policy)).policy, seed=self.seed))
         except PolicyError as error:
             raise PolicyError(f"{self.label}, seed {self.seed}: {error}") from error
 
@@ -198,17 +198,6 @@ def _n_processes() -> int:
     return n_cores() if not hasattr(sys.modules["__main__"], "__file__") else 1
 
 
-def policy_identity(named: NamedPolicy) -> str:
-    """Return the digest of what a policy does, if it has one; else of its file, with its class; "" if neither is known.
-
-    A file may hold several policies: so the class goes with it.
-    """
-    own = getattr(named.policy, "digest", None)
-    if isinstance(own, str):
-        return own
-    return f"{named.digest}:{type(named.policy).__qualname__}" if named.digest else ""
-
-
 def _copied(policy: Any) -> Any:
     """Return a copy of an object, so that nothing it remembers gets from run to run; a class or a name stays itself."""
     try:
@@ -224,23 +213,3 @@ def _sent_run(scenario: Scenario, label: str, policy: Any, seed: int) -> PolicyR
 @lru_cache(maxsize=16)
 def _built_once(scenario: Scenario) -> BuiltScenario:
     return build_scenario(scenario)
-
-
-def _find(given: Any) -> NamedPolicy:  # XXX find_policy
-    if isinstance(given, str | Path):
-        return load_policy(str(given))
-    import hashlib
-    import inspect
-
-    from fireworld.policy.asking import name_of
-    from fireworld.policy.protocol import Policy
-
-    made = given() if inspect.isclass(given) else given
-    if not isinstance(made, Policy):
-        raise PolicyError(expected("policy", "", "a policy", made))
-    digest = getattr(made, "digest", None)
-    try:
-        source = hashlib.sha256(Path(inspect.getfile(type(made))).read_bytes()).hexdigest()
-    except (OSError, TypeError):
-        source = ""
-    return NamedPolicy(name_of(made), digest if isinstance(digest, str) else source, made)

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import astuple, dataclass, fields
-from difflib import get_close_matches
-from typing import Final, NoReturn
+from dataclasses import astuple, dataclass
+from typing import Final
 
 from fireworld.errors import PolicyError, expected
 from fireworld.kernels.arrays import CityArrays, WorldState
 from fireworld.planning.forecast import BURNING_COST, Assignment, Forecast
 from fireworld.planning.search import action_values, climb
-from fireworld.policy.protocol import Decision, Observation
+from fireworld.policy.protocol import Decision, Observation, Policy
 from fireworld.records import ACTIONS
 from fireworld.simulation.state import copy_world
 
@@ -20,56 +19,48 @@ OPTION_MAX: Final = 1000
 
 @dataclass(frozen=True)
 class PlannerOptions:
-    """How far, how often and how often over the planner looks ahead; whole numbers from 1 to 1000."""
+    """How far, how often and with how many rollouts the planner looks ahead; whole numbers from 1 to 1000."""
 
     horizon: int = 30
     """Steps of a rollout."""
     interval: int = 4
-    """Steps that an assignment is kept for."""
+    """Steps for which a plan is followed."""
     rollouts: int = 1
-    """Rollouts of each assignment, each with luck of its own."""
+    """Rollouts of each assignment, each with random draws of its own."""
 
     def __post_init__(self) -> None:
-        """Refuse numbers out of range.
-
-        Raises:
-            PolicyError: a number is not from 1 to 1000.
-        """
-        for field in fields(self):
-            number = getattr(self, field.name)
-            if not 1 <= number <= OPTION_MAX:
-                _refuse(field.name, number)
+        """Raise PolicyError for numbers out of range."""
+        for name, number in vars(self).items():
+            if type(number) is not int or not 1 <= number <= OPTION_MAX:
+                wanted = f"a whole number from 1 to {OPTION_MAX}"
+                raise PolicyError(expected("--policy", f"planner:{name}", wanted, number))
 
 
-class Planner:
+class Planner(Policy):
     """Tries out joint assignments of actions in copies of the world, through the kernels that run the world itself.
 
-    It knows the true model and the state of the world, but not its luck. It is what a policy that looks at eight
-    features is measured by, and taught by: its Q-values are what each action of a brigade is worth while the others
-    keep to the plan.
+    It knows the true model and the state of the world, but not its random draws. Policies that see eight features are
+    measured by it, and taught by it: its Q-values are the values of a brigade's actions while the others follow the
+    plan.
     """
 
     def __init__(self, options: PlannerOptions | None = None) -> None:
         self.options = options if options is not None else PlannerOptions()
+        self.digest = hashlib.sha256(repr((astuple(self.options), BURNING_COST)).encode()).hexdigest()
         self._room: WorldState | None = None
         self._planned_at = -1
         self._plan: Assignment = ()
         self._values: tuple[tuple[float, ...], ...] = ()
 
-    @property
-    def digest(self) -> str:
-        """SHA-256 of what the planner does."""
-        return hashlib.sha256(repr((astuple(self.options), BURNING_COST)).encode()).hexdigest()
-
     def begin(self, city: CityArrays, n_brigades: int, seed: int) -> None:
         """Forget the run before."""
-        del city, n_brigades, seed  # the seed above all: a plan must not know the luck of the run
+        del city, n_brigades, seed  # the seed above all: a plan must not know the random draws of the run
         self._room, self._planned_at, self._plan = None, -1, ()
 
     def decide(self, observation: Observation) -> Decision:
-        """Do what the plan says; the first brigade that chooses in a period of `interval` steps makes the plan.
+        """Follow the plan; the first brigade that chooses in a period of `interval` steps makes it.
 
-        Periods follow the clock, not the age of the plan: a run taken up in its midst plans at the same steps.
+        Periods follow the step number, not the age of the plan: a run that is resumed plans at the same steps.
         """
         step, brigade, interval = observation.step, observation.brigade, self.options.interval
         if not self._plan or step // interval != self._planned_at // interval:
@@ -90,30 +81,11 @@ class Planner:
         self._values = tuple(action_values(forecast.value, self._plan, brigade) for brigade in range(n_brigades))
 
 
-def planner(text: str = "") -> Planner:
-    """Return a planner with options as they stand on the command line.
-
-    Args:
-        text: "horizon=30,interval=4,rollouts=1"; what is left out keeps its default.
-
-    Raises:
-        PolicyError: an unknown option, one given twice, or not a whole number from 1 to 1000.
-    """
-    given: dict[str, int] = {}
-    for part in text.split(",") if text else ():
-        name, _, number = part.partition("=")
-        known = [field.name for field in fields(PlannerOptions)]
-        if name not in known:
-            near = get_close_matches(name, known, n=1)
-            hint = f"try {near[0]}" if near else ""
-            raise PolicyError(expected("--policy", "planner", "options " + ", ".join(known), name, hint))
-        if name in given:
-            raise PolicyError(expected("--policy", "planner", "every option once", f"{name} twice"))
-        if not (number.isascii() and number.isdecimal() and len(number) < 10):
-            _refuse(name, number)
-        given[name] = int(number)
-    return Planner(PlannerOptions(**given))
-
-
-def _refuse(name: str, number: object) -> NoReturn:
-    raise PolicyError(expected("--policy", f"planner:{name}", f"a whole number from 1 to {OPTION_MAX}", number))
+def planner(
+    *,
+    horizon: int = PlannerOptions.horizon,
+    interval: int = PlannerOptions.interval,
+    rollouts: int = PlannerOptions.rollouts,
+) -> Planner:
+    """Return a planner, by its parameters on the command line; errors as for `PlannerOptions`."""
+    return Planner(PlannerOptions(horizon, interval, rollouts))

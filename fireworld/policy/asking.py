@@ -1,19 +1,24 @@
-"""Ask a policy, and turn what goes wrong in it into one line that names the policy, the step and the brigade."""
+"""Ask a policy, whatever a user brought as one; what goes wrong in it becomes one line that says where."""
 
 from __future__ import annotations
 
+import inspect
 import math
 import operator
 import sysconfig
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from difflib import get_close_matches
+from functools import partial
+from itertools import islice
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
-from fireworld.errors import FireworldError, PolicyError, expected
+from fireworld.errors import FireworldError, PolicyError, described, expected, shown
 from fireworld.kernels.arrays import CityArrays
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
-from fireworld.records import ACTIONS
+from fireworld.records import ACTION_NAMES, ACTIONS
 
 LIBRARIES: Final = (
     str(Path(__file__).parents[1]),
@@ -21,107 +26,172 @@ LIBRARIES: Final = (
     "<",  # code without a file
 )
 """Where code that is not the user's own comes from."""
-DETAIL_SHOWN_MAX: Final = 200
+AN_ANSWER: Final = f"a Decision or an action ({', '.join(ACTION_NAMES)}, or 0 to {len(ACTION_NAMES) - 1})"
+
+Value = TypeVar("Value")
+
+
+class Adapted(Policy):
+    """A policy made of what a user brought; what that lacks of a policy's methods is the default.
+
+    Attributes:
+        given: an object with a method `decide`, or a function of the observation.
+    """
+
+    def __init__(self, given: Any) -> None:
+        self.given = given
+        self._choose = given.decide if isinstance(given, Policy) else given
+        for name in ("begin", "keeps", "stateless", "digest"):
+            own = getattr(given, name, None)
+            if own is not None:
+                setattr(self, name, own)
+
+    def decide(self, observation: Observation) -> Decision | str | int:
+        """Return what the user's own answers, which may be anything."""
+        answer: Decision | str | int = self._choose(observation)
+        return answer
+
+
+def complete(given: Any, *, where: str = "policy") -> Policy:
+    """Return a policy with all of a policy's methods: the one given, or one that calls it.
+
+    Args:
+        given: an object with a method `decide`, or a function of the observation.
+        where: what errors call it.
+
+    Raises:
+        PolicyError: what is given has no method `decide` and is no function.
+    """
+    if Policy in type(given).__mro__:
+        policy: Policy = given
+        return policy
+    if inspect.isclass(given) or not (isinstance(given, Policy) or callable(given)):
+        wanted = "a policy with a method decide(observation) or a function of the observation"
+        raise PolicyError(expected(where, "", wanted, given if inspect.isclass(given) else type(given).__name__))
+    return Adapted(given)
 
 
 def begin(policy: Policy, city: CityArrays, *, n_brigades: int, seed: int) -> None:
-    """Tell a policy that a run begins, if it wants to know.
+    """Let a policy prepare for a run.
 
     Raises:
         PolicyError: the policy's own `begin` fails.
     """
-    if not hasattr(policy, "begin"):
-        return
-    try:
-        policy.begin(city, n_brigades, seed)
-    except FireworldError:
-        raise
-    except Exception as error:
-        raise PolicyError(f"policy {name_of(policy)}: begin: {describe(error)}") from error
+    with users_code(policy, "begin"):
+        complete(policy).begin(city, n_brigades, seed)
 
 
 def ask(policy: Policy, observation: Observation) -> Decision:
     """Return a policy's decision, checked and in plain Python values.
 
     Raises:
-        PolicyError: the policy fails, or answers with something else than a decision.
+        PolicyError: the policy fails, or answers with something that is no decision.
+    """
+    with users_code(policy, observation):
+        return _checked(policy.decide(observation), policy, observation)
+
+
+def keeps(policy: Policy, brigade: int, last_action: int, step: int) -> bool:
+    """Return whether a policy lets a brigade repeat its last action; False if it has none.
+
+    Raises:
+        PolicyError: the policy's own `keeps` fails.
+    """
+    with users_code(policy, f"step {step}, brigade {brigade}: keeps"):
+        return last_action >= 0 and bool(policy.keeps(brigade, last_action, step))
+
+
+@contextmanager
+def users_code(what: object, moment: str | Observation) -> Iterator[None]:
+    """Turn whatever a user's code raises into a PolicyError; only Ctrl-C and fireworld's own errors pass.
+
+    Args:
+        what: a policy, or what the message begins with.
+        moment: when it is called: what the message goes on with.
     """
     try:
-        answer = policy.decide(observation)
-    except FireworldError:
+        yield
+    except (FireworldError, KeyboardInterrupt):
         raise
-    except Exception as error:
-        raise PolicyError(f"policy {name_of(policy)}: {_moment(observation)}: {describe(error)}") from error
-    return _checked(answer, policy, observation)
+    except BaseException as error:
+        place = what if isinstance(what, str) else f"policy {name_of(what)}"
+        raise PolicyError(f"{place}: {_said(moment)}: {describe(error)}") from error
 
 
 def name_of(policy: object) -> str:
-    """Name a policy as a user would on the command line: module:Class."""
-    kind = type(policy)
-    return f"{kind.__module__}:{kind.__qualname__}"
+    """Return a policy's name as on the command line: module:Class, or module:function."""
+    given = policy.given if isinstance(policy, Adapted) else policy
+    while isinstance(given, partial):
+        given = given.func
+    named = given if inspect.isroutine(given) or inspect.isclass(given) else type(given)
+    return f"{named.__module__}:{named.__qualname__}"
 
 
 def describe(error: BaseException) -> str:
-    """Say in one line what went wrong in a user's code, and where: "ValueError: no such state (mine.py, line 7)"."""
-    text = " ".join(str(error).split())
-    shown = text if len(text) <= DETAIL_SHOWN_MAX else text[: DETAIL_SHOWN_MAX - 3] + "..."
+    """Return in one line what went wrong in a user's code, and where: "ValueError: no such state (mine.py, line 7)"."""
     own = [frame for frame in traceback.extract_tb(error.__traceback__) if not frame.filename.startswith(LIBRARIES)]
-    place = f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
-    return f"{type(error).__name__}{': ' if shown else ''}{shown}{place}"
+    return described(error) + (f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else "")
 
 
-def _moment(observation: Observation) -> str:
-    return f"step {observation.step}, brigade {observation.brigade}"
+def _said(moment: str | Observation) -> str:
+    return moment if isinstance(moment, str) else f"step {moment.step}, brigade {moment.brigade}"
 
 
-def _checked(answer: object, policy: Policy, observation: Observation) -> Decision:
+def _checked(answer: Any, policy: Policy, observation: Observation) -> Decision:
     """Return a decision with nothing but plain values in it."""
-    wanted = f"a Decision with an action from 0 to {len(Action) - 1}"
-    if not isinstance(answer, Decision):
-        raise _refusal(policy, observation, wanted, answer)
+
+    def refusal(wanted: str, got: object, hint: str = "") -> PolicyError:
+        return PolicyError(expected(f"policy {name_of(policy)}", _said(observation), wanted, got, hint))
+
+    def plain(name: str, wanted: str, convert: Callable[[Any], Value]) -> Value:
+        value = getattr(answer, name)
+        try:
+            return convert(value)
+        except (ArithmeticError, TypeError, ValueError):
+            raise refusal(wanted, f"{name} {shown(value)}") from None
+
+    bare = not isinstance(answer, Decision)
+    action = _action_index(answer if bare else answer.action)
+    if action is None or (bare and isinstance(answer, bool)):
+        near = get_close_matches(answer, ACTION_NAMES, n=1) if isinstance(answer, str) else []
+        hint = f"try {near[0]}" if near else ""
+        raise refusal(AN_ANSWER, answer if bare else f"action {shown(answer.action)}", hint)
+    answer = Decision(action) if bare else answer
+    target = None
+    if action == Action.OWN_TARGET:
+        wanted = "with OWN_TARGET a target that is one of observation.burning"
+        target = plain("target", wanted, operator.index)
+        if target not in observation.burning:
+            raise refusal(wanted, f"target {shown(target)}")
+    return Decision(
+        action,
+        target=target,
+        q_values=plain("q_values", f"q_values that are {len(ACTIONS)} numbers, or None", _action_values),
+        epsilon=plain("epsilon", "epsilon as a number", _number),
+        value=plain("value", "value as a number, or None", lambda value: None if value is None else _number(value)),
+        explored=plain("explored", "explored as true or false", bool),
+    )
+
+
+def _action_index(action: Any) -> int | None:
+    """Return the index of an action given by its name or index; None if there is no such action."""
+    if isinstance(action, str):
+        return ACTION_NAMES.index(action) if action in ACTION_NAMES else None
     try:
-        action = operator.index(answer.action)
+        index = operator.index(action)
     except TypeError:
-        raise _refusal(policy, observation, wanted, f"action {answer.action!r}") from None
-    if not 0 <= action < len(Action):
-        raise _refusal(policy, observation, wanted, f"action {action}")
-    target = _own_target(answer, policy, observation) if action == Action.OWN_TARGET else None
-    try:
-        values = _plain_values(answer.q_values)
-    except (TypeError, ValueError):
-        wanted = f"q_values that are {len(ACTIONS)} numbers, or None"
-        raise _refusal(policy, observation, wanted, f"q_values {answer.q_values!r}") from None
-    try:
-        epsilon = _number(answer.epsilon)
-    except (TypeError, ValueError):
-        raise _refusal(policy, observation, "epsilon as a number", f"epsilon {answer.epsilon!r}") from None
-    try:
-        value = None if answer.value is None else _number(answer.value)
-    except (TypeError, ValueError):
-        raise _refusal(policy, observation, "value as a number, or None", f"value {answer.value!r}") from None
-    explored = bool(answer.explored)
-    return Decision(action, target=target, q_values=values, value=value, explored=explored, epsilon=epsilon)
+        return None
+    return index if 0 <= index < len(ACTION_NAMES) else None
 
 
-def _own_target(answer: Decision, policy: Policy, observation: Observation) -> int:
-    """Return the target of a brigade that names it itself."""
-    wanted = "with OWN_TARGET a target that is one of observation.burning"
-    try:
-        target = operator.index(answer.target)  # type: ignore[arg-type]  # whatever a user's policy answers
-    except TypeError:
-        raise _refusal(policy, observation, wanted, f"target {answer.target!r}") from None
-    if target not in observation.burning:
-        raise _refusal(policy, observation, wanted, f"target {target}")
-    return target
-
-
-def _plain_values(values: Sequence[float] | None) -> tuple[float, ...] | None:
+def _action_values(values: Any) -> tuple[float, ...] | None:
+    """Return the values of the four actions; of what yields more, no more than one too many is read."""
     if values is None:
         return None
-    plain = tuple(_number(value) for value in values)
-    if len(plain) != len(ACTIONS):
+    found = tuple(_number(value) for value in islice(values, len(ACTIONS) + 1))
+    if len(found) != len(ACTIONS):
         raise ValueError
-    return plain
+    return found
 
 
 def _number(value: Any) -> float:
@@ -130,7 +200,3 @@ def _number(value: Any) -> float:
     if math.isnan(number):
         raise ValueError
     return number
-
-
-def _refusal(policy: Policy, observation: Observation, wanted: str, got: object) -> PolicyError:
-    return PolicyError(expected(f"policy {name_of(policy)}", _moment(observation), wanted, got))

@@ -1,4 +1,4 @@
-"""Policies that the compiled episode can follow by itself: fixed actions, random, tables, and rankings of targets."""
+"""Policies that the compiled episode follows by itself: fixed actions, random, tables, and rankings of targets."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from fireworld.kernels.choice import (
     table_state,
 )
 from fireworld.kernels.ranking import N_OF_BUILDING, N_WEIGHTS, rank
-from fireworld.policy.protocol import Decision, Observation
+from fireworld.policy.protocol import Decision, Observation, Policy
 from fireworld.records import ACTIONS
 
 NO_TABLES: Final = np.zeros((1, 1, 4))
@@ -29,8 +29,8 @@ NO_RANKINGS: Final = np.zeros((1, N_WEIGHTS))
 
 
 @dataclass
-class KernelPolicy:
-    """A policy as data, so that one implementation of the choice serves single steps and whole episodes.
+class KernelPolicy(Policy):
+    """A policy as data: one implementation of the choice serves single steps and whole compiled episodes.
 
     Brigade b behaves as entry b modulo the length of `kinds`, so a policy fits any number of brigades.
     """
@@ -42,18 +42,19 @@ class KernelPolicy:
     """(tables, states, 4) float64, states 4320 or 270."""
     epsilon: float = 0.0
     commit: int = 1
-    """Steps that a choice is kept for."""
+    """Steps for which a choice is repeated."""
     rankings: Array = field(default_factory=NO_RANKINGS.copy)
     """(rankings, 17) float64, weights."""
+    stateless = True
     _ready: PolicyArrays | None = field(default=None, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Refuse what the compiled episode and single steps would not do alike."""
+        """Raise ValueError for what the compiled episode and single steps would not do alike."""
         if self.commit > 1 and {RANK_NAMED, RANK_ALL} & set(self.kinds):
             raise ValueError("a ranking chooses in every step: commit must be 1")
 
     def for_brigades(self, n_brigades: int) -> PolicyArrays:
-        """Spread the policy over a team."""
+        """Return the policy's arrays for a team."""
         turn = np.arange(n_brigades) % len(self.kinds)
         return PolicyArrays(
             kind=np.array(self.kinds, dtype=np.int32)[turn],
@@ -66,7 +67,7 @@ class KernelPolicy:
         )
 
     def begin(self, city: CityArrays, n_brigades: int, seed: int) -> None:
-        """Get ready for a run of a team."""
+        """Prepare for a run of a team."""
         del city, seed
         self._ready = self.for_brigades(n_brigades)
 
@@ -90,11 +91,11 @@ class KernelPolicy:
         )
 
     def keeps(self, brigade: int, last_action: int, step: int) -> bool:
-        """Tell whether a brigade goes on with what it chose before."""
+        """Return whether a brigade repeats what it chose before."""
         return bool(keeps_choice(brigade, last_action, self.commit, step))
 
     @property
-    def digest(self) -> str:
+    def digest(self) -> str:  # type: ignore[override]  # no attribute to set, as in a user's class: it follows the data
         """SHA-256 of what the policy does."""
         content = hashlib.sha256(repr((self.kinds, self.actions, self.table_of, self.epsilon, self.commit)).encode())
         content.update(repr(self.tables.shape).encode() + np.ascontiguousarray(self.tables, dtype="<f8").tobytes())
@@ -157,7 +158,7 @@ def from_tables(tables: Array, *, epsilon: float = 0.0, commit: int = 1) -> Kern
     Args:
         tables: (tables, 4320 or 270, 4) values.
         epsilon: probability of a random action.
-        commit: steps that a choice is kept for.
+        commit: steps for which a choice is repeated.
     """
     n = len(tables)
     return KernelPolicy((TABLE,) * n, (0,) * n, tuple(range(n)), tables, epsilon, commit)

@@ -1,26 +1,35 @@
-"""Find a policy by the name a user gives: a built-in one, a team, or MODULE:CLASS of the user's own."""
+"""Find a policy by what a user gives: a name, a file, a class, an object or a function."""
 
 from __future__ import annotations
 
-import hashlib
 import importlib
 import inspect
-import sys
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 from fireworld.errors import PolicyError, expected
-from fireworld.policy.asking import describe
+from fireworld.policy.arguments import (
+    Parameters,
+    check_no_parameters,
+    check_plain,
+    check_signature,
+    read_parameters,
+    write_parameters,
+)
+from fireworld.policy.asking import complete, name_of
 from fireworld.policy.chief import chief
+from fireworld.policy.identity import can_be_imported, covering, digest_of, digest_of_module
+from fireworld.policy.importing import CODE_SUFFIX, find_in, import_source, make_policy
 from fireworld.policy.kernel import KernelPolicy, always, at_random, each_another
 from fireworld.policy.protocol import Policy
 from fireworld.policy.teams.npz import SUFFIX, read_bytes
 from fireworld.policy.teams.shipped import team_names, team_path
-from fireworld.policy.teams.team import parse_team
+from fireworld.policy.teams.team import load_team, parse_team
 from fireworld.records import ACTIONS
 
 BUILT_IN: Final[dict[str, Callable[[], KernelPolicy]]] = {
@@ -29,13 +38,31 @@ BUILT_IN: Final[dict[str, Callable[[], KernelPolicy]]] = {
     "random": at_random,
     "chief": chief,
 }
-"""Policies by name."""
-
-WITH_OPTIONS: Final = {"planner": "fireworld.planning.planner:planner"}
-"""Policies that take options, `NAME` or `NAME:KEY=VALUE,...`: what makes each from the options' text. They use the
-world, which this layer does not know, so they are found as a user's own policy is."""
+"""Rules by name."""
+RULES: Final = {
+    "easiest": "all brigades go for the burning building with the lowest temperature",
+    "nearest-to-civilian": "all brigades go for the burning building nearest to a civilian",
+    "nearest-to-center": "all brigades go for the burning building nearest to the center of the fire site",
+    "nearest-to-me": "every brigade goes for the burning building nearest to itself",
+    "each-another": "brigade 0 always takes the first of these four actions, brigade 1 the second, and so on",
+    "random": "every brigade takes one of the four actions at random, in every step",
+    "chief": "one brigade between the fire and the civilians, the others at the nearest front",
+}
+"""What each rule does."""
+PLANNERS: Final = {"planner": "fireworld.planning.planner:planner"}
+"""Where the functions are that make planners: they use the world, which this layer does not know."""
 TEAM_ATTACHMENT: Final = "policy.npz"
 """What a recording calls the team file that its brigades followed."""
+_FILE: Final = re.compile(rf"(.+?(?:{re.escape(CODE_SUFFIX)}|{re.escape(SUFFIX)}))(?::(.*))?", re.DOTALL)
+
+
+class KnownPolicy(NamedTuple):
+    """A policy that comes with fireworld."""
+
+    name: str
+    kind: str
+    """rule, team or planner."""
+    doc: str
 
 
 @dataclass(frozen=True)
@@ -44,52 +71,130 @@ class NamedPolicy:
 
     name: str
     digest: str
-    policy: Policy
-    attachments: Mapping[str, bytes] = field(default_factory=dict)
+    """"" if what it does cannot be told: of an object with values that are not plain, of a function without source."""
+    policy: Policy = field(repr=False)
+    attachments: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     """Files that go with a recording of it, by name."""
-    trained_choices: str = ""
-    """Of a team: the scenario's `choices` that it was trained with, where its file tells."""
+    trained_choices: str = field(default="", repr=False)
+    """Of a team: the scenario's `choices` that it was trained with, where its file has them."""
+    part: str = field(default="", repr=False)
+    """The class, function or object within its source; "": the class of the policy."""
+    parameters: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    """What it was made with."""
+    given: object = field(default=None, repr=False)
+    """What `find_policy` was given to find it."""
+
+    def __post_init__(self) -> None:
+        """Complete what has not all of a policy's methods."""
+        object.__setattr__(self, "policy", complete(self.policy))
+
+    @property
+    def identity(self) -> str:
+        """What tells the policy from every other one, parts of one file too; "" if that cannot be told."""
+        own = self.policy.digest
+        if own and not self.parameters:
+            return own
+        part = self.part or name_of(self.policy).partition(":")[2]
+        return ":".join(filter(None, (self.digest, part, own))) if self.digest else ""
+
+    @property
+    def can_be_found_again(self) -> bool:
+        """Whether another process finds the same policy: one with a name, or whose class or function is in a module."""
+        return isinstance(self.given, str) or can_be_imported(self.policy if self.given is None else self.given)
+
+    def fresh(self) -> Policy:
+        """Return the policy for another run: made anew, unless an object was given."""
+        anew = isinstance(self.given, str) or inspect.isclass(self.given)
+        return self._found_again().policy if anew else self.policy
+
+    def require_identity(self, purpose: str) -> str:
+        """Return the identity; raise PolicyError if there is none.
+
+        Args:
+            purpose: what it is for: what the message begins with, as in "--results".
+        """
+        if not self.identity:
+            wanted = "a policy whose source can be read, and whose values are plain"
+            hint = "write it into a file, or give it an attribute `digest`: a text that changes with what it does"
+            raise PolicyError(expected(purpose, self.name, wanted, "another", hint))
+        return self.identity
+
+    def require_found_again(self, purpose: str) -> None:
+        """Raise PolicyError if other processes cannot find the policy; `purpose` as for `require_identity`."""
+        if not self.can_be_found_again:
+            wanted, hint = "a policy that other processes can import", "write it into a file"
+            raise PolicyError(expected(purpose, self.name, wanted, "one that only this process has", hint))
+
+    def _found_again(self) -> NamedPolicy:
+        return find_policy(self.given, parameters=None if isinstance(self.given, str) else self.parameters)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what another process finds the policy by."""
+        kept = vars(self)
+        return kept if self.given is None else {"given": self.given, "parameters": self.parameters}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Find the policy again."""
+        vars(self).update(state)
+        if "name" not in state:
+            vars(self).update(vars(self._found_again()))
 
 
-def load_policy(name: str) -> NamedPolicy:
-    """Return a policy by name.
+def find_policy(given: object, *, parameters: Parameters | None = None) -> NamedPolicy:
+    """Return a policy by what a user gives.
 
     Args:
-        name: a built-in policy, with its options where it takes any; a team that comes with fireworld, or a team file;
-            or `module:Class` found from the current folder or the Python path.
+        given: the name of a policy or team that comes with fireworld, or a team file; FILE.py:CLASS or MODULE:CLASS,
+            without the class where there is only one, and instead of it also a function that returns a policy, a
+            function of the observation, or an object; all of these with parameters, as in `mine.py:Mine:k=3,near=true`.
+            Or a class, an object with a method `decide`, or a function of the observation. Or a NamedPolicy.
+        parameters: plain values that the class or function takes as keywords; more of them, if `given` has some.
 
     Raises:
-        PolicyError: no such policy, or it has no `decide` method, or making it fails.
+        PolicyError: there is no such policy, it does not take the parameters, or making it fails.
         TrainingError: a team file that cannot be read or makes no sense.
     """
-    if name.endswith(SUFFIX):
-        return _load_team(Path(name), name=Path(name).name)
-    kind, _, options = name.partition(":")
-    if kind in WITH_OPTIONS and (name == kind or "=" in options):
-        module_name, _, maker = WITH_OPTIONS[kind].partition(":")
-        made = getattr(importlib.import_module(module_name), maker)(options)
-        return NamedPolicy(name, made.digest, made)
-    if ":" in name:
-        return _load_own(name)
-    if name in team_names():
-        return _load_team(team_path(name), name=name)
-    if name not in BUILT_IN:
-        meant = name.lower()
-        names = [*BUILT_IN, *WITH_OPTIONS, *team_names()]
-        near = [known for known in names if meant and meant in known] or get_close_matches(meant, names, n=1)
-        hint = "try " + " or ".join(near) if near else "MODULE:CLASS names one of your own"
-        raise PolicyError(expected("--policy", "", "one of " + ", ".join(names), name, hint))
-    policy = BUILT_IN[name]()
-    return NamedPolicy(name, policy.digest, policy)
+    if isinstance(given, NamedPolicy):
+        check_no_parameters(parameters or {}, where=f"policy: {given.name}")
+        return given
+    if isinstance(given, str | Path):
+        return _by_name(str(given), parameters or {})
+    is_named = inspect.isclass(given) or inspect.isroutine(given)
+    where = f"policy: {name_of(given)}" if is_named else "policy"
+    values = check_plain(parameters or {}, where=where)
+    policy = make_policy(given, values, where=where, as_function=True)
+    name, source = name_of(given), policy.digest if isinstance(policy.digest, str) else ""
+    return NamedPolicy(
+        _with_parameters(name, values),
+        covering(source or digest_of(given), values),
+        policy,
+        part=name.partition(":")[2],
+        parameters=values,
+        given=given,
+    )
+
+
+def policies() -> list[KnownPolicy]:
+    """List the policies that come with fireworld."""
+    known = [KnownPolicy(name, "rule", doc) for name, doc in RULES.items()]
+    known += [
+        KnownPolicy(name, "planner", "tries out assignments of actions in copies of the world") for name in PLANNERS
+    ]
+    for name in team_names():
+        origin = load_team(name).provenance
+        method, curriculum = (dict(origin.get(key, {})) for key in ("method", "curriculum"))
+        learned = method.get("name") or method.get("rule")
+        known.append(KnownPolicy(name, "team", f"learned by {learned}, with the curriculum {curriculum.get('name')}"))
+    return known
 
 
 def note_on_team(named: NamedPolicy, n_brigades: int, *, choices: str = "") -> str:
-    """Say how a team will be used otherwise than it was trained, a line each; nothing of other policies.
+    """Return how a team is used differently from its training, a line each; nothing about other policies.
 
     Args:
         named: the policy.
         n_brigades: brigades of the scenario.
-        choices: of the scenario; left out, nothing is said of them.
+        choices: of the scenario; left out, they are not compared.
     """
     if TEAM_ATTACHMENT not in named.attachments or not isinstance(named.policy, KernelPolicy):
         return ""
@@ -98,7 +203,7 @@ def note_on_team(named: NamedPolicy, n_brigades: int, *, choices: str = "") -> s
 
 
 def _note_on_tables(n_tables: int, n_brigades: int) -> str:
-    """Say which brigade follows which table, if there is not one for each."""
+    """Return which brigade follows which table, if there is not one for each."""
     if n_tables in {1, n_brigades}:
         return ""
     if n_tables > n_brigades:
@@ -107,38 +212,78 @@ def _note_on_tables(n_tables: int, n_brigades: int) -> str:
 
 
 def _note_on_choices(trained: str, choices: str) -> str:
-    """Say so if the brigades learned to choose in another order than the scenario has it."""
+    """Return whether the brigades learned to choose in another order than the scenario has."""
     if not (trained and choices) or trained == choices:
         return ""
     return f"trained with choices {trained}, run with choices {choices}; --set choices={trained} runs it as trained"
 
 
-def _load_team(path: Path, *, name: str) -> NamedPolicy:
-    """Return the policy of a team file; a recording names it without its folder and takes the file along."""
+def _by_name(text: str, more: Parameters) -> NamedPolicy:
+    """Find a policy by its name, with its parameters and more of them."""
+    source, target, written = _split(text)
+    where = f"--policy: {source}" + (f":{target}" if target else "")
+    values = read_parameters(written, where=where)
+    for name in more.keys() & values:
+        raise PolicyError(expected(where, "", "every parameter once", f"{name} twice"))
+    values |= check_plain(more, where=where)
+    name = _with_parameters(text, more)
+    if source.endswith(SUFFIX) or (source in team_names() and target is None):
+        check_no_parameters(values, where=where)
+        return _team(source)
+    if target is None and source in BUILT_IN | PLANNERS:
+        make = BUILT_IN.get(source) or _function(PLANNERS[source])
+        check_signature(make, values, where=where)
+        policy = make(**values)
+        return NamedPolicy(name, policy.digest, policy, given=name)
+    if ":" not in text and "." not in text:
+        raise _unknown(text)
+    module = import_source(source)
+    thing = find_in(module, target or "", where=f"--policy: {source}")
+    policy = make_policy(thing, values, where=where)
+    digest = covering(digest_of_module(module), values)
+    return NamedPolicy(name, digest, policy, part=target or thing.__qualname__, parameters=values, given=name)
+
+
+def _split(text: str) -> tuple[str, str | None, str]:
+    """Split SOURCE:TARGET:PARAMETERS; what holds a "=" is parameters, so a target can be left out."""
+    file = _FILE.fullmatch(text)
+    source, rest = (
+        (file[1], file[2]) if file else (text.partition(":")[0], text.partition(":")[2] if ":" in text else None)
+    )
+    if rest is None:
+        return source, None, ""
+    target, _, written = rest.partition(":")
+    return (source, None, rest) if "=" in target else (source, target, written)
+
+
+def _with_parameters(name: str, parameters: Parameters) -> str:
+    """Return the name by which a policy with these parameters is found again."""
+    if not parameters:
+        return name
+    separator = "," if "=" in _split(name)[2] else ":"
+    return f"{name}{separator}{write_parameters(parameters)}"
+
+
+def _function(place: str) -> Callable[..., Policy]:
+    module, _, name = place.partition(":")
+    function: Callable[..., Policy] = vars(importlib.import_module(module))[name]
+    return function
+
+
+def _team(source: str) -> NamedPolicy:
+    """Return the policy of a team; a recording names a file without its folder and takes it along."""
+    path, name = (Path(source), Path(source).name) if source.endswith(SUFFIX) else (team_path(source), source)
     content = read_bytes(path)
     team = parse_team(content, source=str(path))
     policy = team.policy()
-    return NamedPolicy(name, policy.digest, policy, {TEAM_ATTACHMENT: content}, team.choices)
+    return NamedPolicy(name, policy.digest, policy, {TEAM_ATTACHMENT: content}, team.choices, given=source)
 
 
-def _load_own(name: str) -> NamedPolicy:
-    module_name, _, class_name = name.partition(":")
-    folder = str(Path.cwd())
-    if folder not in sys.path:
-        sys.path.insert(0, folder)
-    try:
-        module = importlib.import_module(module_name)
-    except (Exception, SystemExit) as error:
-        raise PolicyError(f"--policy: {module_name}: cannot be imported: {describe(error)}") from error
-    made = getattr(module, class_name, None)
-    if made is None:
-        raise PolicyError(expected("--policy", module_name, "a class of that name", class_name))
-    try:
-        policy = made() if inspect.isclass(made) or inspect.isfunction(made) else made
-    except (Exception, SystemExit) as error:
-        raise PolicyError(f"--policy: {name}: cannot be made: {describe(error)}") from error
-    if not isinstance(policy, Policy):
-        wanted = "a policy with a method decide(observation)"
-        raise PolicyError(expected("--policy", name, wanted, type(policy).__name__))
-    source = Path(inspect.getfile(module)).read_bytes()
-    return NamedPolicy(name, hashlib.sha256(source).hexdigest(), policy)
+def _unknown(name: str) -> PolicyError:
+    """Return the error for a name that no policy has."""
+    names, meant = [*BUILT_IN, *PLANNERS, *team_names()], name.lower()
+    near = [known for known in names if meant and meant in known] or get_close_matches(meant, names, n=1)
+    if name and Path(f"{name}{CODE_SUFFIX}").is_file():
+        near = [f"{name}{CODE_SUFFIX}"]
+    hint = "try " + " or ".join(near) if near else "FILE.py:CLASS or MODULE:CLASS names one of your own"
+    return PolicyError(expected("--policy", "", "one of " + ", ".join(names), name, hint))

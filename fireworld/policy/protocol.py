@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from abc import ABCMeta, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,20 +106,49 @@ class Observation:
         return temperature
 
 
-@runtime_checkable
-class Policy(Protocol):
+class _HasDecide(ABCMeta):
+    """Makes every object with a method `decide` an instance of Policy, whatever its class inherits."""
+
+    def __instancecheck__(cls, instance: object) -> bool:
+        """Return whether an object is a policy, or of a subclass of Policy."""
+        if cls is Policy:
+            return callable(getattr(instance, "decide", None))
+        return super().__instancecheck__(instance)
+
+
+class Policy(metaclass=_HasDecide):
     """Decides for every brigade, one after another in order of their numbers.
 
-    The simplest policy is a class with a method:
+    The simplest policy is a class with a method, or a function with its body:
 
         class AlwaysNear:
             def decide(self, observation):
-                return Decision(Action.NEAREST_TO_ME)
+                return Action.NEAREST_TO_ME
 
-    A policy may also have `begin(city, n_brigades, seed)`, called before the first step of every run, and
-    `keeps(brigade, last_action, step)`, true if a brigade goes on with its last action and is not to be asked.
+    Inheriting from Policy is optional: it documents the other methods and types them. fireworld calls those that a
+    class has and uses these defaults for the rest.
     """
 
-    def decide(self, observation: Observation) -> Decision:
-        """Choose an action for one brigade."""
-        ...
+    stateless: bool = False
+    """True: decisions depend on the observation alone, not on earlier steps. Forks then skip the steps before."""
+    digest: str = ""
+    """What identifies the policy's behaviour, if its source does not: a digest of a model it reads, say. Text."""
+
+    @abstractmethod
+    def decide(self, observation: Observation) -> Decision | str | int:
+        """Choose for one brigade: a Decision; or only an action, by its name or index."""
+
+    def begin(self, city: CityArrays, n_brigades: int, seed: int) -> None:
+        """Prepare for a run; called before its first step.
+
+        Args:
+            city: the city's arrays; not to be changed.
+            n_brigades: brigades of the team.
+            seed: of the run's random draws.
+        """
+        del city, n_brigades, seed
+
+    def keeps(self, brigade: int, last_action: int, step: int) -> bool:
+        """Return whether a brigade repeats its last action without being asked; never called if it has none."""
+        del brigade, last_action, step
+        return False

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from fireworld.errors import LogError, expected
-from fireworld.policy.asking import ask
+from fireworld.policy.asking import ask, keeps
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
 from fireworld.recording.replay import recorded_decision
 from fireworld.records import ACTION_NAMES, CityRecord, Recording, RunHeader
@@ -36,11 +36,13 @@ def check_same_luck(first: RunHeader, second: RunHeader, *, names: tuple[str, st
         raise LogError(expected(names[1], "seed", wanted, second.seed))
 
 
-class RecordedDecisions:
+class RecordedDecisions(Policy):
     """Decides as a recorded run did, whatever happens; where nothing is recorded, as the brigade last did there.
 
     Nothing is recorded where a brigade had no choice (it refilled), and after the end of the recording.
     """
+
+    stateless = True
 
     def __init__(self, recording: Recording) -> None:
         self._made = {record.step: record.decisions for record in recording}
@@ -73,7 +75,7 @@ class RecordedDecisions:
         return decision if possible(decision, observation) else FIRST_ACTION
 
 
-class ToldPolicy:
+class ToldPolicy(Policy):
     """A policy for all brigades but those that are told what to do; they ask it only if that is not possible."""
 
     def __init__(self, policy: Policy, told: Told) -> None:
@@ -90,7 +92,7 @@ class ToldPolicy:
         return self._told(brigade, step) is None and keeps(self._policy, brigade, last_action, step)
 
 
-class ComparedPolicy:
+class ComparedPolicy(Policy):
     """Decides as recorded, and asks a policy too: it remembers what it would, and is seen to decide alike or not.
 
     Attributes:
@@ -105,7 +107,7 @@ class ComparedPolicy:
     def decide(self, observation: Observation) -> Decision:
         """Return the recorded decision."""
         brigade, step = observation.brigade, observation.step
-        recorded = self._recorded.decide(observation)
+        recorded = ask(self._recorded, observation)
         last = _last(observation)
         kept = possible(last, observation) and keeps(self._policy, brigade, last.action, step)
         own = last if kept else ask(self._policy, observation)
@@ -131,9 +133,3 @@ def _last(observation: Observation) -> Decision:
     action = int(brigades.action[observation.brigade])
     target = int(brigades.target[observation.brigade]) if action == Action.OWN_TARGET else None
     return Decision(action, target=target)
-
-
-def keeps(policy: Policy, brigade: int, last_action: int, step: int) -> bool:
-    """Tell whether a policy lets a brigade go on with its last action unasked."""
-    rule = getattr(policy, "keeps", None)
-    return rule is not None and bool(rule(brigade, last_action, step))

@@ -11,7 +11,7 @@ from typing import Any, Final
 from fireworld import __version__
 from fireworld.errors import LogError, expected
 from fireworld.policy.names import TEAM_ATTACHMENT, NamedPolicy
-from fireworld.policy.protocol import Decision, Observation
+from fireworld.policy.protocol import Decision, Observation, Policy
 from fireworld.recording.decisions import (
     FIRST_ACTION,
     RecordedDecisions,
@@ -143,7 +143,7 @@ def _check_brigade(option: str, brigade: int, n_brigades: int) -> None:
         raise LogError(expected(option, "brigade", f"a number from 0 to {n_brigades - 1}", brigade))
 
 
-class _Asked:
+class _Asked(Policy):
     """Asked for decisions, it remembers what was seen."""
 
     def __init__(self) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from fireworld.errors import LogError, expected
-from fireworld.policy.protocol import Action, Decision, Observation
+from fireworld.policy.protocol import Action, Decision, Observation, Policy
 from fireworld.records import AIR, Array, CityRecord, Decisions, Recording, RunHeader, Snapshot, StepRecord
 from fireworld.scenario import parse_scenario
 from fireworld.simulation.built import BuiltScenario, build_scenario
@@ -14,7 +14,7 @@ from fireworld.simulation.observer import Observer
 from fireworld.simulation.placement import CITY_ATTACHMENT, SCENARIO_ATTACHMENT
 
 
-class RecordedPolicy:
+class RecordedPolicy(Policy):
     """Decides as a recording says."""
 
     def __init__(self, recording: Recording) -> None:

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 from fireworld.errors import FireworldError, LogError, PolicyError, expected
 from fireworld.policy.asking import begin
-from fireworld.policy.kernel import KernelPolicy
-from fireworld.policy.names import TEAM_ATTACHMENT, NamedPolicy, load_policy
+from fireworld.policy.names import TEAM_ATTACHMENT, NamedPolicy, find_policy
 from fireworld.policy.protocol import Policy
 from fireworld.policy.teams.team import parse_team
 from fireworld.recording.decisions import ComparedPolicy, RecordedDecisions
@@ -51,7 +50,7 @@ def recorded_policy(header: RunHeader, *, source: str) -> NamedPolicy:
             policy = team.policy()
             named = NamedPolicy(name, policy.digest, policy, {TEAM_ATTACHMENT: team_file})
         else:
-            named = load_policy(name)
+            named = find_policy(name)
     except FireworldError as error:
         reason = str(error).removeprefix("--policy: ")
         raise PolicyError(
@@ -66,7 +65,7 @@ def recorded_policy(header: RunHeader, *, source: str) -> NamedPolicy:
 
 def has_memory(policy: Policy) -> bool:
     """Tell whether what a policy decides may depend on what it saw in the steps before."""
-    return not isinstance(policy, KernelPolicy | RecordedDecisions)
+    return not policy.stateless
 
 
 def resume(

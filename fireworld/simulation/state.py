@@ -12,6 +12,7 @@ from fireworld.errors import LogError
 from fireworld.kernels.arrays import (
     Array,
     BrigadeState,
+    CityArrays,
     CivilianState,
     FireState,
     Learner,
@@ -168,7 +169,7 @@ def fresh_world(
     )
 
 
-def named_arrays(world: WorldState) -> Iterator[tuple[str, Array]]:
+def named_arrays(world: WorldState | CityArrays) -> Iterator[tuple[str, Array]]:
     """Yield every array with its name, `group.field`."""
     groups: tuple[Any, ...] = world
     for group_name, group in zip(world._fields, groups, strict=True):

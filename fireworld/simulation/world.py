@@ -16,7 +16,7 @@ from fireworld.kernels.observation import can_choose, find_target, observe
 from fireworld.kernels.outcome import assess
 from fireworld.kernels.sites import find_sites
 from fireworld.parameters import Parameters
-from fireworld.policy.asking import ask
+from fireworld.policy.asking import ask, complete, keeps
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
 from fireworld.simulation.city_arrays import city_arrays, world_constants
 from fireworld.simulation.state import NO_LEARNER, copy_world, fresh_world
@@ -124,7 +124,7 @@ class World:
         """Run one step: look, decide one after another, act, burn, hurt, assess."""
         self.step_number += 1
         self._look()
-        choices = self._decide(policy)
+        choices = self._decide(complete(policy))
         self._act()
         self._burn()
         self._hurt()
@@ -178,7 +178,6 @@ class World:
         before, target_before = brigades.action.copy(), brigades.target.copy()
         in_turn = self.constants.observation.in_turn
         shown, known = (brigades.action, brigades.target) if in_turn else (before, target_before)
-        keeps, step = getattr(policy, "keeps", None), self.step_number
         for brigade in range(self.n_brigades):
             states[brigade] = observe(
                 brigade, shown, brigades, self.state.sites, self.constants.observation, features[brigade]
@@ -186,7 +185,7 @@ class World:
             target = -1
             if can_choose(brigade, brigades, self.state.sites):
                 last = Decision(int(before[brigade]), target=int(target_before[brigade]))
-                if keeps is not None and self._can_keep(brigade, last) and keeps(brigade, last.action, step):
+                if self._can_keep(brigade, last) and keeps(policy, brigade, last.action, self.step_number):
                     decisions[brigade] = last
                 else:
                     decisions[brigade] = self._ask(policy, brigade, features[brigade], int(states[brigade]), known)

@@ -10,6 +10,8 @@ import sys
 
 import pytest
 
+from fireworld.records import ACTION_NAMES
+
 SHORT = ("run", "quick", "--steps", 6)
 
 
@@ -117,7 +119,7 @@ def test_an_existing_recording_is_replaced_only_when_asked(here, fireworld, file
         (("run", "quick", "--policy", "chef"), "--policy: expected one of easiest"),
         (("run", "quick", "--policy", "absent:Mine"), "ModuleNotFoundError"),
         (("run", "quick", "--policy", "policies:Absent"), "expected a class of that name, got 'Absent'"),
-        (("run", "quick", "--policy", "policies:Decision"), "missing 1 required positional argument: 'action'"),
+        (("run", "quick", "--policy", "policies:Decision"), "policies:Decision: expected a value for action"),
         (("run", "quick", "--policy", "policies:os"), "expected a policy with a method decide"),
         (
             ("run", "quick", "--policy", "policies:NeverReady"),
@@ -162,7 +164,10 @@ def test_a_recording_that_cannot_be_written(here, fireworld, files):
     ("policy", "message"),
     [
         ("Failing", "step 5, brigade 1: RuntimeError: lost the thread (policies.py, line "),
-        ("Wrong", "step 5, brigade 0: expected a Decision with an action from 0 to 4, got action 7"),
+        (
+            "Wrong",
+            f"step 5, brigade 0: expected a Decision or an action ({', '.join(ACTION_NAMES)}, or 0 to 4), got action 7",
+        ),
     ],
 )
 def test_a_policy_that_fails_leaves_the_steps_before(here, fireworld, files, policy, message):

@@ -6,7 +6,7 @@ import click
 import pytest
 
 from fireworld.cli import root
-from fireworld.policy.names import BUILT_IN, WITH_OPTIONS
+from fireworld.policy.names import BUILT_IN, PLANNERS
 from fireworld.policy.teams.shipped import team_names
 from fireworld.scenario import scenario_names
 from tests.docs.pages import PAGES, README, ROOT, anchors, commands, links, page_name
@@ -50,7 +50,7 @@ def test_commands_are_real(words):
         return
     scenario, policy = given.get("scenario"), given.get("policy")
     assert scenario in {None, "NAME", *scenario_names()} or scenario.endswith(".yaml")
-    assert policy in {None, *BUILT_IN, *WITH_OPTIONS, *team_names()} or ":" in policy or policy.endswith(".npz")
+    assert policy in {None, *BUILT_IN, *PLANNERS, *team_names()} or ":" in policy or policy.endswith(".npz")
 
 
 def test_the_model_has_every_section_that_code_cites():

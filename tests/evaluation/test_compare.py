@@ -13,7 +13,7 @@ import pytest
 
 from fireworld.evaluation import comparison_runs
 from fireworld.evaluation.results import read_results
-from fireworld.policy.names import load_policy
+from fireworld.policy.names import find_policy
 from fireworld.policy.teams.table_team import TableTeam
 from tests.cli.conftest import fireworld, here  # noqa: F401 - fixtures
 
@@ -65,7 +65,7 @@ def test_json_has_what_its_page_says(fireworld):  # noqa: F811
         "sentence", "notes",
     ]  # fmt: skip
     assert found["format"] == "fireworld-comparison/1"
-    assert found["a"] == {"name": BAD_FIRST[0], "digest": load_policy(BAD_FIRST[0]).digest}
+    assert found["a"] == {"name": BAD_FIRST[0], "digest": find_policy(BAD_FIRST[0]).digest}
     assert [scenario["name"] for scenario in found["scenarios"]] == ["quick", "train-5"]
     assert (found["first_seed"], found["n_seeds"], found["gate"]) == (1, 6, None)
     assert [(each["scenario"], each["metric"]) for each in found["comparisons"]] == [

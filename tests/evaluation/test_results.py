@@ -11,11 +11,10 @@ import pytest
 
 from fireworld.errors import OutputError
 from fireworld.evaluation import results as results_file
-from fireworld.evaluation.comparison_runs import policy_identity
 from fireworld.evaluation.results import KEYS, Result, Results, RunKey, open_results, read_results
 from fireworld.outcome import COLUMNS
 from fireworld.policy.kernel import always
-from fireworld.policy.names import NamedPolicy, load_policy
+from fireworld.policy.names import NamedPolicy, find_policy
 
 ROW = (9.5, 12.0, 3, 77, True, 11, -123.25, 4000.0)
 
@@ -136,10 +135,10 @@ class Telling(Own):
 
 def test_what_tells_policies_apart():
     """A digest of a file says little of the classes in it; a digest of what a policy does says all."""
-    assert policy_identity(load_policy("chief")) == load_policy("chief").digest
-    assert policy_identity(NamedPolicy("any:name", "of the file", always(2))) == always(2).digest
-    assert policy_identity(NamedPolicy("m:Own", "of the file", Own())) == "of the file:Own"
-    assert policy_identity(NamedPolicy("m:Telling", "of the file", Telling())) == "what it reads"
+    assert find_policy("chief").identity == find_policy("chief").digest
+    assert NamedPolicy("any:name", "of the file", always(2)).identity == always(2).digest
+    assert NamedPolicy("m:Own", "of the file", Own()).identity == "of the file:Own"
+    assert NamedPolicy("m:Telling", "of the file", Telling()).identity == "what it reads"
 
 
 def test_the_version_follows_all_that_computes_a_run():

@@ -8,7 +8,7 @@ import pytest
 from fireworld.evaluation.runs import evaluate
 from fireworld.executors import threads
 from fireworld.outcome import COLUMNS
-from fireworld.policy.names import BUILT_IN, load_policy
+from fireworld.policy.names import BUILT_IN, find_policy
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import build_scenario
 from fireworld.simulation.run import prepare_run
@@ -24,7 +24,7 @@ def built():
 def test_outcomes_are_those_of_recorded_runs(built):
     found = evaluate(built, BUILT_IN["nearest-to-me"](), SEEDS)
     for place, seed in enumerate(SEEDS):
-        last = [*prepare_run(built, load_policy("nearest-to-me"), seed=seed)][-1]
+        last = [*prepare_run(built, find_policy("nearest-to-me"), seed=seed)][-1]
         assert found.seed[place] == seed
         assert found.score[place] == last.score.score
         assert found.score_max[place] == last.score.score_max == 5

@@ -9,7 +9,7 @@ from fireworld_recorder.recover import recover
 from fireworld_recorder.writer import LogWriter
 
 from fireworld.errors import LogError
-from fireworld.policy.names import load_policy
+from fireworld.policy.names import find_policy
 from fireworld.recording.replay import Replay
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import build_scenario
@@ -19,7 +19,7 @@ from fireworld.simulation.run import prepare_run
 @pytest.fixture(scope="module")
 def clean_logs(tmp_path_factory):
     """The bytes of the logs of one run that ended after 0, 1, ... 8 steps, as if it had been stopped there."""
-    run = prepare_run(build_scenario(load_scenario("quick")), load_policy("chief"), seed=1, n_steps_max=8)
+    run = prepare_run(build_scenario(load_scenario("quick")), find_policy("chief"), seed=1, n_steps_max=8)
     records = list(run)
     folder = tmp_path_factory.mktemp("clean")
     for n in range(1, len(records) + 1):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from fireworld_recorder.reader import open_log
 
-from fireworld.policy.names import load_policy
+from fireworld.policy.names import find_policy
 from fireworld.policy.teams.ranking_team import RankingTeam
 from fireworld.recording.decisions import RecordedDecisions
 from fireworld.recording.explanation.search import explain
@@ -102,14 +102,14 @@ def test_no_stretches_no_replays():
 def test_compiled_replays_are_those_step_by_step(recordings, policy):
     log, other = open_log(recordings / f"{policy}.mcap"), open_log(recordings / "chief.mcap")
     better = RecordedDecisions(other)
-    run = prepare_worse_run(build_recorded(log.header), log, better, lambda: load_policy(policy).policy)
+    run = prepare_worse_run(build_recorded(log.header), log, better, lambda: find_policy(policy).policy)
     assert run.compiled
     assert not run.orders
     stretches = find_stretches(run.recorded, better, n_brigades=run.n_brigades)
     scores = set()
     for told in ([stretches[0]], [stretches[-1]], stretches, [*stretches[0].halves()][1:]):
         world = run._world_before(0)
-        run._run_stepwise(world, load_policy(policy).policy, told)
+        run._run_stepwise(world, find_policy(policy).policy, told)
         scores.add(run.score(told))
         assert run.score(told) == world.state.outcome.score[0]
     assert len(scores) > 1
@@ -247,7 +247,7 @@ def test_the_orders_of_a_fork_are_found(here, answer):
     answer("fork", "random.mcap", "--at", 40, "--policy", "easiest", "--record", "f.mcap")
     log = open_log("f.mcap")
     run = prepare_worse_run(
-        build_recorded(log.header), log, RecordedDecisions(log), lambda: load_policy("easiest").policy
+        build_recorded(log.header), log, RecordedDecisions(log), lambda: find_policy("easiest").policy
     )
     assert run.orders
     assert max(step for step, _ in run.orders) <= 40, "afterwards the policy decided by itself"

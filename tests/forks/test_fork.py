@@ -14,7 +14,7 @@ from fireworld_recorder.reader import open_log
 from fireworld_recorder.writer import StepFile
 
 from fireworld.policy.asking import begin
-from fireworld.policy.names import load_policy
+from fireworld.policy.names import find_policy
 from fireworld.policy.teams.table_team import TableTeam
 from fireworld.recording.fork import Change, prepare_fork
 from fireworld.recording.replay import build_recorded
@@ -45,7 +45,7 @@ def test_without_a_change_the_fork_is_the_run_wherever_it_is_forked(recordings):
     for step in [*log.snapshots, *np.random.default_rng(1).choice(STEPS, 20, replace=False).tolist()]:
         resumed = resume(built, MemoryRecording(log.header, log.city, records[: step + 1]), source="log")
         assert compare(resumed.recorded, resumed.replayed).same
-        named = load_policy("random")
+        named = find_policy("random")
         begin(named.policy, resumed.world.city_arrays, n_brigades=resumed.world.n_brigades, seed=resumed.world.seed)
         fork = prepare_fork(resumed, Change(named), log, records[: step + 1], digest=log.digest, source="log")
         gone, digest = list(fork), Digest(log.city)

@@ -8,10 +8,10 @@ import pytest
 from fireworld_recorder.diff import compare
 
 from fireworld.errors import PolicyError
-from fireworld.planning.planner import Planner, PlannerOptions, planner
-from fireworld.policy.asking import begin
+from fireworld.planning.planner import Planner, PlannerOptions
+from fireworld.policy.asking import begin, name_of
 from fireworld.policy.kernel import always
-from fireworld.policy.names import load_policy
+from fireworld.policy.names import find_policy
 from fireworld.recording.replay import Replay
 from fireworld.records import MemoryRecording
 from fireworld.scenario import load_scenario
@@ -80,12 +80,12 @@ def test_teams_of_any_size(n_brigades):
 
 
 def test_a_recorded_run_of_it_replays(built):
-    run = prepare_run(built, load_policy("planner:horizon=8"), seed=4, n_steps_max=20)
+    run = prepare_run(built, find_policy("planner:horizon=8"), seed=4, n_steps_max=20)
     recording = MemoryRecording(run.header, run.city, list(run))
     difference = compare(recording, Replay(recording))
     assert difference.same
     again = MemoryRecording(
-        run.header, run.city, list(prepare_run(built, load_policy("planner:horizon=8"), seed=4, n_steps_max=20))
+        run.header, run.city, list(prepare_run(built, find_policy("planner:horizon=8"), seed=4, n_steps_max=20))
     )
     assert compare(recording, again).same
 
@@ -106,32 +106,36 @@ def test_it_does_better_than_every_fixed_action(built):
 
 
 def test_names():
-    assert load_policy("planner").policy.options == PlannerOptions()
-    named = load_policy("planner:rollouts=2,horizon=50")
+    assert find_policy("planner").policy.options == PlannerOptions()
+    named = find_policy("planner:rollouts=2,horizon=50")
     assert named.name == "planner:rollouts=2,horizon=50"
     assert named.policy.options == PlannerOptions(horizon=50, rollouts=2)
-    digests = {planner(text).digest for text in ("", "horizon=31", "interval=5", "rollouts=2")}
+    names = ("planner", "planner:horizon=31", "planner:interval=5", "planner:rollouts=2")
+    digests = {find_policy(name).digest for name in names}
     assert len(digests) == 4
-    assert planner("horizon=31").digest == planner("horizon=31").digest
+    assert find_policy("planner:horizon=31").digest == find_policy("planner", parameters={"horizon": 31}).digest
+    assert find_policy("planner:horizon=30").digest == find_policy("planner").digest == Planner().digest
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("horizn=3", "--policy: planner: expected options horizon, interval, rollouts, got 'horizn'; try horizon"),
+        ("horizn=3", "--policy: planner: expected parameters horizon, interval, rollouts, got 'horizn'; try horizon"),
         ("horizon=", "--policy: planner:horizon: expected a whole number from 1 to 1000, got ''"),
         ("horizon=0", "from 1 to 1000, got 0"),
-        ("interval=-1", "planner:interval: expected a whole number from 1 to 1000, got '-1'"),
-        ("rollouts=1.5", "got '1.5'"),
+        ("interval=-1", "planner:interval: expected a whole number from 1 to 1000, got -1"),
+        ("rollouts=1.5", "got 1.5"),
+        ("rollouts=true", "got True"),
+        ("rollouts=[1]", r"got \[1\]"),
         ("rollouts=\u0663", "expected a whole number"),
         ("horizon=99999999999999999999", "from 1 to 1000"),
-        ("horizon=3,horizon=4", "expected every option once, got 'horizon' twice|got horizon twice"),
-        ("horizon=3,", "expected options horizon, interval, rollouts, got ''"),
+        ("horizon=3,horizon=4", "--policy: planner: expected every parameter once, got horizon twice"),
+        ("horizon=3,", "--policy: planner: expected parameters as in k=3,near=true, got 'horizon=3,'"),
     ],
 )
-def test_what_is_wrong_with_options(text, message):
+def test_what_is_wrong_with_parameters(text, message):
     with pytest.raises(PolicyError, match=message) as caught:
-        load_policy(f"planner:{text}")
+        find_policy(f"planner:{text}")
     assert "\n" not in str(caught.value)
 
 
@@ -141,5 +145,5 @@ def test_a_module_of_that_name_is_still_ones_own(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", sys.path.copy())
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
-    assert type(load_policy("planner:Mine").policy).__name__ == "Mine"
+    assert name_of(find_policy("planner:Mine").policy) == "planner:Mine"
     del sys.modules["planner"]

@@ -9,7 +9,7 @@ import pytest
 
 from fireworld.errors import PolicyError
 from fireworld.policy.kernel import from_rankings, from_tables
-from fireworld.policy.names import BUILT_IN, load_policy
+from fireworld.policy.names import BUILT_IN, find_policy
 from fireworld.policy.protocol import Action, Decision
 from fireworld.testing import PolicyConformance
 
@@ -21,7 +21,7 @@ class TestBuiltIn(PolicyConformance):
         self.name = name
 
     def make_policy(self):
-        return load_policy(self.name).policy
+        return find_policy(self.name).policy
 
 
 class TestExploringTable(PolicyConformance):
@@ -43,6 +43,18 @@ class TestRanking(PolicyConformance):
 class AlwaysNear:
     def decide(self, observation):
         return Decision(Action.NEAREST_TO_ME)
+
+
+class Steady(AlwaysNear):
+    """Decides anew in every third step only, and does not look whether there is something to keep."""
+
+    def keeps(self, brigade, last_action, step):
+        return step % 3 != 0
+
+
+class TestSteady(PolicyConformance):
+    def make_policy(self):
+        return Steady()
 
 
 class TestOwn(PolicyConformance):
@@ -90,6 +102,39 @@ class Wordless:
         return None
 
 
+class CityMeddler(AlwaysNear):
+    def begin(self, city, n_brigades, seed):
+        city.buildings.capacity[0] += 1.0
+
+
+class Hasty(AlwaysNear):
+    """Keeps by what it noted in `decide`, which in a fork it has not seen."""
+
+    def begin(self, city, n_brigades, seed):
+        self.until = {}
+
+    def decide(self, observation):
+        self.until[observation.brigade] = observation.step + 3
+        return super().decide(observation)
+
+    def keeps(self, brigade, last_action, step):
+        return step < self.until[brigade]
+
+
+class Moody(AlwaysNear):
+    def __init__(self):
+        self.asked = 0
+
+    def keeps(self, brigade, last_action, step):
+        self.asked += 1
+        return self.asked % 2 == 0
+
+
+class GlobalKeeps(AlwaysNear):
+    def keeps(self, brigade, last_action, step):
+        return random.random() < 2  # noqa: S311 - the fault
+
+
 @pytest.mark.parametrize(
     ("make", "test", "message"),
     [
@@ -100,6 +145,11 @@ class Wordless:
         (GlobalNumpy, "test_decides_in_every_step", "global randomness"),
         (Unseeded, "test_same_seed_same_decisions", "one seed led to two runs"),
         (Forgetful, "test_begins_anew", "something of the run before is left"),
+        (CityMeddler, "test_decides_in_every_step", r"begin\(\) changed the city's buildings.capacity"),
+        (Hasty, "test_keeps_from_any_step_on", "keeps: KeyError: 0"),
+        (Moody, "test_keeps_from_any_step_on", "answers differently"),
+        (Moody, "test_decides_in_every_step", "answers differently"),
+        (GlobalKeeps, "test_decides_in_every_step", r"keeps\(\) used global randomness"),
     ],
 )
 def test_faults_are_found(make, test, message):
@@ -107,3 +157,14 @@ def test_faults_are_found(make, test, message):
     conformance.make_policy = make
     with pytest.raises((AssertionError, PolicyError), match=message):
         getattr(conformance, test)()
+
+
+def test_a_city_that_was_changed_is_as_before():
+    """It is shared by the tests of all policies."""
+    conformance = PolicyConformance()
+    for _ in range(2):
+        conformance.make_policy = CityMeddler
+        with pytest.raises(AssertionError, match="changed the city"):
+            conformance.test_same_seed_same_decisions()
+        conformance.make_policy = AlwaysNear
+        conformance.test_decides_in_every_step()

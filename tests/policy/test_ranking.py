@@ -11,7 +11,7 @@ from fireworld_recorder.reader import open_log
 from fireworld.kernels.choice import RANK_ALL, RANK_NAMED
 from fireworld.kernels.ranking import N_TARGET_FEATURES, N_WEIGHTS
 from fireworld.policy.kernel import from_rankings
-from fireworld.policy.names import load_policy
+from fireworld.policy.names import find_policy
 from fireworld.policy.protocol import Action, Decision
 from fireworld.policy.teams.ranking_team import RankingTeam
 from fireworld.policy.teams.ranking_words import WEIGHTS
@@ -155,7 +155,7 @@ def test_what_is_written_is_what_was_recorded(here, fireworld):  # noqa: F811 - 
     from fireworld.simulation.run import prepare_run
 
     built = build_scenario(load_scenario("quick"))
-    records = list(prepare_run(built, load_policy("all.npz"), seed=1, n_steps_max=9))
+    records = list(prepare_run(built, find_policy("all.npz"), seed=1, n_steps_max=9))
     for told, read in zip(records, open_log(here / "a.mcap"), strict=True):
         assert told.decisions.target_value.tolist() == read.decisions.target_value.tolist()
         assert told.decisions.action.tolist() == read.decisions.action.tolist()

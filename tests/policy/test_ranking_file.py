@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fireworld.errors import TrainingError
-from fireworld.policy.names import load_policy, note_on_team
+from fireworld.policy.names import find_policy, note_on_team
 from fireworld.policy.teams.table_team import TableTeam
 from fireworld.policy.teams.team import FORMAT, load_team, parse_team, read_team, write_team
 from tests.policy.test_ranking import NAMES, make_ranking
@@ -43,14 +43,14 @@ def test_it_may_hold_more_arrays(tmp_path):
 def test_it_is_a_policy_by_its_path(tmp_path):
     path = tmp_path / "mine.npz"
     make_ranking(3).save(path)
-    named = load_policy(str(path))
+    named = find_policy(str(path))
     assert (named.name, named.trained_choices) == ("mine.npz", "")
     assert named.attachments == {"policy.npz": path.read_bytes()}
     assert named.digest == make_ranking(3).policy().digest
     assert note_on_team(named, 3) == ""
     assert "mine.npz: 3 " in note_on_team(named, 4)
     make_ranking(1).save(path, force=True)
-    assert note_on_team(load_policy(str(path)), 4) == "", "one row is for all"
+    assert note_on_team(find_policy(str(path)), 4) == "", "one row is for all"
 
 
 def test_team_files_of_tables_are_read_too(tmp_path):
@@ -107,7 +107,7 @@ def test_what_is_wrong_with_a_file(tmp_path, form, changes, message):
     write(tmp_path / "bad.npz", **{"format": form, **changes})
     for read in (
         lambda: parse_team((tmp_path / "bad.npz").read_bytes(), source="bad"),
-        lambda: load_policy(str(tmp_path / "bad.npz")),
+        lambda: find_policy(str(tmp_path / "bad.npz")),
     ):
         with pytest.raises(TrainingError, match=message) as caught:
             read()
@@ -121,7 +121,7 @@ def test_a_file_of_a_later_format(tmp_path):
     with pytest.raises(TrainingError, match=message):
         parse_team((tmp_path / "bad.npz").read_bytes(), source="bad")
     with pytest.raises(TrainingError, match="got 'fireworld-ranking/2'"):
-        load_policy(str(tmp_path / "bad.npz"))
+        find_policy(str(tmp_path / "bad.npz"))
 
 
 @pytest.mark.parametrize("names", [NAMES[:-1], NAMES[::-1], [*NAMES, "smell"], "temperature", {"temperature": 1}])

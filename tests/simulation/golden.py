@@ -13,7 +13,7 @@ from typing import Final
 
 from fireworld_recorder.chain import Digest
 
-from fireworld.policy.names import load_policy
+from fireworld.policy.names import find_policy
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import build_scenario
 from fireworld.simulation.run import prepare_run
@@ -28,7 +28,7 @@ RUNS: Final = {
 
 def digest_of(scenario: str, policy: str, seed: int, n_steps: int) -> str:
     """Run and return the digest."""
-    run = prepare_run(build_scenario(load_scenario(scenario)), load_policy(policy), seed=seed, n_steps_max=n_steps)
+    run = prepare_run(build_scenario(load_scenario(scenario)), find_policy(policy), seed=seed, n_steps_max=n_steps)
     digest = Digest(run.city)
     for record in run:
         digest.write(record)

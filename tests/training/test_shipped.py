@@ -10,7 +10,7 @@ from fireworld_recorder.reader import open_log
 
 from benchmarks.shipped import COMMANDS
 from fireworld.errors import PolicyError
-from fireworld.policy.names import load_policy
+from fireworld.policy.names import find_policy
 from fireworld.policy.teams.shipped import team_names, team_path
 from fireworld.policy.teams.table_team import TableTeam
 from fireworld.policy.teams.team import load_team
@@ -52,10 +52,10 @@ def test_a_team_comes_from_the_shipped_curriculum(name):
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_by_its_name(name):
-    named = load_policy(name)
+    named = find_policy(name)
     assert named.name == name
     assert named.attachments == {"policy.npz": team_path(name).read_bytes()}
-    assert named.digest == load_policy(str(team_path(name))).digest
+    assert named.digest == find_policy(str(team_path(name))).digest
 
 
 def test_run_and_recorded(here, fireworld):
@@ -74,7 +74,7 @@ def test_help_and_hints_name_them(fireworld):
     for name in team_names():
         assert name in text
     with pytest.raises(PolicyError, match=r"one of .*paper-noncooperative.*; try paper-cooperative$"):
-        load_policy("paper-coperative")
+        find_policy("paper-coperative")
 
 
 def test_any_team_in_the_folder_is_found(tmp_path, monkeypatch):
@@ -82,4 +82,4 @@ def test_any_team_in_the_folder_is_found(tmp_path, monkeypatch):
     assert team_names() == []
     TableTeam(np.zeros((1, 270, 4)), np.zeros((1, 270, 4), dtype=np.int64)).save(tmp_path / "mine.npz")
     assert team_names() == ["mine"]
-    assert load_policy("mine").policy.tables.shape == (1, 270, 4)
+    assert find_policy("mine").policy.tables.shape == (1, 270, 4)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fireworld.errors import TrainingError
-from fireworld.policy.names import load_policy, note_on_team
+from fireworld.policy.names import find_policy, note_on_team
 from fireworld.policy.teams.table_team import TableTeam
 from fireworld.policy.teams.team import FORMAT, load_team
 
@@ -35,7 +35,7 @@ def test_written_and_read_again(tmp_path):
 
 def test_it_is_a_policy_by_its_path(tmp_path):
     make_team(method={"commit": 3}).save(tmp_path / "team.npz")
-    named = load_policy(str(tmp_path / "team.npz"))
+    named = find_policy(str(tmp_path / "team.npz"))
     assert named.name == "team.npz", "a recording names no folder"
     assert named.policy.commit == 3
     assert named.attachments == {"policy.npz": (tmp_path / "team.npz").read_bytes()}
@@ -54,14 +54,14 @@ def test_it_is_a_policy_by_its_path(tmp_path):
 def test_tables_are_spread_over_brigades(tmp_path, n_tables, n_brigades, note):
     team = make_team(n_tables)
     team.save(tmp_path / "team.npz")
-    named = load_policy(str(tmp_path / "team.npz"))
+    named = find_policy(str(tmp_path / "team.npz"))
     assert note_on_team(named, n_brigades) == note
     spread = named.policy.for_brigades(n_brigades)
     assert spread.table_of.tolist() == [brigade % n_tables for brigade in range(n_brigades)]
 
 
 def test_no_note_on_other_policies():
-    assert note_on_team(load_policy("each-another"), 7) == ""
+    assert note_on_team(find_policy("each-another"), 7) == ""
 
 
 HEADER = {"format": FORMAT, "kind": "tables", "provenance": {}}
@@ -115,7 +115,7 @@ def with_nan():
 def test_what_is_wrong_with_a_team_file(tmp_path, changes, message):
     write(tmp_path / "bad.npz", **changes)
     with pytest.raises(TrainingError, match=message) as caught:
-        load_policy(str(tmp_path / "bad.npz"))
+        find_policy(str(tmp_path / "bad.npz"))
     assert str(caught.value).startswith(f"{tmp_path / 'bad.npz'}: ")
     assert "\n" not in str(caught.value)
 
@@ -149,4 +149,4 @@ def test_a_broken_header_and_an_absent_file(tmp_path):
     with pytest.raises(TrainingError, match="header: expected JSON"):
         load_team(tmp_path / "bad.npz")
     with pytest.raises(TrainingError, match="expected a team file, got No such file or directory"):
-        load_policy(str(tmp_path / "absent.npz"))
+        find_policy(str(tmp_path / "absent.npz"))

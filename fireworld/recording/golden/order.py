@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import inspect
 import os
 from collections.abc import Collection, Mapping
 from dataclasses import replace
@@ -13,11 +11,9 @@ from typing import Annotated, Final
 import msgspec
 
 from fireworld import __version__
-from fireworld.errors import LogError, PolicyError, expected
+from fireworld.errors import LogError, expected
 from fireworld.parameters import PRESETS
-from fireworld.policy.asking import describe, name_of
-from fireworld.policy.names import TEAM_ATTACHMENT, NamedPolicy, load_policy
-from fireworld.policy.protocol import Policy
+from fireworld.policy.names import TEAM_ATTACHMENT, NamedPolicy, find_policy
 from fireworld.policy.teams.npz import SUFFIX
 from fireworld.policy.teams.team import parse_team
 from fireworld.recording.replay import build_recorded
@@ -131,26 +127,9 @@ def prepare_golden(
     scenario = load_scenario(found).with_settings(order.settings)
     name = str(_reached(folder, order.policy)) if order.policy.endswith(SUFFIX) else order.policy
     built = (cities or CityCache()).build(scenario)
-    run = prepare_run(built, policy or load_policy(name), seed=order.seed, n_steps_max=order.steps)
+    run = prepare_run(built, policy or find_policy(name), seed=order.seed, n_steps_max=order.steps)
     attachments = {**run.header.attachments, ORDER_ATTACHMENT: msgspec.json.encode(order)}
     return replace(run, header=replace(run.header, attachments=attachments))
-
-
-def given_policy(given: Policy | type[Policy]) -> NamedPolicy:
-    """Return a policy given as an object or as its class, named as it would be on the command line.
-
-    Raises:
-        PolicyError: it is none, or making it fails.
-    """
-    try:
-        made = given() if inspect.isclass(given) else given
-    except Exception as error:
-        raise PolicyError(f"policy: {given!r}: cannot be made: {describe(error)}") from error
-    if not isinstance(made, Policy):
-        wanted = "a policy with a method decide(observation), its class, or its name"
-        raise PolicyError(expected("policy", "", wanted, made))
-    digest = getattr(made, "digest", None)  # policies that are data have one of that data
-    return NamedPolicy(name_of(made), digest if isinstance(digest, str) else _digest_of_source(made), made)
 
 
 def recorded_scenario(header: RunHeader) -> Scenario:
@@ -207,7 +186,7 @@ def _prepare_recorded(order: Order, recorded: RunHeader | None) -> PreparedRun:
         raise LogError("a recording that branched off from another one cannot be a golden; it has no start of its own")
     content = recorded.attachments.get(TEAM_ATTACHMENT)
     if content is None:
-        named = load_policy(order.policy)
+        named = find_policy(order.policy)
     else:
         team = parse_team(content, source=f"recording: {TEAM_ATTACHMENT}")
         policy = team.policy()
@@ -226,11 +205,3 @@ def _seen_from(folder: Path, path: Path) -> str:
 def _reached(folder: Path, way: str) -> Path:
     """Follow the way from a folder to a file."""
     return Path(os.path.normpath(folder / way))
-
-
-def _digest_of_source(policy: Policy) -> str:
-    """Return the digest of the file that a policy's class stands in, "" if there is none."""
-    try:
-        return hashlib.sha256(Path(inspect.getfile(type(policy))).read_bytes()).hexdigest()
-    except (OSError, TypeError):
-        return ""
