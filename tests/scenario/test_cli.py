@@ -56,7 +56,7 @@ def test_a_map_is_drawn_once(tmp_path):
     assert (code, text) == (0, f"{path}: 80 buildings, 4 burning\n")
     first = path.read_bytes()
     assert first.startswith(PNG)
-    with pytest.raises(OutputError, match="exists"):
+    with pytest.raises(OutputError, match="an existing file; use --force"):
         call("show", "quick", "-o", path)
     call("show", "quick", "-o", path, "--force", "--set", "fires.0.n_buildings=9")
     assert path.read_bytes() != first
