@@ -1,3 +1,79 @@
-"""A flight recorder, replayer and test bench for teams of fire brigades."""
+"""A flight recorder, replayer and test bench for teams of fire brigades.
+
+    import fireworld as fw
+
+    run = fw.run("test-1", policy="best", seed=3, record="a.mcap")   # run a scenario, record every step
+    fw.open_log("a.mcap").to_pandas("brigades")                      # read a recording
+    fw.diff("a.mcap", fw.run("test-1", policy="chief", seed=3))      # where do two runs first differ?
+    fw.compare(["chief", "best"], scenarios=["quick"], seeds=20)     # is it better?
+
+Everything that the command line can do is here, by the same functions. Names are imported when they are first used:
+`import fireworld` loads neither numpy nor a compiler.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from fireworld.errors import FireworldError as FireworldError
+    from fireworld.evaluation.compare import Comparison as Comparison
+    from fireworld.evaluation.compare import compare as compare
+    from fireworld.outcome import Outcome as Outcome
+    from fireworld.policy.names import policies as policies
+    from fireworld.policy.protocol import Action as Action
+    from fireworld.policy.protocol import Decision as Decision
+    from fireworld.policy.protocol import Observation as Observation
+    from fireworld.policy.protocol import Policy as Policy
+    from fireworld.policy.teams import Team as Team
+    from fireworld.policy.teams import load_team as load_team
+    from fireworld.recording.record import run as run
+    from fireworld.recording.run import Run as Run
+    from fireworld.recording.run import open_log as open_log
+    from fireworld.reproduction.reproduce import Reproduction as Reproduction
+    from fireworld.reproduction.reproduce import reproduce as reproduce
+    from fireworld.scenario import Scenario as Scenario
+    from fireworld.scenario import scenarios as scenarios
+    from fireworld.training.train import train as train
 
 __version__ = "0.1.0"
+
+_ROOMS = {
+    "Action": "policy.protocol",
+    "Comparison": "evaluation.compare",
+    "Decision": "policy.protocol",
+    "FireworldError": "errors",
+    "Observation": "policy.protocol",
+    "Outcome": "outcome",
+    "Policy": "policy.protocol",
+    "Reproduction": "reproduction.reproduce",
+    "Run": "recording.run",
+    "Scenario": "scenario",
+    "Team": "policy.teams",
+    "compare": "evaluation.compare",
+    "load_team": "policy.teams",
+    "open_log": "recording.run",
+    "policies": "policy.names",
+    "reproduce": "reproduction.reproduce",
+    "run": "recording.record",
+    "scenarios": "scenario",
+    "train": "training.train",
+}
+"""The module, below fireworld, that each name of the front door lives in."""
+
+__all__ = ["__version__", *sorted(_ROOMS)]  # noqa: PLE0604 - the names are those of the table
+
+
+def __getattr__(name: str) -> Any:
+    """Import a name of the front door from the module it lives in, at its first use."""
+    if name not in _ROOMS:
+        raise AttributeError(f"module 'fireworld' has no attribute {name!r}; there are {', '.join(sorted(_ROOMS))}")
+    from importlib import import_module
+
+    found = getattr(import_module(f"fireworld.{_ROOMS[name]}"), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return [*__all__]

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
 from fireworld_recorder.chain import Digest
 from fireworld_recorder.writer import PARTIAL_SUFFIX, LogWriter
 
+from fireworld.arguments import path_of, seed_of, settings_of, whole_number
 from fireworld.errors import PolicyError
 from fireworld.interrupt import Interrupted, gentle_interrupt
-from fireworld.records import StepRecord, Steps
+from fireworld.records import MemoryRecording, StepRecord, Steps
 
 if TYPE_CHECKING:
     from fireworld_recorder.writer import Scene
+
+    from fireworld.policy.protocol import Policy
+    from fireworld.recording.run import Run
+    from fireworld.scenario import Scenario
+
+STEPS_MAX: Final = 100_000
 
 
 @dataclass(frozen=True)
@@ -83,3 +91,55 @@ def play(
     if last is None:
         raise AssertionError("a run yields its start before anything else")
     return Played(last, sink.digest, interrupted.is_set())
+
+
+def run(
+    scenario: str | Path | Scenario | Mapping[str, Any],
+    *,
+    policy: str | Policy | type[Policy] | Callable[..., Any] = "best",
+    seed: int = 1,
+    steps: int | None = None,
+    set: Mapping[str, Any] | None = None,
+    record: str | os.PathLike[str] | None = None,
+    force: bool = False,
+) -> Run:
+    """Run a scenario once.
+
+    Args:
+        scenario: a shipped name, a YAML file, a Scenario, or the keys and values of one.
+        policy: a name as for `fireworld run --policy`, a team file, a policy, its class, or a function of the
+            observation that returns an action.
+        seed: of the run's random draws, from 0 to 2**32 - 1.
+        steps: stop after this step; None: the scenario's.
+        set: keys of the scenario with other values, as in {"brigades.n": 7}.
+        record: the log to write, with every step; None keeps the steps in memory.
+        force: replace an existing log.
+
+    Returns:
+        The run: its outcome, digest, and every step; after Ctrl-C KeyboardInterrupt is raised, and a log holds the
+        steps that were done.
+
+    Raises:
+        ScenarioError, CityError, PolicyError, TrainingError: scenario or policy cannot be had, or the policy fails.
+        OutputError: the log cannot be written.
+        ArgumentError: an argument that makes no sense.
+    """
+    from fireworld.policy.names import find_policy
+    from fireworld.recording.run import Run, open_log
+    from fireworld.scenario import find_scenario
+    from fireworld.simulation.built import build_scenario
+    from fireworld.simulation.run import prepare_run
+
+    seed = seed_of(seed)
+    n_steps_max = None if steps is None else whole_number("steps", steps, least=1, most=STEPS_MAX)
+    path = None if record is None else path_of("record", record)
+    chosen = find_scenario(scenario).with_values(settings_of(set))
+    named = find_policy(policy)
+    prepared = prepare_run(build_scenario(chosen), named, seed=seed, n_steps_max=n_steps_max)
+    records: list[StepRecord] = []
+    played = play(prepared, record=path, force=force, on_step=records.append if path is None else lambda _: None)
+    if played.interrupted:
+        raise Interrupted(f"interrupted after step {played.last.step}")
+    if path is not None:
+        return open_log(path)
+    return Run(MemoryRecording(prepared.header, prepared.city, records, digest=played.digest))

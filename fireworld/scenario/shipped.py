@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import fireworld
 from fireworld.errors import ScenarioError, expected
@@ -30,6 +32,26 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
         return read_scenario(path)
     hint = nearest(str(name_or_path), names) or "try `fireworld scenarios`"
     raise ScenarioError(expected("scenario", "", "the name of a scenario or a .yaml file", str(name_or_path), hint))
+
+
+def find_scenario(given: str | Path | Scenario | Mapping[str, Any]) -> Scenario:
+    """Return a scenario by its name or file, or made of the keys and values of one, or itself.
+
+    Raises:
+        ScenarioError: there is none of that name, or it makes no sense.
+    """
+    if isinstance(given, Scenario):
+        return given
+    if isinstance(given, str | Path):
+        return load_scenario(given)
+    if isinstance(given, Mapping):
+        return Scenario.from_dict(given)
+    raise ScenarioError(expected("scenario", "", "a name, a file, a Scenario, or keys and values", given))
+
+
+def scenarios() -> list[Scenario]:
+    """Return the scenarios that come with fireworld, by name."""
+    return [load_scenario(name) for name in scenario_names()]
 
 
 def shipped_folder() -> Path:
