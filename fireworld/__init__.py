@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from fireworld.policy.protocol import Decision as Decision
     from fireworld.policy.protocol import Observation as Observation
     from fireworld.policy.protocol import Policy as Policy
-    from fireworld.policy.teams import Team as Team
-    from fireworld.policy.teams import load_team as load_team
+    from fireworld.policy.teams.team import Team as Team
+    from fireworld.policy.teams.team import load_team as load_team
     from fireworld.recording.record import run as run
     from fireworld.recording.run import Run as Run
     from fireworld.recording.run import open_log as open_log
@@ -49,9 +49,9 @@ _ROOMS = {
     "Reproduction": "reproduction.reproduce",
     "Run": "recording.run",
     "Scenario": "scenario",
-    "Team": "policy.teams",
+    "Team": "policy.teams.team",
     "compare": "evaluation.compare",
-    "load_team": "policy.teams",
+    "load_team": "policy.teams.team",
     "open_log": "recording.run",
     "policies": "policy.names",
     "reproduce": "reproduction.reproduce",
