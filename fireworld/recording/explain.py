@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import cached_property, partial
 from html import escape
@@ -11,7 +10,7 @@ from typing import Any, Final
 
 from fireworld.arguments import whole_number
 from fireworld.errors import FireworldError, LogError, expected
-from fireworld.executors import Workers, given, threads
+from fireworld.executors import AnyExecutor, Workers, threads, workers_for
 from fireworld.html_page import html_table, text_cell
 from fireworld.interrupt import gentle_interrupt
 from fireworld.policy.protocol import Policy
@@ -140,7 +139,7 @@ def explain(
     b: AnyRun,
     *,
     budget: int = BUDGET,
-    executor: Executor | None = None,
+    executor: AnyExecutor = None,
     on_replay: Callable[[], object] = lambda: None,
 ) -> Explanation:
     """Find out which decisions make up how much of the difference between the scores of two runs.
@@ -152,15 +151,17 @@ def explain(
         a: the path of a recording, or a run.
         b: another run of the same scenario and seed.
         budget: replays at most.
-        executor: does the replays; None: threads.
+        executor: what does the replays, as for `fw.compare`; None: two threads.
         on_replay: called after each replay.
 
     Raises:
         LogError: a run cannot be read, has not reached its end, does not replay to what is recorded, or the two have
             another scenario, seed or last step.
         PolicyError: the policy of the worse run fails.
+        ArgumentError, ExecutorError: the budget or the executor makes no sense.
     """
     whole_number("budget", budget, least=2, most=BUDGET_MAX)
+    workers_for(executor)  # raises for what is no executor
     worse, better, scores = _sorted_by_score(open_run(a), open_run(b))
     if scores[0] == scores[1]:
         return Explanation(worse, better, *scores, SearchResult())
@@ -173,7 +174,7 @@ def explain(
     spans = find_spans(counterfactuals.recorded, decisions, n_brigades=built.n_brigades)
     with gentle_interrupt() as interrupted:
         n_threads = N_THREADS if counterfactuals.compiled else 1
-        workers = threads(n_threads, stop=interrupted) if executor is None else given(executor, stop=interrupted)
+        workers = threads(n_threads, stop=interrupted) if executor is None else workers_for(executor, stop=interrupted)
         result = search_effects(
             spans,
             worse_score=scores[0],

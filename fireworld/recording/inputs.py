@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from fireworld.errors import LogError, expected
 from fireworld.records import Recording, Steps, StoredRun
@@ -36,18 +37,29 @@ def open_run(given: AnyRun, *, partial: bool = False) -> StoredRun:
     return given
 
 
-def open_to_show(given: Sequence[AnyRecording]) -> list[Recording]:
-    """Return one run or two to be shown; those given as paths are opened as far as they are good.
+def open_one_or_two(given: AnyRun | Sequence[AnyRun]) -> list[StoredRun]:
+    """Return one run or two; those given as paths are opened as far as they are good.
 
     Raises:
         LogError: they are more or fewer, one is neither a path nor a run, or cannot be read.
     """
-    if not 1 <= len(given) <= 2:
-        raise LogError(expected("recordings", "", "one or two", str(len(given))))
-    for one in given:
+    return [open_run(one, partial=True) for one in _listed(given)]
+
+
+def open_to_show(given: AnyRecording | Sequence[AnyRecording]) -> list[Recording]:
+    """Return one recording or two to be shown, as `open_one_or_two` does; these need not know their digests."""
+    return [open_run(one, partial=True) if isinstance(one, str | os.PathLike) else one for one in _listed(given)]
+
+
+def _listed(given: object) -> list[Any]:
+    """Return a list of the one or two that were given."""
+    many = list(given) if isinstance(given, list | tuple) else [given]
+    if not 1 <= len(many) <= 2:
+        raise LogError(expected("recordings", "", "one or two", str(len(many))))
+    for one in many:
         if not (isinstance(one, str | os.PathLike) or hasattr(one, "steps")):
             raise LogError(expected("recording", "", _WANTED, one))
-    return [open_run(one, partial=True) if isinstance(one, str | os.PathLike) else one for one in given]
+    return many
 
 
 def run_name(run: Steps) -> str:

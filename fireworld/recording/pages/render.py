@@ -19,7 +19,11 @@ ENDINGS: Final = (*STILLS, *FILMS)
 
 
 def render_picture(
-    logs: Sequence[AnyRecording], output: Path | str, *, steps: Sequence[int] = (LAST,), force: bool = False
+    logs: AnyRecording | Sequence[AnyRecording],
+    output: Path | str,
+    *,
+    steps: Sequence[int] = (LAST,),
+    force: bool = False,
 ) -> None:
     """Draw steps of one recording, or of two of one city side by side, as a picture.
 
@@ -41,7 +45,7 @@ def render_picture(
 
 
 def render_film(
-    logs: Sequence[AnyRecording],
+    logs: AnyRecording | Sequence[AnyRecording],
     output: Path | str,
     *,
     first_step: int | None = None,

@@ -22,7 +22,7 @@ from fireworld.errors import one_line
 from fireworld.files import check_output, write_file
 from fireworld.html_page import html_figure, html_page, html_table, text_cell
 from fireworld.outcome import QUANTITIES
-from fireworld.recording.inputs import AnyRun, open_run, run_name
+from fireworld.recording.inputs import AnyRun, open_one_or_two, run_name
 from fireworld.records import ACTION_NAMES, EVENT_KINDS, StoredRun
 
 _STYLE: Final = """
@@ -41,7 +41,7 @@ _EVENTS_SHOWN: Final = 40
 _TARGETS_SHOWN: Final = 12
 
 
-def report(logs: Sequence[AnyRun], output: Path | str, *, force: bool = False) -> None:
+def report(logs: AnyRun | Sequence[AnyRun], output: Path | str, *, force: bool = False) -> None:
     """Write one recording, or two of one city, as an HTML page that needs no other file.
 
     Args:
@@ -55,7 +55,7 @@ def report(logs: Sequence[AnyRun], output: Path | str, *, force: bool = False) -
         LogError: a recording cannot be read.
     """
     check_output(Path(output), endings=ENDINGS, force=force)
-    runs = [open_run(log, partial=True) for log in logs]
+    runs = open_one_or_two(logs)
     with plain_style():
         images = {
             "maps": png_bytes(draw_steps(runs, evenly_spaced(runs, _MAPS))),

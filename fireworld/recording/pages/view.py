@@ -18,7 +18,7 @@ from fireworld.records import Recording
 
 
 def view(
-    logs: Sequence[AnyRecording],
+    logs: AnyRecording | Sequence[AnyRecording],
     *,
     save: Path | str | None = None,
     force: bool = False,
