@@ -193,7 +193,9 @@ def test_a_fork_of_a_fork_tells_of_both(here, answer):
 @pytest.mark.parametrize("commit", [1, 7])
 def test_a_team_comes_from_the_recording(here, answer, commit):
     tables = np.random.default_rng(3).normal(size=(2, 4320, 4))
-    team = TableTeam(tables=tables, visits=np.zeros(tables.shape, dtype=np.int64), provenance={"method": {"commit": commit}})
+    team = TableTeam(
+        tables=tables, visits=np.zeros(tables.shape, dtype=np.int64), provenance={"method": {"commit": commit}}
+    )
     team.save(here / "team.npz")
     answer("run", "quick", "--steps", 30, "--policy", "team.npz", "--record", "t.mcap")
     (here / "team.npz").unlink()
@@ -207,7 +209,9 @@ def test_a_team_comes_from_the_recording(here, answer, commit):
 def test_a_brigade_that_is_told_drops_what_it_was_committed_to(here, answer):
     tables = np.zeros((1, 4320, 4))
     tables[..., 0] = 1.0
-    team = TableTeam(tables=tables, visits=np.zeros(tables.shape, dtype=np.int64), provenance={"method": {"commit": 50}})
+    team = TableTeam(
+        tables=tables, visits=np.zeros(tables.shape, dtype=np.int64), provenance={"method": {"commit": 50}}
+    )
     team.save(here / "team.npz")
     answer("run", "quick", "--steps", 12, "--policy", "team.npz", "--record", "t.mcap")
     answer("fork", "t.mcap", "--at", 4, "--decide", "0=nearest-to-me", "--record", "f.mcap")
