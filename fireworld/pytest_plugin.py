@@ -1,4 +1,4 @@
-"""The pytest plugin: a fixture `recording` that runs a policy and holds the run against its golden recording.
+"""The pytest plugin: a fixture `recording` that runs a policy and compares the run with its golden recording.
 
 pytest imports this module at every start, wherever fireworld is installed: it imports nothing else before a test asks.
 """
@@ -6,7 +6,6 @@ pytest imports this module at every start, wherever fireworld is installed: it i
 from __future__ import annotations
 
 import hashlib
-import json
 import re
 from collections.abc import Collection, Mapping
 from pathlib import Path
@@ -17,8 +16,8 @@ import pytest
 if TYPE_CHECKING:
     from fireworld.policy.names import NamedPolicy
     from fireworld.policy.protocol import Policy
-    from fireworld.recording.golden.check import Checked
-    from fireworld.recording.golden.order import Order
+    from fireworld.recording.golden.check import GoldenResult
+    from fireworld.recording.golden.spec import GoldenSpec
     from fireworld.records import MemoryRecording
     from fireworld.simulation.built import CityCache
 
@@ -40,7 +39,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Say which recordings were stored; reports bring it here from all workers."""
+    """Write which recordings were stored; reports bring it here from all workers."""
     reports = terminalreporter.getreports("passed") + terminalreporter.getreports("failed")
     stored = [value for report in reports for key, value in report.user_properties if key == STORED]
     if stored:
@@ -51,7 +50,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 @pytest.fixture(scope="session")
 def _fireworld_cities() -> CityCache:
-    """Cities that were built, to be built once."""
+    """Return the cities built so far: each is built once."""
     from fireworld.simulation.built import CityCache
 
     return CityCache()
@@ -64,13 +63,13 @@ def recording(
     """Run a policy in a scenario and compare every step with the golden recording of this test.
 
     recording(scenario="test-1", policy="mine:Policy", seed=3) fails at the first difference. `--fireworld-update`
-    stores the golden anew, and the first time.
+    stores the golden, the first time and whenever the run has changed.
     """
     return Recorder(request, tmp_path_factory, _fireworld_cities)
 
 
 class Recorder:
-    """What the fixture `recording` is: call it to run and compare."""
+    """The fixture `recording`: call it to run and compare."""
 
     def __init__(self, request: pytest.FixtureRequest, factory: pytest.TempPathFactory, cities: CityCache) -> None:
         self._node = request.node
@@ -100,10 +99,10 @@ class Recorder:
         Args:
             scenario: a shipped name, or a YAML file.
             policy: a name as for `fireworld run --policy`, a policy, or the class of one.
-            seed: of the run's luck.
+            seed: of the random draws.
             steps: stop after this step; None: the scenario's.
             overrides: keys of the scenario with other values, as in {"brigades.n": 7}.
-            tolerances: the largest difference that counts as none, by field, as in {"buildings.temperature": 1e-6}.
+            tolerances: the largest difference that is ignored, by field, as in {"buildings.temperature": 1e-6}.
             ignore: topics and fields that are not compared, as in ["draws", "decisions.q_values"].
             name: tells several recordings of one test apart.
 
@@ -112,25 +111,24 @@ class Recorder:
         """
         from fireworld.errors import FireworldError
         from fireworld.policy.names import find_policy
-        from fireworld.recording.golden.order import place_order
+        from fireworld.recording.golden.spec import make_spec
 
         path = self._path(name)
         if not (self._update or path.exists()):
             raise _failure(f"{_shown(path)}: there is no such recording; run with {UPDATE} to store it")
-        settings = {key: _as_yaml(value) for key, value in (overrides or {}).items()}
         try:
             named = None if isinstance(policy, str) else find_policy(policy)
-            order = place_order(
+            spec = make_spec(
                 path.parent,
                 scenario=scenario,
                 policy=named.name if named is not None else str(policy),
                 seed=seed,
                 steps=steps,
-                settings=settings,
+                settings=overrides,
                 tolerances=tolerances,
                 ignore=ignore,
             )
-            return self._run(path, order, named)
+            return self._run(path, spec, named)
         except FireworldError as error:
             raise _failure(str(error)) from None
 
@@ -142,46 +140,36 @@ class Recorder:
         self._paths.add(path)
         return path
 
-    def _run(self, path: Path, order: Order, named: NamedPolicy | None) -> MemoryRecording:
-        """Run an order; compare with the golden, or store it."""
-        from fireworld.recording.golden.check import carry_out, compare_golden
-        from fireworld.recording.golden.order import prepare_golden
+    def _run(self, path: Path, spec: GoldenSpec, named: NamedPolicy | None) -> MemoryRecording:
+        """Run a spec; compare with the golden, or store it."""
+        from fireworld.recording.golden.check import compare_golden, run_in_memory
+        from fireworld.recording.golden.spec import prepare_golden
+        from fireworld.recording.golden.update import store_if_changed
 
-        fresh = carry_out(prepare_golden(order, path.parent, policy=named, cities=self._cities))
-        if self._update:
-            self._store(path, fresh, order)
-        else:
-            checked = compare_golden(path, fresh, order)
-            if checked.result != "same":
-                raise _failure(self._complaint(checked))
+        fresh = run_in_memory(prepare_golden(spec, path.parent, policy=named, cities=self._cities))
+        if not self._update:
+            result = compare_golden(path, fresh, spec)
+            if result.result != "same":
+                raise _failure(self._complaint(result))
+        elif store_if_changed(path, fresh, spec):
+            self._node.user_properties.append((STORED, _shown(path)))
         return fresh
 
-    def _store(self, path: Path, fresh: MemoryRecording, order: Order) -> None:
-        """Store a golden, unless it is there already and the same."""
-        from fireworld.recording.golden.check import is_current, make_golden_folder, store_golden, store_text
+    def _complaint(self, result: GoldenResult) -> str:
+        """Return what differs, and record the new run where it can be looked at."""
+        from fireworld.recording.golden.store import store_recording
 
-        if is_current(path, fresh, order):
-            store_text(path)
-            return
-        make_golden_folder(path.parent)
-        store_golden(path, fresh)
-        self._node.user_properties.append((STORED, _shown(path)))
-
-    def _complaint(self, checked: Checked) -> str:
-        """Say what differs, and keep the new run where it can be looked at."""
-        from fireworld.recording.golden.check import changes, store_recording
-
-        lines = [f"{_shown(checked.path)}: the run is not the same any more", checked.sentence]
-        if checked.difference is not None and checked.fresh is not None and not checked.difference.same:
-            lines += [f"  {line}" for line in changes(checked.difference)]
-            new = self._factory.mktemp("fireworld") / checked.path.name
-            store_recording(new, checked.fresh)
-            lines.append(f"the new run: {new}; hold it against the golden with `fireworld diff` or `fireworld view`")
+        lines = [f"{_shown(result.path)}: the run is not the same any more", result.sentence]
+        if result.fresh is not None and result.differs:
+            lines += [f"  {line}" for line in result.changes]
+            new = self._factory.mktemp("fireworld") / result.path.name
+            store_recording(new, result.fresh)
+            lines.append(f"the new run: {new}; compare it with the golden by `fireworld diff` or `fireworld view`")
         return "\n".join([*lines, f"if that is meant, run with {UPDATE}"])
 
 
 def golden_name(node: pytest.Item, name: str = "") -> str:
-    """Name the golden of a test, as in test_mine-test_policy or test_mine-TestTeam.test_policy-easiest-second.
+    """Return the name of a test's golden, as in test_mine-test_policy or test_mine-TestTeam.test_policy-easiest-second.
 
     Parameters whose names no file should have are replaced, and a short hash tells them apart.
     """
@@ -192,13 +180,8 @@ def golden_name(node: pytest.Item, name: str = "") -> str:
     return clean if clean == plain else f"{clean}-{hashlib.sha256(full.encode()).hexdigest()[:6]}"
 
 
-def _as_yaml(value: Any) -> str:
-    """Write a value as `--set` takes it: text as it is, all else as JSON, which is YAML."""
-    return value if isinstance(value, str) else json.dumps(value)
-
-
 def _shown(path: Path) -> str:
-    """Name a file as short as it can be found from the current folder."""
+    """Return the path of a file from the current folder, if it is in there."""
     return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from importlib.util import find_spec
 from pathlib import Path
 
 import click
@@ -35,45 +34,29 @@ def command(*, log: Path, folder: Path, tables: str | None, force: bool, as_json
     fireworld export run.mcap --parquet run
     fireworld export run.mcap --parquet run --tables buildings,steps --force
 
-    There is a row for each step and building, brigade and so on. Columns are called as the fields of the recording,
+    There is a row for each step and building, brigade and so on. Columns are named after the fields of the recording,
     with unit and meaning in the metadata of the column; the header of the run is the metadata of each file.
     A recording that was cut off or damaged is exported as far as it is good.
 
     Exit code: 0 exported, 2 could not export, 130 interrupted (nothing is left of it).
     """
-    from fireworld_recorder.reader import open_log
+    from fireworld.recording.export import export
+    from fireworld.recording.inputs import open_run
 
-    from fireworld.errors import OutputError
-
-    if find_spec("pyarrow") is None:
-        raise OutputError("--parquet: pyarrow is not installed; try pip install 'fireworld[archive]'")
-    chosen = _chosen(tables)
-    recording = open_log(log, partial=True)
-    from fireworld_recorder.parquet import SUFFIX, export
-
+    chosen = None if tables is None else [name.strip() for name in tables.split(",")]
+    recording = open_run(log, partial=True)
     with bar("export", len(recording), quiet=as_json) as advance:
         n_rows = export(recording, folder, tables=chosen, force=force, on_step=lambda _: advance())
     if recording.damage is not None:
         click.echo(f"{log}: {recording.damage}; exported {len(recording)} committed steps", err=True)
     if as_json:
-        facts = {
+        known = {
             "folder": str(folder),
             "state": recording.state,
             "damage": recording.damage,
             "digest": recording.digest,
         }
-        click.echo(json.dumps({**facts, "n_steps": len(recording), "n_rows": n_rows}, indent=2))
+        click.echo(json.dumps({**known, "n_steps": len(recording), "n_rows": n_rows}, indent=2))
         return
     for name, n in n_rows.items():
-        click.echo(f"{folder / (name + SUFFIX)}: {n:,} rows")
-
-
-def _chosen(tables: str | None) -> list[str]:
-    """Return the names of the tables to write."""
-    from fireworld_recorder.tables import TABLES
-
-    names = list(TABLES) if tables is None else [name.strip() for name in tables.split(",")]
-    for name in names:
-        if name not in TABLES:
-            raise click.UsageError(f"--tables: expected some of {', '.join(TABLES)}, got {name!r}")
-    return names
+        click.echo(f"{folder / name}.parquet: {n:,} rows")

@@ -1,4 +1,4 @@
-"""`fireworld info`: say what a recording holds and how far it is good."""
+"""`fireworld info`: what a recording holds and how far it is good."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("log", metavar="[LOG]", required=False, type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Write JSON.")
-@click.option("--schema", is_flag=True, help="Say which topics and fields it has: types, shapes, units, meaning.")
+@click.option("--schema", is_flag=True, help="List its topics and fields: types, shapes, units, meaning.")
 @click.option("--proto", is_flag=True, help="Write the messages of this version's logs as a .proto file.")
 @click.pass_context
 def command(context: click.Context, *, log: Path | None, as_json: bool, schema: bool, proto: bool) -> None:
-    """Say what LOG recorded, what it holds and how far it is good.
+    """Show what LOG recorded, what it holds and how far it is good.
 
     \b
     fireworld info run.mcap             header, outcome, size of each topic
@@ -30,6 +30,8 @@ def command(context: click.Context, *, log: Path | None, as_json: bool, schema: 
     """
     from fireworld_recorder.reader import open_log
     from fireworld_recorder.schema import PROTO
+
+    from fireworld.recording.summary import summary
 
     if schema and proto:
         raise click.UsageError("--schema and --proto exclude each other.")
@@ -42,14 +44,14 @@ def command(context: click.Context, *, log: Path | None, as_json: bool, schema: 
         _show_schema(recording, as_json=as_json)
     elif recording is not None:
         if as_json:
-            click.echo(json.dumps(_summary(recording), indent=2))
+            click.echo(json.dumps(summary(recording), indent=2))
         else:
-            _show(recording)
+            _show(recording, summary(recording))
     context.exit(0 if recording is None or recording.damage is None else 1)
 
 
 def _show_schema(log: Log | None, *, as_json: bool) -> None:
-    """Say what the messages of a log are, or those that this version writes."""
+    """Print the messages of a log, or those that this version writes."""
     from fireworld_recorder.describe import describe
     from fireworld_recorder.plain import plain
     from fireworld_recorder.recover import channels_of
@@ -80,51 +82,10 @@ def _show_schema(log: Log | None, *, as_json: bool) -> None:
             click.echo(one_line("  ".join(["", *cells, row[-1]]).rstrip()))
 
 
-def _summary(log: Log) -> dict[str, Any]:
-    """Collect what there is to say."""
-    from fireworld_recorder.header import to_metadata
-    from fireworld_recorder.plain import plain
-    from fireworld_recorder.totals import totals_of
-
-    from fireworld.records import FORMAT
-
-    steps = log.steps
-    metadata = to_metadata(log.header).items()
-    return {
-        "path": str(log.path),
-        "format": FORMAT,
-        "state": log.state,
-        "damage": log.damage,
-        "digest": log.digest,
-        "header": {key: value for key, value in metadata if ":" not in key and key not in {"format", "checksum"}},
-        "steps": {"n": len(log), "first": int(steps[0]), "last": int(steps[-1])} if len(log) else {"n": 0},
-        "ending": _ending(log),
-        "totals": plain(totals_of(log)),
-        "n_buildings": len(log.city.building_id),
-        "n_brigades": len(log.city.brigade_tank_litres),
-        "n_civilians": len(log.city.civilian_hp),
-        "snapshots": log.snapshots,
-        "attachments": {name: len(data) for name, data in log.header.attachments.items()},
-        "n_bytes": log.found.n_bytes,
-        "topics": plain(log.topics),
-    }
-
-
-def _ending(log: Log) -> str:
-    """Say how the run ended."""
-    if not len(log):
-        return "no step"
-    last = log.step(int(log.steps[-1]))
-    if last.terminated:
-        return "terminated: nothing burned any more"
-    return "truncated: the last step of the scenario" if last.truncated else "stopped before its end"
-
-
-def _show(log: Log) -> None:
-    """Say it for people; names in a recording are whoever's, so that what cannot be printed is escaped."""
+def _show(log: Log, summary: dict[str, Any]) -> None:
+    """Print a summary; names in a recording are anybody's, so what cannot be printed is escaped."""
     from fireworld.errors import one_line
 
-    summary = _summary(log)
     header, totals, steps = summary["header"], summary["totals"], summary["steps"]
     span = f"{steps['n']}, from {steps['first']} to {steps['last']}" if steps["n"] else "none"
     lines = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,15 +12,19 @@ if TYPE_CHECKING:
     from fireworld_recorder.reader import Log
 
 
-def open_committed(path: Path, *, doing: str) -> Log:
-    """Open a log as far as it is good; where that is not to its end, say so and what is done with the rest.
+def open_one_or_two(paths: Sequence[Path], *, doing: str) -> list[Log]:
+    """Open logs as far as they are good; where that is not to the end, print so and what is done with the rest.
 
     Raises:
-        LogError: it is not a log.
+        UsageError: there are more than two.
+        LogError: one is not a log.
     """
-    from fireworld_recorder.reader import open_log
+    if len(paths) > 2:
+        raise click.UsageError(f"Expected one or two recordings, got {len(paths)}.")
+    from fireworld_recorder import reader
 
-    log = open_log(path, partial=True)
-    if log.damage is not None:
-        click.echo(f"{path}: {log.damage}; {doing} {len(log.steps)} committed steps", err=True)
-    return log
+    logs = [reader.open_log(path, partial=True) for path in paths]
+    for log, path in zip(logs, paths, strict=True):
+        if log.damage is not None:
+            click.echo(f"{path}: {log.damage}; {doing} {len(log.steps)} committed steps", err=True)
+    return logs

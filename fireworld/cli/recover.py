@@ -13,7 +13,7 @@ import click
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def command(*, log: Path, output: Path, force: bool) -> None:
     """Write the committed steps of LOG, a cut-off or damaged recording, as a recording of their own."""
-    from fireworld_recorder.recover import recover
+    from fireworld.recording.export import recover
 
     recovery = recover(log, output, force=force)
     click.echo(f"{log}: {recovery.damage or 'it was complete'}")

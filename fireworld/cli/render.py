@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import click
 
-from fireworld.cli.opening import open_committed
-from fireworld.cli.progress import bar
-
-if TYPE_CHECKING:
-    from fireworld.records import Recording
+from fireworld.cli.opening import open_one_or_two
+from fireworld.cli.progress import bars
 
 _LAST: Final = "last"
 _STEPS_MAX: Final = 24
@@ -60,18 +57,16 @@ def command(
 
     Exit code: 0 drawn, 2 could not draw, 130 interrupted (no half file is left).
     """
-    if len(logs) > 2:
-        raise click.UsageError(f"Expected one or two recordings, got {len(logs)}.")
-    from fireworld_viewer.pictures.figure_files import STILLS
     from fireworld_viewer.pictures.film import FILMS
 
     from fireworld.files import check_output
+    from fireworld.recording.pages.render import ENDINGS
 
-    check_output(output, endings=[*STILLS, *FILMS], force=force)
+    check_output(output, endings=ENDINGS, force=force)
     if output.suffix.lower() in FILMS:
         if step is not None or steps is not None:
             raise click.UsageError(f"--step and --steps go with pictures, not with films ({output.suffix}).")
-        _render_film(logs, output, first=first, last=last, every=every or 1, fps=fps)
+        _render_film(logs, output, first=first, last=last, every=every or 1, fps=fps, force=force)
         return
     if not (first is last is every is fps is None):
         raise click.UsageError(f"--from, --to, --every and --fps go with films, not with pictures ({output.suffix}).")
@@ -80,44 +75,54 @@ def command(
     chosen = _step_numbers("--steps", steps) if steps is not None else _step_numbers("--step", step or _LAST)
     if steps is None and len(chosen) > 1:
         raise click.UsageError(f"--step: expected one step, got {step!r}; several go with --steps.")
-    _render_still(logs, output, chosen, force=force)
+    _render_picture(logs, output, chosen, force=force)
 
 
 def _step_numbers(option: str, text: str) -> list[int]:
     """Turn "0,60,last" into steps."""
-    from fireworld_viewer.story.steps import LAST
-
     words = [word.strip() for word in text.split(",")]
     if len(words) > _STEPS_MAX:
         raise click.UsageError(f"{option}: expected at most {_STEPS_MAX} steps, got {len(words)}; a film shows more.")
     if not all(word == _LAST or (word.isascii() and word.isdigit()) for word in words):
         raise click.UsageError(f"{option}: expected steps like 0,60,last, got {text!r}.")
-    return [LAST if word == _LAST else int(word) for word in words]
+    return [-1 if word == _LAST else int(word) for word in words]
 
 
-def _render_still(paths: Sequence[Path], output: Path, steps: Sequence[int], *, force: bool) -> None:
-    from fireworld_viewer.pictures.figure_files import plain_style, save_figure
-    from fireworld_viewer.pictures.maps import draw_steps
+def _render_picture(paths: Sequence[Path], output: Path, steps: Sequence[int], *, force: bool) -> None:
+    from fireworld.recording.pages.render import render_picture
 
-    recordings = [open_committed(path, doing="drawing") for path in paths]
-    with plain_style():
-        save_figure(draw_steps(recordings, steps), output, force=force)
+    render_picture(open_one_or_two(paths, doing="drawing"), output, steps=steps, force=force)
     click.echo(f"{output}: {len(steps)} step{'s' if len(steps) > 1 else ''}, {_size(output)}")
 
 
 def _render_film(
-    paths: Sequence[Path], output: Path, *, first: int | None, last: int | None, every: int, fps: float | None
+    paths: Sequence[Path],
+    output: Path,
+    *,
+    first: int | None,
+    last: int | None,
+    every: int,
+    fps: float | None,
+    force: bool,
 ) -> None:
-    from fireworld_viewer.pictures.figure_files import plain_style
-    from fireworld_viewer.pictures.film import FPS, save_film
-    from fireworld_viewer.story.steps import read_steps_between
+    from fireworld_viewer.pictures.film import FPS
 
-    recordings: list[Recording] = [open_committed(path, doing="drawing") for path in paths]
-    shown = read_steps_between(recordings, first=first, last=last, every=every)
-    with plain_style(), bar("film", len(shown)) as advance:
-        save_film(recordings, shown, output, fps=fps or FPS, on_frame=advance)
-    span = f"steps {shown[0].step} to {shown[-1].step}"
-    click.echo(f"{output}: {len(shown)} frames, {span}, {_size(output)}")
+    from fireworld.recording.pages.render import render_film
+
+    recordings = open_one_or_two(paths, doing="drawing")
+    with bars() as progress:
+        task = progress.add_task("film", total=None)
+        steps = render_film(
+            recordings,
+            output,
+            first_step=first,
+            last_step=last,
+            every=every,
+            fps=fps or FPS,
+            force=force,
+            on_frame=lambda done, total: progress.update(task, completed=done, total=total),
+        )
+    click.echo(f"{output}: {len(steps)} frames, steps {steps[0]} to {steps[-1]}, {_size(output)}")
 
 
 def _size(path: Path) -> str:

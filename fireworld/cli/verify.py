@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import click
@@ -14,27 +15,19 @@ import click
 def command(context: click.Context, *, log: Path, as_json: bool) -> None:
     """Run the scenario, seed and decisions of LOG again and compare every step.
 
-    Needs nothing but the recording. Names the first step, entity and field that this fireworld computes otherwise.
+    Needs nothing but the recording. Names the first step, entity and field that this fireworld computes differently.
 
     Exit code: 0 the same, 1 different, 2 could not replay.
     """
-    import json
+    from fireworld.recording.verify import verify
 
-    from fireworld_recorder.diff import compare
-    from fireworld_recorder.reader import open_log
-
-    from fireworld.cli.diff import show, write_json
-    from fireworld.recording.replay import Replay
-
-    recording = open_log(log)
-    difference = compare(recording, Replay(recording))
-    if not difference.same:
-        if as_json:
-            write_json(difference, digests=[recording.digest])
-        else:
-            show(difference, names=(str(log), "replay"))
-        context.exit(1)
+    verified = verify(log)
     if as_json:
-        click.echo(json.dumps({"same": True, "digests": [recording.digest], "n_steps_compared": len(recording)}))
+        click.echo(json.dumps(verified.to_dict(), indent=None if verified else 2))
+    elif verified.difference is None:
+        click.echo(repr(verified))
     else:
-        click.echo(f"{log}: the replay is the same, {len(recording)} steps, digest {recording.digest}")
+        from fireworld.cli.difference_tables import show_difference
+
+        show_difference(verified.difference, names=(str(log), "replay"))
+    context.exit(0 if verified else 1)

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from fireworld.cli.opening import open_committed
-
-if TYPE_CHECKING:
-    from fireworld_viewer.rerun_view.outcome_page import OutcomePage
-
-    from fireworld.records import MemoryRecording, Recording
+from fireworld.cli.compiling import announce_compilation
+from fireworld.cli.opening import open_one_or_two
 
 
 def _building_ids(context: click.Context, parameter: click.Parameter, value: str | None) -> tuple[int, ...]:
@@ -41,7 +35,7 @@ def _building_ids(context: click.Context, parameter: click.Parameter, value: str
 @click.option("--from", "first", type=click.IntRange(min=0), metavar="N", help="First step to show.")
 @click.option("--to", "last", type=click.IntRange(min=0), metavar="N", help="Last step to show.")
 @click.option("--every", type=click.IntRange(min=1), default=1, metavar="N", help="Show every N-th step.")
-@click.option("--air", is_flag=True, help="Show the air of every step: it is worked out by replaying the run.")
+@click.option("--air", is_flag=True, help="Show the air of every step: it is computed by replaying the run.")
 def command(
     *,
     logs: tuple[Path, ...],
@@ -70,71 +64,28 @@ def command(
 
     Exit code: 0 shown or saved, 2 could not (no display, no Rerun, not a recording, two cities).
     """
-    if len(logs) > 2:
-        raise click.UsageError(f"Expected one or two recordings, got {len(logs)}.")
     if web and output is not None:
         raise click.UsageError("--save and --web exclude each other.")
     if port is not None and not web:
         raise click.UsageError("--port goes with --web.")
     if force and output is None:
         raise click.UsageError("--force goes with --save.")
-    from fireworld_viewer.rerun_view import app
-    from fireworld_viewer.story.steps import select_steps
+    if air:
+        announce_compilation()
+    from fireworld.recording.pages.view import view
 
-    held = [open_committed(path, doing="showing") for path in logs]
-    read = [_with_air(recording, path) if air else recording for recording, path in zip(held, logs, strict=True)]
-    recordings = [select_steps(recording, first=first, last=last, every=every) for recording in read]
-    outcome = _outcome(logs, recordings)
+    view(
+        open_one_or_two(logs, doing="showing"),
+        save=output,
+        force=force,
+        web=web,
+        port=port,
+        announce=lambda address: click.echo(f"Open {address} in a browser; Ctrl-C ends it."),
+        focus=focus,
+        first_step=first,
+        last_step=last,
+        every=every,
+        air=air,
+    )
     if output is not None:
-        app.save(recordings, output, focus=focus, outcome=outcome, force=force)
         click.echo(f"wrote {output}; open it with `rerun {output}`")
-    elif web:
-        app.serve(recordings, focus=focus, outcome=outcome, port=port or app.WEB_PORT, announce=_announce)
-    else:
-        app.show(recordings, focus=focus, outcome=outcome)
-
-
-def _with_air(recording: Recording, path: Path) -> MemoryRecording:
-    """Replay a run to know the air of every step.
-
-    Raises:
-        LogError: this fireworld computes something else than what is recorded.
-    """
-    from fireworld.cli.compiling import announce_compilation
-    from fireworld.cli.replays import check_replay
-    from fireworld.recording.replay import Replay
-    from fireworld.records import MemoryRecording
-
-    announce_compilation()
-    again = Replay(recording, with_air=True)
-    replayed = MemoryRecording(recording.header, again.city, list(again))
-    check_replay(recording, replayed, source=str(path), hint="try without --air")
-    return replayed
-
-
-def _outcome(logs: Sequence[Path], recordings: Sequence[Recording]) -> OutcomePage:
-    """Work out what the runs came to, and where two first differ, in the steps that are shown."""
-    from fireworld_recorder.diff import Difference, compare
-    from fireworld_recorder.totals import totals_of
-    from fireworld_viewer.rerun_view.outcome_page import OutcomePage
-    from fireworld_viewer.story.two_runs import check_same_city
-
-    from fireworld.cli.difference_text import totals_rows
-
-    heads = [path.name for path in logs]
-    if len(recordings) == 1:
-        totals = totals_of(recordings[0])
-        alone = Difference(None, (totals, totals), {}, totals.n_steps, {})
-        return OutcomePage(heads=heads, rows=[(label, value) for label, value, _ in totals_rows(alone)])
-    first_run, second_run = recordings
-    check_same_city(first_run.city, second_run.city)
-    difference = compare(first_run, second_run)
-    rows, first = list(totals_rows(difference)), difference.first
-    if first is None:
-        return OutcomePage(heads=heads, rows=rows)
-    step = int(first_run.steps[0]) if first.step is None else first.step
-    return OutcomePage(heads=heads, rows=rows, first_step=step, first_sentence=first.sentence)
-
-
-def _announce(address: str) -> None:
-    click.echo(f"Open {address} in a browser; Ctrl-C ends it.")

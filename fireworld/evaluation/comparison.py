@@ -13,10 +13,10 @@ from xml.etree import ElementTree as Xml
 from fireworld.arguments import ArgumentError
 from fireworld.errors import OutputError, expected, one_line
 from fireworld.evaluation.paired import N_SEEDS_ENOUGH, Judgement, Pairing, Verdict, judge, over_all
-from fireworld.evaluation.text_table import text_table
 from fireworld.html_page import html_mark, html_table, text_cell
 from fireworld.junit import report
 from fireworld.outcome import METRICS, Metric
+from fireworld.text_table import text_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -1,28 +1,35 @@
-"""Decisions of a recorded run, and policies that are made of them: recorded, told, compared."""
+"""Decisions of a recorded run, and policies that are made of them: recorded, forced, in shadow."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from difflib import get_close_matches
+from typing import Final
 
-from fireworld.errors import LogError, expected
+from fireworld.arguments import whole_number
+from fireworld.errors import LogError, PolicyError, expected
 from fireworld.policy.asking import ask, keeps
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
+from fireworld.recording.inputs import run_name
 from fireworld.recording.replay import recorded_decision
-from fireworld.records import ACTION_NAMES, CityRecord, Recording, RunHeader
+from fireworld.records import ACTION_NAMES, CityRecord, RunHeader, Steps, StoredRun
 
-Told = Callable[[int, int], Decision | None]
-"""From a brigade and a step to what the brigade is told to do; None: it asks its policy."""
+ForcedDecisions = Callable[[int, int], Decision | None]
+"""From a brigade and a step to the decision forced on the brigade; None: it asks its policy."""
 
-FIRST_ACTION = Decision(0)
+DecisionGiven = str | Action | Decision
+"""A decision as callers give it: itself, an action, or text as in "nearest-to-me" or "own-target:301"."""
+
+FALLBACK: Final = Decision(0)
 """What a brigade does of which no decision is known at all, or one that is not possible."""
 
 
-def check_same_luck(first: RunHeader, second: RunHeader, *, names: tuple[str, str]) -> None:
-    """Refuse two runs that do not start alike or do not meet the same luck.
+def check_same_draws(first: RunHeader, second: RunHeader, *, names: tuple[str, str]) -> None:
+    """Check that two runs start alike and see the same random draws.
 
     Args:
         first: a run.
-        second: the run to hold against it.
+        second: the run to compare with it.
         names: their files.
 
     Raises:
@@ -32,19 +39,19 @@ def check_same_luck(first: RunHeader, second: RunHeader, *, names: tuple[str, st
         wanted = f"{first.scenario} ({first.scenario_digest[:12]}), as in {names[0]}"
         raise LogError(expected(names[1], "scenario", wanted, f"{second.scenario} ({second.scenario_digest[:12]})"))
     if first.seed != second.seed:
-        wanted = f"{first.seed}, as in {names[0]}: other seeds are other luck"
+        wanted = f"{first.seed}, as in {names[0]}: other seeds give different random draws"
         raise LogError(expected(names[1], "seed", wanted, second.seed))
 
 
 class RecordedDecisions(Policy):
-    """Decides as a recorded run did, whatever happens; where nothing is recorded, as the brigade last did there.
+    """Decides as a recorded run did, in any world; where nothing is recorded, as the brigade last did there.
 
     Nothing is recorded where a brigade had no choice (it refilled), and after the end of the recording.
     """
 
     stateless = True
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, recording: Steps) -> None:
         self._made = {record.step: record.decisions for record in recording}
         self.last_step = max(self._made, default=0)
 
@@ -62,7 +69,7 @@ class RecordedDecisions(Policy):
             decision = self.made(earlier, brigade)
             if decision is not None:
                 return Decision(decision.action, target=decision.target)
-        return FIRST_ACTION
+        return FALLBACK
 
     def targets(self, brigade: int, *, first: int, last: int) -> list[int]:
         """Return the buildings that a brigade named itself from a step to another, each once, in their order."""
@@ -72,63 +79,105 @@ class RecordedDecisions(Policy):
     def decide(self, observation: Observation) -> Decision:
         """Decide as recorded; `easiest` instead of a target of its own that does not burn here."""
         decision = self.at(observation.step, observation.brigade)
-        return decision if possible(decision, observation) else FIRST_ACTION
+        return decision if is_possible(decision, observation) else FALLBACK
 
 
-class ToldPolicy(Policy):
-    """A policy for all brigades but those that are told what to do; they ask it only if that is not possible."""
+class ForcedPolicy(Policy):
+    """A policy with some decisions forced on its brigades; a brigade asks it only if its forced one is not possible."""
 
-    def __init__(self, policy: Policy, told: Told) -> None:
+    def __init__(self, policy: Policy, forced: ForcedDecisions) -> None:
         self._policy = policy
-        self._told = told
+        self._forced = forced
 
     def decide(self, observation: Observation) -> Decision:
-        """Return what the brigade is told, else what the policy decides."""
-        told = self._told(observation.brigade, observation.step)
-        return told if told is not None and possible(told, observation) else ask(self._policy, observation)
+        """Return the forced decision, else what the policy decides."""
+        forced = self._forced(observation.brigade, observation.step)
+        return forced if forced is not None and is_possible(forced, observation) else ask(self._policy, observation)
 
     def keeps(self, brigade: int, last_action: int, step: int) -> bool:
-        """Tell whether a brigade goes on with its last action: as the policy says, unless it is told what to do."""
-        return self._told(brigade, step) is None and keeps(self._policy, brigade, last_action, step)
+        """Return whether a brigade repeats its last action: as the policy says, unless a decision is forced on it."""
+        return self._forced(brigade, step) is None and keeps(self._policy, brigade, last_action, step)
 
 
-class ComparedPolicy(Policy):
-    """Decides as recorded, and asks a policy too: it remembers what it would, and is seen to decide alike or not.
+class ShadowPolicy(Policy):
+    """Decides as recorded, and asks a policy too: it notes where the policy would have decided differently.
 
     Attributes:
-        others: the recorded decisions that the policy would not have made, by (step, brigade), as they came.
+        disagreements: recorded and own decision where they differ, by (step, brigade), in the order of the run.
     """
 
     def __init__(self, recorded: Policy, policy: Policy) -> None:
         self._recorded = recorded
         self._policy = policy
-        self.others: dict[tuple[int, int], tuple[Decision, Decision]] = {}
+        self.disagreements: dict[tuple[int, int], tuple[Decision, Decision]] = {}
 
     def decide(self, observation: Observation) -> Decision:
         """Return the recorded decision."""
         brigade, step = observation.brigade, observation.step
         recorded = ask(self._recorded, observation)
         last = _last(observation)
-        kept = possible(last, observation) and keeps(self._policy, brigade, last.action, step)
-        own = last if kept else ask(self._policy, observation)
+        repeats = is_possible(last, observation) and keeps(self._policy, brigade, last.action, step)
+        own = last if repeats else ask(self._policy, observation)
         if (own.action, own.target) != (recorded.action, recorded.target):
-            self.others[step, brigade] = recorded, own
+            self.disagreements[step, brigade] = recorded, own
         return recorded
 
 
-def possible(decision: Decision, observation: Observation) -> bool:
-    """Tell whether a decision can be made: a target of its own must burn, in the brigade's fire site."""
+def is_possible(decision: Decision, observation: Observation) -> bool:
+    """Return whether a decision can be made: a target of its own must burn, in the brigade's fire site."""
     return decision.target is None or decision.target in observation.burning
 
 
-def in_words(decision: Decision, city: CityRecord) -> str:
-    """Say a decision as `--decide` takes it: its action, and the id of the building that it names itself."""
+def decision_text(decision: Decision, city: CityRecord) -> str:
+    """Write a decision as `--decide` takes it: its action, and the id of the building that it names itself."""
     name = ACTION_NAMES[decision.action]
     return name if decision.target is None else f"{name}:{city.building_id[decision.target]}"
 
 
+def read_decision(where: str, given: DecisionGiven, run: StoredRun) -> Decision:
+    """Return a decision.
+
+    Args:
+        where: what errors name.
+        given: a decision; an action; or its name, as in "nearest-to-me" or "own-target:301", a building by its id.
+        run: the run that it is for.
+
+    Raises:
+        PolicyError: there is no such action or building, or a building where none belongs.
+        ArgumentError: it is no action at all.
+    """
+    if isinstance(given, Decision):
+        return given
+    if not isinstance(given, str):
+        return Decision(Action(whole_number(where, given, least=0, most=len(Action) - 2)))
+    name, colon, building = given.partition(":")
+    if name not in ACTION_NAMES:
+        near = [one for one in ACTION_NAMES if name in one] or get_close_matches(name, ACTION_NAMES, n=1)
+        hint = "try " + " or ".join(near) if near else ""
+        raise PolicyError(expected(where, "", "one of " + ", ".join(ACTION_NAMES), name, hint))
+    action = Action(ACTION_NAMES.index(name))
+    if action == Action.OWN_TARGET:
+        return Decision(action, target=_building(where, given, building, run))
+    if colon:
+        hint = "a brigade goes for a building with own-target:BUILDING"
+        raise PolicyError(expected(where, "", f"{name} without a building", given, hint))
+    return Decision(action)
+
+
+def _building(where: str, given: str, building: str, run: StoredRun) -> int:
+    """Return the index of a building given by its id."""
+    if not (building.isascii() and building.isdecimal()):
+        name = ACTION_NAMES[Action.OWN_TARGET]
+        raise PolicyError(expected(where, "", f"a building behind {name}, as in {name}:301", given))
+    ids = run.city.building_id.tolist()
+    if int(building) not in ids:
+        wanted = f"the id of a building of {run_name(run)}, {min(ids)} to {max(ids)}"
+        raise PolicyError(expected(where, "", wanted, given))
+    return int(ids.index(int(building)))
+
+
 def _last(observation: Observation) -> Decision:
-    """Return what a brigade did in the step before; its arrays tell until it has answered."""
+    """Return what a brigade did in the step before; the world's arrays hold it until the brigade has decided anew."""
     brigades = observation.world.brigades
     action = int(brigades.action[observation.brigade])
     target = int(brigades.target[observation.brigade]) if action == Action.OWN_TARGET else None

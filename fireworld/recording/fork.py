@@ -1,70 +1,82 @@
-"""Fork: a recorded run that goes on otherwise after one of its steps."""
+"""Fork: a recorded run that branches off after one of its steps."""
 
 from __future__ import annotations
 
-import copy
 import json
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import takewhile
 from typing import Any, Final
 
 from fireworld import __version__
+from fireworld.arguments import ArgumentError, whole_number
 from fireworld.errors import LogError, expected
-from fireworld.policy.names import TEAM_ATTACHMENT, NamedPolicy
+from fireworld.policy.asking import begin
+from fireworld.policy.names import TEAM_ATTACHMENT, NamedPolicy, find_policy, note_on_team
 from fireworld.policy.protocol import Decision, Observation, Policy
 from fireworld.recording.decisions import (
-    FIRST_ACTION,
+    FALLBACK,
+    DecisionGiven,
+    ForcedPolicy,
     RecordedDecisions,
-    ToldPolicy,
-    check_same_luck,
-    in_words,
-    possible,
+    check_same_draws,
+    decision_text,
+    is_possible,
+    read_decision,
 )
-from fireworld.recording.resume import Resumed
-from fireworld.records import CityRecord, Recording, RunHeader, StepRecord
+from fireworld.recording.inputs import AnyRun, open_run, run_name
+from fireworld.recording.replay import build_recorded, check_replay
+from fireworld.recording.resume import Resumed, has_memory, recorded_policy, resume
+from fireworld.records import CityRecord, MemoryRecording, RunHeader, StepRecord, StoredRun
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.run import PreparedRun
-from fireworld.simulation.state import copy_world
 from fireworld.simulation.world import World
 
 FORK_ATTACHMENT: Final = "fork.json"
-"""What a recording calls the list of its forks, the oldest first."""
-NAMED_MAX: Final = 8
+"""Name of the attachment that lists the forks a recording comes from, the oldest first."""
+RECORDED: Final = "recorded"
+"""Names the policy that decides as is recorded, whatever happens."""
+BUILDINGS_NAMED_MAX: Final = 8
 """Buildings that an error names at most."""
 
 
 @dataclass(frozen=True)
-class Swap:
+class SwappedBrigade:
     """A brigade that takes the decisions recorded in another run of the same scenario and seed."""
 
-    brigade: int
-    name: str
-    """The other run's file, for errors."""
-    digest: str
-    header: RunHeader
+    run: StoredRun
     decisions: RecordedDecisions
 
 
 @dataclass(frozen=True)
-class Change:
-    """What is to be otherwise after the step of the fork.
+class ForkChange:
+    """What is changed after the step of the fork.
 
     Attributes:
-        named: the policy that goes on.
+        named: the policy that takes over.
         decided: decisions by brigade, for the first step after the fork.
-        swaps: brigades that take another run's decisions, to the end.
+        swaps: by brigade: whose decisions it takes, to the end.
     """
 
     named: NamedPolicy
     decided: Mapping[int, Decision] = field(default_factory=dict)
-    swaps: Sequence[Swap] = ()
+    swaps: Mapping[int, SwappedBrigade] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
-class Fork(PreparedRun):
-    """A run whose first steps are recorded ones: iterate over it to let the rest happen."""
+class PreparedFork(PreparedRun):
+    """A prepared run whose first steps are recorded ones; iterating runs the others.
+
+    Attributes:
+        recorded: the recorded steps.
+        score_of_original: of the recorded run, at its last step.
+        note: how a team is used in another way than it was trained, if it is.
+    """
 
     recorded: Sequence[StepRecord]
+    score_of_original: float
+    note: str
 
     def __iter__(self) -> Iterator[StepRecord]:
         """Yield the recorded steps and then every new one, until nothing burns or the last step is done."""
@@ -76,75 +88,104 @@ class Fork(PreparedRun):
 
 
 def prepare_fork(
-    resumed: Resumed, change: Change, recording: Recording, records: Sequence[StepRecord], *, digest: str, source: str
-) -> Fork:
-    """Get a fork ready.
-
-    The policy must have seen the steps before, if it is the recorded one and has a memory; else be told that a run
-    begins.
-
-    Args:
-        resumed: the world after the step to fork at.
-        change: what is to be otherwise.
-        recording: the run to fork.
-        records: its steps up to that one.
-        digest: of the whole recording.
-        source: its file, for errors.
-
-    Raises:
-        LogError: nothing burns any more, a brigade cannot do what it is told, or a swapped run does not fit.
-    """
-    world, header = resumed.world, recording.header
-    _check_not_over(world, source)
-    if change.decided:
-        asked = _asked_next(world)
-        for brigade, decision in change.decided.items():
-            _check_decides(world, brigade, recording, asked)
-            _check_possible(world, brigade, decision, recording.city, asked[brigade])
-    for swap in change.swaps:
-        _check_swap(world, swap, header, source)
-    step = world.step_number
-    swapped = {swap.brigade: swap.decisions for swap in change.swaps}
-
-    def told(brigade: int, now: int) -> Decision | None:
-        if brigade in swapped:
-            return swapped[brigade].at(now, brigade)
-        return change.decided.get(brigade) if now == step + 1 else None
-
-    attachments = {name: data for name, data in header.attachments.items() if name != TEAM_ATTACHMENT}
-    attachments |= change.named.attachments
-    attachments[FORK_ATTACHMENT] = _told_forks(header, _told(change, recording.city, digest=digest, step=step))
-    return Fork(
-        header=replace(
-            header,
-            policy=change.named.name,
-            policy_digest=change.named.digest,
-            fireworld_version=__version__,
-            forked_from=f"{digest}:{step}",
-            attachments=attachments,
-        ),
-        city=recording.city,
-        start=world,
-        policy=ToldPolicy(change.named.policy, told),
-        recorded=records,
+    log: AnyRun,
+    *,
+    at: int,
+    policy: str | None = None,
+    decide: Mapping[int, DecisionGiven] | None = None,
+    swap: Mapping[int, AnyRun] | None = None,
+) -> PreparedFork:
+    """Prepare a fork; arguments and errors as for `fork`."""
+    run = open_run(log)
+    beginning = _recorded_up_to(run, at)
+    built = build_recorded(run.header)
+    change = _read_change(run, built.n_brigades, policy, decide or {}, swap or {})
+    with_memory = change.named if policy is None and has_memory(change.named.policy) else None
+    resumed = resume(built, beginning, source=run_name(run), with_memory=with_memory)
+    check_replay(resumed.recorded, resumed.replayed, source=run_name(run))
+    _check_change(change, resumed, run)
+    if with_memory is None:
+        begin(change.named.policy, resumed.world.city_arrays, n_brigades=built.n_brigades, seed=run.header.seed)
+    return PreparedFork(
+        header=_header(run, change, at),
+        city=run.city,
+        start=resumed.world,
+        policy=_forced_policy(change, first_step=at + 1),
+        recorded=list(beginning),
+        score_of_original=run.step(int(run.steps[-1])).score.score,
+        note=note_on_team(change.named, built.n_brigades, choices=built.scenario.choices),
     )
 
 
-def _check_not_over(world: World, source: str) -> None:
-    if world.terminated or world.truncated:
-        why = "nothing burns any more" if world.terminated else "it is the last of the run"
-        raise LogError(
-            expected("--at", "", f"a step of {source} after which the run goes on", f"{world.step_number}, {why}")
-        )
+def _recorded_up_to(run: StoredRun, step: int) -> MemoryRecording:
+    """Read the steps of a run up to one of them.
+
+    Raises:
+        LogError: there is no such step, or the run has ended with it.
+    """
+    if step not in run.steps:
+        steps = run.steps
+        held = f"a step of {run_name(run)}, {steps[0]} to {steps[-1]}" if len(run) else f"steps in {run_name(run)}"
+        raise LogError(expected("at", "", held, step if len(run) else "none"))
+    recording = MemoryRecording(run.header, run.city, [*takewhile(lambda record: record.step <= step, run)])
+    *_, last = recording
+    if last.terminated or last.truncated:
+        got = f"{step}, {'nothing burns any more' if last.terminated else 'it is the last of the run'}"
+        raise LogError(expected("at", "", f"a step of {run_name(run)} after which the run continues", got))
+    return recording
 
 
-def _check_brigade(option: str, brigade: int, n_brigades: int) -> None:
-    if not 0 <= brigade < n_brigades:
-        raise LogError(expected(option, "brigade", f"a number from 0 to {n_brigades - 1}", brigade))
+def _read_change(
+    run: StoredRun,
+    n_brigades: int,
+    policy: str | None,
+    decide: Mapping[int, DecisionGiven],
+    swap: Mapping[int, AnyRun],
+) -> ForkChange:
+    """Read what is to be changed; errors as for `fork`."""
+    for option, brigades in (("decide", decide), ("swap", swap)):
+        for brigade in brigades:
+            whole_number(f"{option}: brigade", brigade, least=0, most=n_brigades - 1)
+    for brigade in decide.keys() & swap.keys():
+        raise ArgumentError(expected("decide, swap", "", f"one of them for brigade {brigade}", "both"))
+    decided = {brigade: read_decision(f"decide: {brigade}", given, run) for brigade, given in decide.items()}
+    swaps: dict[int, SwappedBrigade] = {}
+    opened: dict[object, SwappedBrigade] = {}
+    for brigade, other in swap.items():
+        key = str(other) if isinstance(other, str | os.PathLike) else id(other)
+        if key not in opened:
+            opened[key] = SwappedBrigade(swapped := open_run(other), RecordedDecisions(swapped))
+        swaps[brigade] = opened[key]
+    return ForkChange(_policy(run, policy), decided, swaps)
 
 
-class _Asked(Policy):
-    """Asked for decisions, it remembers what was seen."""
+def _policy(run: StoredRun, name: str | None) -> NamedPolicy:
+    """Return the policy that takes over."""
+    if RECORDED in {name, run.header.policy if name is None else None}:
+        return NamedPolicy(RECORDED, run.digest, RecordedDecisions(run))
+    return find_policy(name) if name is not None else recorded_policy(run.header, source=run_name(run))
+
+
+def _check_change(change: ForkChange, resumed: Resumed, run: StoredRun) -> None:
+    """Check that every brigade can do what it is to do.
+
+    Raises:
+        LogError: a brigade has no decision to make or cannot make this one, or a swapped run does not fit.
+    """
+    asked = _observations_of_next_step(resumed.world) if change.decided else {}
+    for brigade, decision in change.decided.items():
+        _check_decides(resumed.world, brigade, run, asked)
+        _check_possible(resumed.world, brigade, decision, run.city, asked[brigade])
+    for swapped in change.swaps.values():
+        other, step = swapped.run, resumed.world.step_number
+        check_same_draws(run.header, other.header, names=(run_name(run), run_name(other)))
+        if swapped.decisions.last_step <= step:
+            wanted, got = f"a run with decisions after step {step}", f"one that ends at {swapped.decisions.last_step}"
+            raise LogError(expected("swap", run_name(other), wanted, got))
+
+
+class _Observing(Policy):
+    """A policy that keeps what it observes."""
 
     def __init__(self) -> None:
         self.seen: dict[int, Observation] = {}
@@ -152,67 +193,72 @@ class _Asked(Policy):
     def decide(self, observation: Observation) -> Decision:
         _ = observation.burning  # what burns where it stands now: the arrays behind it change within the step
         self.seen[observation.brigade] = observation
-        return FIRST_ACTION
+        return FALLBACK
 
 
-def _asked_next(world: World) -> dict[int, Observation]:
+def _observations_of_next_step(world: World) -> dict[int, Observation]:
     """Return what the brigades that are asked in the next step see then; the world stays as it is."""
-    ahead, asked = copy.copy(world), _Asked()
-    ahead.state = copy_world(world.state)
-    ahead.step(asked)
-    return asked.seen
+    observing = _Observing()
+    world.copy().step(observing)
+    return observing.seen
 
 
-def _check_decides(world: World, brigade: int, recording: Recording, asked: Mapping[int, Observation]) -> None:
+def _check_decides(world: World, brigade: int, run: StoredRun, asked: Mapping[int, Observation]) -> None:
     """Refuse a decision that would not be asked for, and so change nothing."""
-    _check_brigade("--decide", brigade, world.n_brigades)
     if brigade not in asked:
         got = "one that is dead" if world.state.brigades.hp[brigade] <= 0 else "one that refills"
         wanted = f"a brigade that decides in step {world.step_number + 1}"
-        actions = zip(recording.steps.tolist(), recording.ragged("/decisions", "action"), strict=True)
+        actions = zip(run.steps.tolist(), run.ragged("/decisions", "action"), strict=True)
         later = [step for step, made in actions if step > world.step_number and made[brigade] >= 0]
-        hint = f"it decides again in step {later[0]}: try --at {later[0] - 1}" if later else ""
-        raise LogError(expected("--decide", str(brigade), wanted, got, hint))
+        hint = f"it decides again in step {later[0]}: fork at {later[0] - 1}" if later else ""
+        raise LogError(expected("decide", str(brigade), wanted, got, hint))
 
 
 def _check_possible(world: World, brigade: int, decision: Decision, city: CityRecord, seen: Observation) -> None:
     """Refuse a target that no policy could name."""
-    if possible(decision, seen):
+    if is_possible(decision, seen):
         return
     burns = 1 <= world.state.fire.fieryness[decision.target] <= 3
     wanted = f"a building that burns in the brigade's fire site in step {seen.step}"
     got = f"{city.building_id[decision.target]}, which {'burns in another one' if burns else 'does not burn'}"
     burning = sorted(city.building_id[seen.burning].tolist())
-    more = f" or {len(burning) - NAMED_MAX} more" if len(burning) > NAMED_MAX else ""
-    raise LogError(
-        expected("--decide", str(brigade), wanted, got, f"try {', '.join(map(str, burning[:NAMED_MAX]))}{more}")
-    )
+    more = f" or {len(burning) - BUILDINGS_NAMED_MAX} more" if len(burning) > BUILDINGS_NAMED_MAX else ""
+    hint = f"try {', '.join(map(str, burning[:BUILDINGS_NAMED_MAX]))}{more}"
+    raise LogError(expected("decide", str(brigade), wanted, got, hint))
 
 
-def _check_swap(world: World, swap: Swap, header: RunHeader, source: str) -> None:
-    check_same_luck(header, swap.header, names=(source, swap.name))
-    _check_brigade("--swap", swap.brigade, world.n_brigades)
-    if swap.decisions.last_step <= world.step_number:
-        wanted = f"a run with decisions after step {world.step_number}"
-        raise LogError(expected("--swap", swap.name, wanted, f"one that ends at step {swap.decisions.last_step}"))
+def _forced_policy(change: ForkChange, *, first_step: int) -> ForcedPolicy:
+    def forced(brigade: int, step: int) -> Decision | None:
+        if brigade in change.swaps:
+            return change.swaps[brigade].decisions.at(step, brigade)
+        return change.decided.get(brigade) if step == first_step else None
+
+    return ForcedPolicy(change.named.policy, forced)
 
 
-def _told(change: Change, city: CityRecord, *, digest: str, step: int) -> dict[str, Any]:
-    """Say what a fork changed, in plain values."""
-    return {
-        "from": digest,
+def _header(run: StoredRun, change: ForkChange, step: int) -> RunHeader:
+    """Return the header of a fork: it names the run it comes from and lists what was changed."""
+    header, named = run.header, change.named
+    made: dict[str, Any] = {
+        "from": run.digest,
         "step": step,
-        "policy": change.named.name,
-        "decide": {str(brigade): in_words(decision, city) for brigade, decision in sorted(change.decided.items())},
-        "swap": {str(swap.brigade): swap.digest for swap in sorted(change.swaps, key=lambda swap: swap.brigade)},
+        "policy": named.name,
+        "decide": {str(brigade): decision_text(made, run.city) for brigade, made in sorted(change.decided.items())},
+        "swap": {str(brigade): swapped.run.digest for brigade, swapped in sorted(change.swaps.items())},
     }
-
-
-def _told_forks(header: RunHeader, fork: dict[str, Any]) -> bytes:
-    """Add a fork to those that a recording tells of already."""
     try:
         before = json.loads(header.attachments.get(FORK_ATTACHMENT, b"[]"))
     except ValueError:
         before = []
-    told = [*before, fork] if isinstance(before, list) else [fork]
-    return (json.dumps(told, indent=1, sort_keys=True) + "\n").encode()
+    forks = [*before, made] if isinstance(before, list) else [made]
+    attachments = {name: data for name, data in header.attachments.items() if name != TEAM_ATTACHMENT}
+    return replace(
+        header,
+        policy=named.name,
+        policy_digest=named.digest,
+        fireworld_version=__version__,
+        forked_from=f"{run.digest}:{step}",
+        attachments=attachments
+        | dict(named.attachments)
+        | {FORK_ATTACHMENT: (json.dumps(forks, indent=1, sort_keys=True) + "\n").encode()},
+    )

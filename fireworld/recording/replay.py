@@ -1,14 +1,25 @@
-"""Replay: a recorded run again, from the scenario, seed and decisions in its recording alone."""
+"""Replay: a recorded run, computed again from the scenario, seed and decisions in its recording alone."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 from fireworld.errors import LogError, expected
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
-from fireworld.records import AIR, Array, CityRecord, Decisions, Recording, RunHeader, Snapshot, StepRecord
-from fireworld.scenario import parse_scenario
+from fireworld.records import (
+    AIR,
+    Array,
+    CityRecord,
+    Decisions,
+    MemoryRecording,
+    Recording,
+    RunHeader,
+    Snapshot,
+    StepRecord,
+    Steps,
+)
+from fireworld.scenario import Scenario, parse_scenario
 from fireworld.simulation.built import BuiltScenario, build_scenario
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.placement import CITY_ATTACHMENT, SCENARIO_ATTACHMENT
@@ -17,7 +28,7 @@ from fireworld.simulation.placement import CITY_ATTACHMENT, SCENARIO_ATTACHMENT
 class RecordedPolicy(Policy):
     """Decides as a recording says."""
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, recording: Steps) -> None:
         self._records = iter(recording)
         self._record = next(self._records, None)
 
@@ -28,7 +39,7 @@ class RecordedPolicy(Policy):
         made = self._record.decisions if self._record is not None else None
         decision = recorded_decision(made, observation.brigade) if made is not None else None
         if decision is None or (decision.target is not None and decision.target not in observation.burning):
-            # The replay has left the recorded path; an arbitrary action lets the comparison go on and name the step.
+            # The replay differs from the recording; with any action the comparison continues and names the step.
             return Decision(0)
         return decision
 
@@ -49,36 +60,40 @@ def recorded_decision(made: Decisions, brigade: int) -> Decision | None:
     )
 
 
-def build_recorded(header: RunHeader) -> BuiltScenario:
-    """Build the built of a recorded run from the files attached to its recording.
+def recorded_scenario(header: RunHeader) -> Scenario:
+    """Return the scenario that is attached to a recording.
 
     Raises:
-        LogError: the recording lacks its scenario.
-        ScenarioError: the scenario in it is not one.
+        LogError: there is none.
+        ScenarioError: it makes no sense.
     """
     text = header.attachments.get(SCENARIO_ATTACHMENT)
     if text is None:
         raise LogError(expected("recording", "attachments", SCENARIO_ATTACHMENT, sorted(header.attachments)))
-    scenario = parse_scenario(text, source=f"recording: {SCENARIO_ATTACHMENT}")
-    return build_scenario(scenario, city_json=header.attachments.get(CITY_ATTACHMENT))
+    return parse_scenario(text, source=f"recording: {SCENARIO_ATTACHMENT}")
+
+
+def build_recorded(header: RunHeader) -> BuiltScenario:
+    """Build the scenario of a recorded run from the files attached to its recording; errors as `recorded_scenario`."""
+    return build_scenario(recorded_scenario(header), city_json=header.attachments.get(CITY_ATTACHMENT))
 
 
 class Replay:
-    """A recorded run, run again while it is walked through; a `Recording` that can only be iterated over."""
+    """The steps of a recorded run, computed again at each iteration: a `fireworld.records.Steps`."""
 
     def __init__(self, recording: Recording, *, with_air: bool = False) -> None:
         """Build the recorded scenario again.
 
         Args:
             recording: of a run.
-            with_air: every step has a snapshot, those without one of the air alone.
+            with_air: give every step a snapshot; steps recorded without one get a snapshot of the air alone.
 
         Raises:
             LogError: the recording lacks its scenario.
         """
         self._recording, self._with_air = recording, with_air
-        self._stage = build_recorded(recording.header)
-        self.city: CityRecord = self._stage.city_record()
+        self._built = build_recorded(recording.header)
+        self.city: CityRecord = self._built.city_record()
 
     @property
     def header(self) -> RunHeader:
@@ -93,7 +108,7 @@ class Replay:
     def __iter__(self) -> Iterator[StepRecord]:
         """Yield the recorded steps, computed again with the recorded decisions."""
         header = self.header
-        world = self._stage.world(seed=header.seed, n_steps_max=header.n_steps_max)
+        world = self._built.world(seed=header.seed, n_steps_max=header.n_steps_max)
         observer = Observer(world)
         policy = RecordedPolicy(self._recording)
         last = int(self.steps[-1]) if len(self.steps) else -1
@@ -108,10 +123,38 @@ class Replay:
         while world.step_number < last and not (world.terminated or world.truncated):
             yield finished(observer.record(world.step(policy)))
 
-    def column(self, topic: str, name: str) -> Array:
-        """Refuse: a replay is only walked through."""
-        raise NotImplementedError(f"{topic}.{name}: a replay is only walked through")
 
-    def ragged(self, topic: str, name: str) -> Sequence[Array]:
-        """Refuse: a replay is only walked through."""
-        raise NotImplementedError(f"{topic}.{name}: a replay is only walked through")
+def check_replay(recorded: Recording, replayed: Steps, *, source: str, hint: str = "") -> None:
+    """Compare recorded steps with the same steps computed again.
+
+    Args:
+        recorded: the steps in the file.
+        replayed: the same steps, computed again; iterated over once.
+        source: the file.
+        hint: what to do if they differ; by default, how to see the whole difference.
+
+    Raises:
+        LogError: they differ; names the first step.
+    """
+    from fireworld_recorder.diff import compare
+
+    first = compare(recorded, replayed).first
+    if first is not None:
+        hint = hint or f"see `fireworld verify {source}`"
+        raise LogError(f"{source}: does not replay to what is recorded: {first.sentence}; {hint}")
+
+
+def replay_with_air(recording: Recording, *, source: str) -> MemoryRecording:
+    """Return a run with the air of every step, which is recorded with snapshots only.
+
+    Args:
+        recording: the run.
+        source: its file.
+
+    Raises:
+        LogError: this fireworld computes something else than what is recorded.
+    """
+    replay = Replay(recording, with_air=True)
+    replayed = MemoryRecording(recording.header, replay.city, list(replay))
+    check_replay(recording, replayed, source=source, hint="try without --air")
+    return replayed

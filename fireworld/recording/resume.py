@@ -1,4 +1,4 @@
-"""Resume: a recorded run taken up again after one of its steps, in the state it was in."""
+"""Resume: the world of a recorded run as it was after one of its steps, and the policy of the run."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fireworld.policy.asking import begin
 from fireworld.policy.names import TEAM_ATTACHMENT, NamedPolicy, find_policy
 from fireworld.policy.protocol import Policy
 from fireworld.policy.teams.team import parse_team
-from fireworld.recording.decisions import ComparedPolicy, RecordedDecisions
+from fireworld.recording.decisions import RecordedDecisions, ShadowPolicy
 from fireworld.records import ACTION_NAMES, MemoryRecording, RunHeader, StepRecord
 from fireworld.simulation.built import BuiltScenario
 from fireworld.simulation.observer import Observer
@@ -25,7 +25,7 @@ class Resumed:
     Attributes:
         world: in the state it was in then.
         recorded: the recorded steps that were computed again, in the recorded city.
-        replayed: the same as computed now; to be held against what is recorded.
+        replayed: the same as computed now; to be compared with what is recorded.
     """
 
     world: World
@@ -33,8 +33,21 @@ class Resumed:
     replayed: MemoryRecording
 
 
+def refind_policy(header: RunHeader) -> NamedPolicy:
+    """Load the policy of a recorded run as it is now: a team from its recording, any other by its name.
+
+    Raises:
+        PolicyError, TrainingError: it cannot be loaded.
+    """
+    team_file = header.attachments.get(TEAM_ATTACHMENT)
+    if team_file is None:
+        return find_policy(header.policy)
+    policy = parse_team(team_file, source=f"recording: {TEAM_ATTACHMENT}").policy()
+    return NamedPolicy(header.policy, policy.digest, policy, {TEAM_ATTACHMENT: team_file})
+
+
 def recorded_policy(header: RunHeader, *, source: str) -> NamedPolicy:
-    """Load the policy of a recorded run again: a team from its recording, any other by its name.
+    """Load the policy of a recorded run, unchanged since.
 
     Args:
         header: of the run.
@@ -43,33 +56,27 @@ def recorded_policy(header: RunHeader, *, source: str) -> NamedPolicy:
     Raises:
         PolicyError: it cannot be loaded, or it is not what it was when the run was recorded.
     """
-    name, team_file = header.policy, header.attachments.get(TEAM_ATTACHMENT)
+    name = header.policy
     try:
-        if team_file is not None:
-            team = parse_team(team_file, source=TEAM_ATTACHMENT)
-            policy = team.policy()
-            named = NamedPolicy(name, policy.digest, policy, {TEAM_ATTACHMENT: team_file})
-        else:
-            named = find_policy(name)
+        named = refind_policy(header)
     except FireworldError as error:
         reason = str(error).removeprefix("--policy: ")
-        raise PolicyError(
-            f"{source}: its policy {name} cannot be loaded: {reason}; say with --policy who goes on"
-        ) from error
+        hint = "name another one with --policy"
+        raise PolicyError(f"{source}: its policy {name} cannot be loaded: {reason}; {hint}") from error
     if named.digest != header.policy_digest:
         wanted = f"the policy {name} as it was recorded ({header.policy_digest[:12]})"
         got = f"one that has changed since ({named.digest[:12]})"
-        raise PolicyError(expected(source, "policy", wanted, got, f"--policy {name} goes on with it as it is now"))
+        raise PolicyError(expected(source, "policy", wanted, got, f"--policy {name} takes it as it is now"))
     return named
 
 
 def has_memory(policy: Policy) -> bool:
-    """Tell whether what a policy decides may depend on what it saw in the steps before."""
+    """Return whether what a policy decides may depend on what it saw in the steps before."""
     return not policy.stateless
 
 
 def resume(
-    built: BuiltScenario, recording: MemoryRecording, *, source: str, remembering: NamedPolicy | None = None
+    built: BuiltScenario, recording: MemoryRecording, *, source: str, with_memory: NamedPolicy | None = None
 ) -> Resumed:
     """Bring a world into the state after the last step of a recording.
 
@@ -79,24 +86,24 @@ def resume(
         built: the scenario of the recording, built.
         recording: the steps 0 to the one to resume after.
         source: the file it comes from, for errors.
-        remembering: the recorded policy, if it has a memory: it then sees every step from the first.
+        with_memory: the recorded policy, if it has a memory: it then sees every step from the first.
 
     Raises:
         LogError: the recording does not begin with step 0, or lacks a step.
-        PolicyError: `remembering` would not have decided as is recorded.
+        PolicyError: `with_memory` would not have decided as is recorded.
     """
     header, records = recording.header, list(recording)
     if [record.step for record in records] != list(range(len(records))):
         raise LogError(expected(source, "steps", f"every step from 0 to {records[-1].step}", "some are missing"))
     world = built.world(seed=header.seed, n_steps_max=header.n_steps_max)
-    start = _restore(world, records) if remembering is None else 0
+    start = _restore(world, records) if with_memory is None else 0
     decider: Policy = RecordedDecisions(recording)
-    if remembering is not None:
-        begin(remembering.policy, world.city_arrays, n_brigades=world.n_brigades, seed=world.seed)
-        decider = ComparedPolicy(decider, remembering.policy)
+    if with_memory is not None:
+        begin(with_memory.policy, world.city_arrays, n_brigades=world.n_brigades, seed=world.seed)
+        decider = ShadowPolicy(decider, with_memory.policy)
     again = _steps_again(world, decider, records[start:])
-    if isinstance(decider, ComparedPolicy) and decider.others:
-        _refuse_memory(decider, source=source, name=header.policy)
+    if isinstance(decider, ShadowPolicy) and decider.disagreements:
+        raise _memory_error(decider, source=source, name=header.policy)
     return Resumed(
         world=world,
         recorded=MemoryRecording(header, recording.city, records[start:]),
@@ -107,7 +114,7 @@ def resume(
 def _restore(world: World, records: Sequence[StepRecord]) -> int:
     """Put the world into the nearest snapshot before the last step and return its step.
 
-    Before, so that at least one step is always computed again; a snapshot that does not fit is passed over.
+    Before, so that at least one step is always computed again; a snapshot that does not fit is skipped.
     """
     for record in reversed(records[1:-1]):
         if record.snapshot is not None:
@@ -126,7 +133,7 @@ def _steps_again(world: World, decider: Policy, records: Sequence[StepRecord]) -
     """Compute recorded steps again, from the world that the first of them left."""
     observer = Observer(world)
     start = observer.record()
-    if world.step_number > 0:  # what was seen, decided and told in that step is not part of the state
+    if world.step_number > 0:  # observations, decisions and events of that step are not part of the state
         first = records[0]
         start = replace(start, observations=first.observations, decisions=first.decisions, events=first.events)
     again = [start]
@@ -135,9 +142,9 @@ def _steps_again(world: World, decider: Policy, records: Sequence[StepRecord]) -
     return again
 
 
-def _refuse_memory(compared: ComparedPolicy, *, source: str, name: str) -> None:
-    (step, brigade), (recorded, own) = next(iter(compared.others.items()))
-    raise PolicyError(
+def _memory_error(shadow: ShadowPolicy, *, source: str, name: str) -> PolicyError:
+    (step, brigade), (recorded, own) = next(iter(shadow.disagreements.items()))
+    return PolicyError(
         f"{source}: step {step}, brigade {brigade}: {ACTION_NAMES[recorded.action]} is recorded, but {name} now decides"
-        f" {ACTION_NAMES[own.action]}, so it cannot go on as it was; --policy {name} lets it begin anew"
+        f" {ACTION_NAMES[own.action]}, so it cannot continue the run; --policy {name} starts it afresh"
     )

@@ -24,11 +24,11 @@ from fireworld_recorder.step_difference import (
 )
 from fireworld_recorder.totals import Totals, totals_at, totals_of, totals_over
 
-__all__ = ["Difference", "FirstDifference", "StepRange", "compare"]
+__all__ = ["FirstDifference", "RunComparison", "StepRange", "compare"]
 
 
 @dataclass(frozen=True)
-class Difference:
+class RunComparison:
     """How two runs compare."""
 
     first: FirstDifference | None
@@ -70,7 +70,7 @@ def compare(
     ignore: Collection[str] = (),
     steps: StepRange | None = None,
     watch: Callable[[SpreadRow], None] | None = None,
-) -> Difference:
+) -> RunComparison:
     """Compare two runs on the steps that both have, in the order in which things happen within a step.
 
     NaN equals NaN. Steps that only one run has are a difference too, reported if there is no other. Snapshots are
@@ -95,14 +95,14 @@ def compare(
     header = header_differences(a.header, b.header)
     if isinstance(a, StoredRun) and isinstance(b, StoredRun) and a.digest and a.digest == b.digest:
         totals = totals_of(a) if steps == StepRange() else totals_over(_within(a, steps), a.city)
-        return Difference(None, (totals, totals), header, totals.n_steps, {})
+        return RunComparison(None, (totals, totals), header, totals.n_steps, {})
     first = find_city_difference(a.city, b.city, rules)
     if first is not None:
-        return Difference(first, (totals_of(a), totals_of(b)), header, 0, {})
+        return RunComparison(first, (totals_of(a), totals_of(b)), header, 0, {})
     comparison = _Comparison(rules, SpreadTally(a.city, watch), a.city)
     comparison.take_steps(_within(a, steps), _within(b, steps))
     tally_a, tally_b = comparison.tallies
-    return Difference(
+    return RunComparison(
         first=comparison.first,
         totals=(totals_at(tally_a.last, tally_a.n_steps, a.city), totals_at(tally_b.last, tally_b.n_steps, b.city)),
         header=header,

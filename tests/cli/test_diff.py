@@ -125,7 +125,7 @@ def test_a_range_of_steps(diff, range_, code, words):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--ignore", "building"], "--ignore: expected a field of the log, got 'building'; try buildings"),
+        (["--ignore", "building"], "ignore: expected a field of the log, got 'building'; try buildings"),
         (["--ignore", "buildings.temprature"], "try buildings.temperature"),
         (["--tolerance", "temprature=1"], "try temperature"),
         (["--from", "9", "--to", "8"], "expected a range of steps, got 9 to 8"),
@@ -135,8 +135,8 @@ def test_a_range_of_steps(diff, range_, code, words):
         (["--junit", "missing/out.xml"], "expected an existing folder missing"),
         (["--junit", "."], "expected the name of a file"),
         (["--html", "short.mcap"], "short.mcap: expected a name that is free"),
-        (["--html", "new.mcap", "--force"], "expected files of their own"),
-        (["--html", "out", "--junit", "out"], "expected files of their own"),
+        (["--html", "new.mcap", "--force"], "expected a file of its own for every input and output"),
+        (["--html", "out", "--junit", "out"], "expected a file of its own for every input and output"),
     ],
 )
 def test_what_is_refused(diff, options, words):
@@ -145,7 +145,7 @@ def test_what_is_refused(diff, options, words):
 
 def test_a_link_is_not_replaced(diff, tmp_path):
     (tmp_path / "link.xml").symlink_to(tmp_path / "golden.mcap")
-    assert "the name of a file" in only_line(diff("golden.mcap", "new.mcap", "--junit", "link.xml", "--force"))
+    assert "the name of a regular file" in only_line(diff("golden.mcap", "new.mcap", "--junit", "link.xml", "--force"))
 
 
 def test_runs_of_different_scenarios(diff):

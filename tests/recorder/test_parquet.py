@@ -278,7 +278,7 @@ def test_export_replaces_only_an_export_and_only_with_force(run_cli, log_path, t
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("--tables", "streets"), "expected some of city, buildings, brigades"),
+        (("--tables", "streets"), "expected one of city, buildings, brigades"),
         (("missing",), "No such file"),
         (("no/such/folder",), "expected an existing folder"),
     ],
@@ -337,7 +337,7 @@ def test_a_leftover_of_a_killed_export_is_replaced_and_a_foreign_folder_is_not(l
 
 
 def test_without_pyarrow_it_says_what_to_install(run_cli, log_path, tmp_path, monkeypatch):
-    monkeypatch.setattr("fireworld.cli.export.find_spec", lambda _: None)
+    monkeypatch.setattr("fireworld.recording.export.find_spec", lambda _: None)
     code, _, err = run_cli("export", log_path, "--parquet", tmp_path / "out")
     assert code == 2
     assert "pip install 'fireworld[archive]'" in err

@@ -27,6 +27,7 @@ class OpenedLog:
     def __init__(self, recording: MemoryRecording, damage: str | None) -> None:
         self.header, self.city, self.steps = recording.header, recording.city, recording.steps
         self.damage = damage
+        self.path = Path()
         self._recording = recording
 
     def __iter__(self):
@@ -44,6 +45,7 @@ def logs(small: MemoryRecording, slower: MemoryRecording, monkeypatch: pytest.Mo
 
     def open_log(path: Path, *, partial: bool) -> OpenedLog:
         assert partial  # a damaged recording is shown as far as it is good
+        known[path.name].path = path
         return known[path.name]
 
     monkeypatch.setattr(reader, "open_log", open_log)

@@ -117,7 +117,7 @@ def test_a_page_of_one_run(page_of_a, small):
     assert re.findall(r'(?:src|href)="(?!data:)', page) == []
     assert "http" not in re.sub(r"base64,[^\"]*", "", page)
     text, last = text_of(page_of_a), list(small)[-1].score
-    assert f"{last.score:.4f} of {last.score_max:.0f}" in text
+    assert f"{last.score:.3f} of {last.score_max:.0f}" in text
     assert f"{last.n_burnt_out} of 36 buildings" in text
     assert open_log(page_of_a.with_name("a.mcap")).digest in text
     for title in ("Outcome", "Maps", "Curves", "Decisions", "Events", "How to get the same again"):
@@ -142,7 +142,7 @@ def test_a_cut_off_recording_says_so_and_its_names_are_no_marks_of_the_page(fire
     write_log(tmp_path / "cut.mcap", MemoryRecording(header, small.city, list(small)[:12]), last=9)
     done = fireworld("report", "cut.mcap", "-o", "cut.html")
     assert done.code == 0
-    assert done.err.endswith("; telling of 10 committed steps\n")
+    assert done.err.endswith("; reporting 10 committed steps\n")
     page = (tmp_path / "cut.html").read_text(encoding="utf-8")
     assert '<p class="caveat">cut.mcap: ' in page
     assert "<script>" not in page

@@ -1,4 +1,4 @@
-"""Explain: which decisions of the better of two runs make up how much of the difference between their scores."""
+"""The search for the decisions of the better of two runs that make up the difference between their scores."""
 
 from __future__ import annotations
 
@@ -6,87 +6,81 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from fireworld.recording.explanation.stretches import Stretch
+from fireworld.recording.explanation.spans import DecisionSpan
 
 KEPT_SHARE: Final = 0.8
-"""A stretch is narrowed down as long as one half of it gains at least this share of what the whole gains."""
+"""A span is narrowed down as long as one half of it gains at least this share of what the whole gains."""
 NARROWED_FROM_SHARE: Final = 0.05
-"""Stretches that explain less are not narrowed down."""
+"""Spans that explain less are not narrowed down."""
 NARROWED_MAX: Final = 10
-"""Stretches that are narrowed down at most, those that explain most."""
+"""Spans that are narrowed down at most, those that explain most."""
 
-ScoreAll = Callable[[Sequence[Sequence[Stretch]]], Sequence[float | None]]
-"""From lists of stretches to the scores of the replays in which brigades are told so; None: it was not done."""
+ScoreAll = Callable[[Sequence[Sequence[DecisionSpan]]], Sequence[float | None]]
+"""From lists of spans to the scores of the replays with these decisions forced; None: it was not done."""
 
 
 @dataclass(frozen=True)
-class Found:
-    """What one stretch explains.
+class SpanEffect:
+    """What the decisions of one span explain.
 
     Attributes:
-        stretch: the decisions.
+        span: the decisions.
         score: of the worse run with them in it.
         share: of the difference of the scores; negative if they make the worse run still worse, above 1 if it gets
             better than the better run.
-        core: the part of the stretch that it was narrowed down to, with its score and share; None if it was not.
-        share_without: what all other stretches that were tried explain together, without this one; None if not tried.
+        core: the part of the span that it was narrowed down to, with its score and share; None if it was not.
+        share_without: what all other spans that were tried explain together, without this one; None if not tried.
     """
 
-    stretch: Stretch
+    span: DecisionSpan
     score: float
     share: float
-    core: Found | None = None
+    core: SpanEffect | None = None
     share_without: float | None = None
 
 
 @dataclass(frozen=True)
-class Explanation:
+class SearchResult:
     """What is known about the difference of two runs' scores.
 
     Attributes:
-        worse_score: of the worse run.
-        better_score: of the better run.
-        n_stretches: stretches in which the runs' decisions differ.
-        found: the stretches that were tried, those that explain most first.
-        together: score and share of all stretches to be tried at once; None if that was not tried.
+        n_spans: spans in which the runs' decisions differ.
+        effects: of the spans that were tried, those that explain most first.
+        together: score and share of all spans to be tried at once; None if that was not tried.
         n_replays: replays done.
     """
 
-    worse_score: float
-    better_score: float
-    n_stretches: int
-    found: tuple[Found, ...]
-    together: tuple[float, float] | None
-    n_replays: int
+    n_spans: int = 0
+    effects: tuple[SpanEffect, ...] = ()
+    together: tuple[float, float] | None = None
+    n_replays: int = 0
 
 
-def explain(
-    stretches: Sequence[Stretch], *, worse_score: float, better_score: float, budget: int, score_all: ScoreAll
-) -> Explanation:
-    """Try stretches one by one, the earliest first, all at once, and all but one; narrow down those that explain most.
+def search_effects(
+    spans: Sequence[DecisionSpan], *, worse_score: float, better_score: float, budget: int, score_all: ScoreAll
+) -> SearchResult:
+    """Try spans one by one, the earliest first, all at once, and all but one; narrow down those that explain most.
 
     Args:
-        stretches: decisions of the better run.
+        spans: decisions of the better run.
         worse_score: of the worse run.
         better_score: of the better run; it must be higher.
         budget: replays at most.
         score_all: does replays.
     """
     search = _Search(worse_score=worse_score, better_score=better_score, budget=budget, score_all=score_all)
-    tried = stretches[: budget - 1]
-    together, *scores = search.scores([tried, *((stretch,) for stretch in tried)]) if tried else [None]
-    found = [
-        Found(stretch, score, search.share(score))
-        for stretch, score in zip(tried, scores, strict=True)
+    tried = spans[: budget - 1]
+    together, *scores = search.scores([tried, *((span,) for span in tried)]) if tried else [None]
+    effects = [
+        SpanEffect(span, score, search.share(score))
+        for span, score in zip(tried, scores, strict=True)
         if score is not None
     ]
-    found.sort(key=lambda one: (-one.share, one.stretch.first, one.stretch.brigade))
-    found = search.leave_out(found, tried)
-    return Explanation(
-        worse_score=worse_score,
-        better_score=better_score,
-        n_stretches=len(stretches),
-        found=tuple(search.narrow(found)),
+    effects.sort(key=lambda one: (-one.share, one.span.first, one.span.brigade))
+    effects = search.leave_out(effects, tried)
+    return SearchResult(
+        n_spans=len(spans),
+        effects=tuple(search.narrow(effects)),
         together=None if together is None else (together, search.share(together)),
         n_replays=search.n_replays,
     )
@@ -106,45 +100,45 @@ class _Search:
         """Return the share of the difference that a replay's score makes up."""
         return (score - self._worse_score) / self._difference
 
-    def scores(self, told: Sequence[Sequence[Stretch]]) -> Sequence[float | None]:
+    def scores(self, forced: Sequence[Sequence[DecisionSpan]]) -> Sequence[float | None]:
         """Do replays."""
-        done = self._score_all(told)
-        self._left -= len(told)
+        done = self._score_all(forced)
+        self._left -= len(forced)
         self.n_replays += sum(score is not None for score in done)
         return done
 
-    def leave_out(self, found: Sequence[Found], tried: Sequence[Stretch]) -> list[Found]:
-        """Try all stretches but one, for each of them, with at most half of the budget that is left."""
-        chosen = sorted(found, key=lambda one: -abs(one.share))[: self._left // 2] if len(tried) > 1 else []
-        rests = [[stretch for stretch in tried if stretch is not one.stretch] for one in chosen]
-        scores = dict(zip((one.stretch for one in chosen), self.scores(rests), strict=True))
+    def leave_out(self, effects: Sequence[SpanEffect], tried: Sequence[DecisionSpan]) -> list[SpanEffect]:
+        """Try all spans but one, for each of them, with at most half of the budget that is left."""
+        chosen = sorted(effects, key=lambda one: -abs(one.share))[: self._left // 2] if len(tried) > 1 else []
+        rests = [[span for span in tried if span is not one.span] for one in chosen]
+        scores = dict(zip((one.span for one in chosen), self.scores(rests), strict=True))
         return [
-            one if (score := scores.get(one.stretch)) is None else replace(one, share_without=self.share(score))
-            for one in found
+            one if (score := scores.get(one.span)) is None else replace(one, share_without=self.share(score))
+            for one in effects
         ]
 
-    def narrow(self, found: Sequence[Found]) -> list[Found]:
-        """Halve the stretches that explain most, again and again, while one half keeps most of what the whole gains."""
-        cores = {place: one for place, one in enumerate(found[:NARROWED_MAX]) if one.share >= NARROWED_FROM_SHARE}
+    def narrow(self, effects: Sequence[SpanEffect]) -> list[SpanEffect]:
+        """Halve the spans that explain most, again and again, while one half keeps most of what the whole gains."""
+        cores = {place: one for place, one in enumerate(effects[:NARROWED_MAX]) if one.share >= NARROWED_FROM_SHARE}
         under_way = list(cores)
-        while under_way := [place for place in under_way if cores[place].stretch.n_steps > 1][: self._left // 2]:
-            halves = [half for place in under_way for half in cores[place].stretch.halves()]
+        while under_way := [place for place in under_way if cores[place].span.n_steps > 1][: self._left // 2]:
+            halves = [half for place in under_way for half in cores[place].span.halves()]
             scores = self.scores([(half,) for half in halves])
-            kept = []
+            narrowed = []
             for turn, place in enumerate(under_way):
                 pair = [
-                    Found(half, score, self.share(score))
+                    SpanEffect(half, score, self.share(score))
                     for half, score in zip(
                         halves[2 * turn : 2 * turn + 2], scores[2 * turn : 2 * turn + 2], strict=True
                     )
                     if score is not None
                 ]
                 best = max(pair, key=lambda one: one.share, default=None)
-                if best is not None and best.share >= KEPT_SHARE * found[place].share:
+                if best is not None and best.share >= KEPT_SHARE * effects[place].share:
                     cores[place] = best
-                    kept.append(place)
-            under_way = kept
+                    narrowed.append(place)
+            under_way = narrowed
         return [
             replace(one, core=cores[place]) if place in cores and cores[place] is not one else one
-            for place, one in enumerate(found)
+            for place, one in enumerate(effects)
         ]

@@ -1,44 +1,51 @@
-"""Golden recordings, checked and stored: where the orders of the simulator's side meet the recorder."""
+"""Golden recordings, run again and compared."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
+from xml.etree.ElementTree import Element, SubElement
+
+from fireworld_recorder.diff import compare
+from fireworld_recorder.plain import plain
+from fireworld_recorder.reader import open_log
 
 from fireworld.errors import FireworldError, OutputError, expected
-from fireworld.files import write_file
-from fireworld.recording.golden.text import golden_text, tells_of
+from fireworld.files import check_output
+from fireworld.junit import clean, report
+from fireworld.recording.difference_text import change_lines
+from fireworld.recording.golden.spec import GoldenSpec, prepare_golden, spec_of
+from fireworld.recording.golden.store import SUFFIX, make_folder, store_recording, text_path
+from fireworld.recording.golden.text import is_text_of
 from fireworld.records import MemoryRecording, RunHeader
+from fireworld.simulation.built import CityCache
+from fireworld.simulation.run import PreparedRun
 
 if TYPE_CHECKING:
-    from fireworld_recorder.diff import Difference
+    from fireworld_recorder.diff import RunComparison
 
-    from fireworld.recording.golden.order import Order
-    from fireworld.simulation.built import CityCache
-    from fireworld.simulation.run import PreparedRun
-
-SUFFIX: Final = ".mcap"
-TEXT_SUFFIX: Final = ".txt"
+FOLDER: Final = Path("recordings/golden")
+"""Where goldens are, seen from the current folder, unless another place is named."""
 Result = Literal["same", "different", "cannot"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Checked:
-    """What came of running a golden again."""
+class GoldenResult:
+    """The result of running a golden again."""
 
     path: Path
     header: RunHeader | None = None
     """Of the golden; None if it cannot be read."""
     fresh: MemoryRecording | None = None
     """The new run; None if there was none."""
-    difference: Difference | None = None
+    difference: RunComparison | None = None
     error: str = ""
     """Why it could not be run or compared."""
     text_is_foreign: bool = False
-    """The text beside the golden is of another recording, or missing."""
+    """The text beside the golden describes another recording, or is missing."""
 
     @property
     def name(self) -> str:
@@ -46,11 +53,16 @@ class Checked:
         return self.path.stem
 
     @property
+    def differs(self) -> bool:
+        """Whether there is a new run, and it is not the recorded one."""
+        return self.difference is not None and not self.difference.same
+
+    @property
     def result(self) -> Result:
-        """How it went."""
+        """How the check ended; "cannot" if the golden could not be run or compared."""
         if self.difference is None:
             return "cannot"
-        return "same" if self.difference.same and not self.text_is_foreign else "different"
+        return "different" if self.differs or self.text_is_foreign else "same"
 
     @property
     def sentence(self) -> str:
@@ -63,14 +75,32 @@ class Checked:
             return f"{text_path(self.path).name}: expected the text of this recording, found none or another's"
         return ""
 
+    @property
+    def changes(self) -> list[str]:
+        """What else is different, line by line."""
+        return change_lines(self.difference) if self.difference is not None else []
 
-def text_path(path: Path) -> Path:
-    """Return where the text of a golden is."""
-    return path.with_suffix(TEXT_SUFFIX)
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as plain values; of a difference, a is the golden and b the new run."""
+        header, difference = self.header, self.difference
+        return {
+            "name": self.name,
+            "result": self.result,
+            "scenario": header and header.scenario,
+            "policy": header and header.policy,
+            "seed": header and header.seed,
+            "sentence": self.sentence,
+            "first": difference and plain(difference.first),
+            "header": plain(difference.header) if difference else {},
+            "totals": difference and plain(difference.totals),
+        }
+
+    def __repr__(self) -> str:
+        return f"<GoldenResult {self.name}: {self.result}{f', {self.sentence}' if self.sentence else ''}>"
 
 
-def find_goldens(folder: Path, names: Collection[str] = ()) -> list[Path]:
-    """List the goldens of a folder, or those of the given names, by name.
+def find_goldens(folder: Path = FOLDER, names: Collection[str] = ()) -> list[Path]:
+    """Return the goldens of a folder, or those of the given names, sorted by name.
 
     Raises:
         OutputError: there are none, or not the ones named.
@@ -89,24 +119,55 @@ def find_goldens(folder: Path, names: Collection[str] = ()) -> list[Path]:
     return [path for name, path in found.items() if not names or name in names]
 
 
-def check_golden(path: Path, *, cities: CityCache | None = None) -> Checked:
-    """Run a golden's order again and compare; what cannot be done is told in the result."""
-    from fireworld_recorder.reader import open_log
+def check_goldens(
+    folder: Path = FOLDER, names: Collection[str] = (), *, keep: Path | None = None, force: bool = False
+) -> Iterator[GoldenResult]:
+    """Run goldens again, one at each step of the iteration, and compare.
 
-    from fireworld.recording.golden.order import order_of, prepare_golden
+    Scenarios, policies and code are taken as they are now.
 
+    Args:
+        folder: of the goldens.
+        names: of those to run; all if there are none.
+        keep: folder in which the new runs that differ are recorded.
+        force: replace recordings in `keep`.
+
+    Raises:
+        OutputError: there are no such goldens, or `keep` cannot be used.
+    """
+    paths = find_goldens(folder, names)
+    if keep is not None and keep.resolve() == folder.resolve():
+        raise OutputError(expected(str(keep), "", "another folder than that of the goldens", "the same"))
+    if keep is not None and not force:
+        for taken in (keep / path.name for path in paths if (keep / path.name).exists()):
+            check_output(taken)
+    return _check_all(paths, keep)
+
+
+def _check_all(paths: Sequence[Path], keep: Path | None) -> Iterator[GoldenResult]:
+    cities = CityCache()
+    for path in paths:
+        result = check_golden(path, cities=cities)
+        if keep is not None and result.fresh is not None and result.result == "different":
+            make_folder(keep)
+            store_recording(keep / path.name, result.fresh)
+        yield result
+
+
+def check_golden(path: Path, *, cities: CityCache | None = None) -> GoldenResult:
+    """Run a golden's spec again and compare; the result says so if that is not possible."""
     header: RunHeader | None = None
     try:
         header = open_log(path).header
-        order = order_of(header)
-        fresh = carry_out(prepare_golden(order, path.parent, recorded=header, cities=cities))
-        return compare_golden(path, fresh, order)
+        spec = spec_of(header)
+        fresh = run_in_memory(prepare_golden(spec, path.parent, recorded=header, cities=cities))
+        return compare_golden(path, fresh, spec)
     except FireworldError as error:
-        return Checked(path=path, header=header, error=str(error))
+        return GoldenResult(path=path, header=header, error=str(error))
 
 
-def carry_out(run: PreparedRun) -> MemoryRecording:
-    """Let a run happen.
+def run_in_memory(run: PreparedRun) -> MemoryRecording:
+    """Run a prepared run to its end and hold its steps in memory.
 
     Raises:
         PolicyError: the policy fails.
@@ -114,106 +175,32 @@ def carry_out(run: PreparedRun) -> MemoryRecording:
     return MemoryRecording(run.header, run.city, list(run))
 
 
-def compare_golden(path: Path, fresh: MemoryRecording, order: Order) -> Checked:
-    """Compare a golden with a new run of its order.
+def compare_golden(path: Path, fresh: MemoryRecording, spec: GoldenSpec) -> GoldenResult:
+    """Compare a golden with a new run of its spec.
 
     Raises:
-        LogError: the golden cannot be read, or the order names fields that there are not.
+        LogError: the golden cannot be read, or the spec names fields that do not exist.
     """
-    from fireworld_recorder.diff import compare
-    from fireworld_recorder.reader import open_log
-
     log, beside = open_log(path), text_path(path)
     text = beside.read_text(encoding="utf-8", errors="replace") if beside.is_file() else ""
-    return Checked(
+    return GoldenResult(
         path=path,
         header=log.header,
         fresh=fresh,
-        difference=compare(log, fresh, tolerances=order.tolerances, ignore=order.ignore),
-        text_is_foreign=not tells_of(text, log),
+        difference=compare(log, fresh, tolerances=spec.tolerances, ignore=spec.ignore),
+        text_is_foreign=not is_text_of(text, log),
     )
 
 
-def is_current(path: Path, fresh: MemoryRecording, order: Order) -> bool:
-    """Whether a golden is there, was made by this order and is the same as a new run of it."""
-    from fireworld_recorder.reader import open_log
-
-    from fireworld.recording.golden.order import order_of
-
-    try:
-        if order_of(open_log(path).header) != order:
-            return False
-        difference = compare_golden(path, fresh, order).difference
-    except FireworldError:
-        return False
-    return difference is not None and difference.same
+def goldens_junit(results: Sequence[GoldenResult]) -> bytes:
+    """Return results as JUnit XML: a difference is a failure, what cannot be run an error."""
+    return report("fireworld golden", "fireworld golden", [_case(result) for result in results])
 
 
-def store_golden(path: Path, fresh: MemoryRecording) -> None:
-    """Write a golden and its text, replacing what is there; each is written beside and renamed.
-
-    Raises:
-        OutputError: they cannot be written.
-    """
-    store_recording(path, fresh)
-    store_text(path)
-
-
-def store_recording(path: Path, fresh: MemoryRecording) -> None:
-    """Write a recording, replacing what is there.
-
-    Raises:
-        OutputError: it cannot be written.
-    """
-    from fireworld_recorder.writer import LogWriter
-
-    with LogWriter(path, fresh.header, fresh.city, force=True) as writer:
-        for record in fresh:
-            writer.write(record)
-
-
-def store_text(path: Path) -> bool:
-    """Write the text of a golden if it is not there as it would be; return whether it was not.
-
-    Raises:
-        LogError: the golden cannot be read.
-        OutputError: the text cannot be written.
-    """
-    from fireworld_recorder.reader import open_log
-
-    text, beside = golden_text(open_log(path)).encode(), text_path(path)
-    if beside.is_file() and beside.read_bytes() == text:
-        return False
-    write_file(beside, text)
-    return True
-
-
-def make_golden_folder(folder: Path) -> None:
-    """Make a folder for goldens, if it is not there.
-
-    Raises:
-        OutputError: it cannot be made.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be made: {error.strerror or error}") from None
-
-
-def changes(difference: Difference) -> list[str]:
-    """Say line by line what else is different: in what was asked for, and in the totals."""
-    lines = [f"{_words(key)}: {_value(b)}, was {_value(a)}" for key, (a, b) in difference.header.items()]
-    before, now = (totals.as_json() for totals in difference.totals)
-    lines += [f"{_words(key)}: {_value(now[key])}, was {_value(before[key])}" for key in now if now[key] != before[key]]
-    return lines
-
-
-def _words(key: str) -> str:
-    return key.replace("_", " ").removeprefix("n ")
-
-
-def _value(value: object) -> str:
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    text = "none" if value is None else str(value)
-    return text[:12] if len(text) == 64 else text  # of a digest as much as tells it from others
+def _case(result: GoldenResult) -> Element:
+    case = Element("testcase", {"classname": "golden", "name": clean(result.name), "time": "0"})
+    if result.result != "same":
+        kind = "error" if result.difference is None else "failure"
+        fault = SubElement(case, kind, {"message": clean(result.sentence), "type": result.result})
+        fault.text = clean("\n".join((result.sentence, *result.changes)))
+    return case

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from itertools import groupby
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from fireworld_recorder.reader import Log
+from fireworld_recorder.totals import final_outcome
+
+from fireworld.recording.golden.kinds import scenario_kind
+from fireworld.recording.golden.spec import GoldenSpec, spec_of
+from fireworld.recording.replay import recorded_scenario
 from fireworld.records import EVENT_KINDS, Array
-
-if TYPE_CHECKING:
-    from fireworld_recorder.reader import Log
-
-    from fireworld.recording.golden.order import Order
 
 LETTERS: Final = {"E": "easiest", "V": "nearest-to-civilian", "C": "nearest-to-center", "M": "nearest-to-me"}
 """Of the actions, in their order."""
@@ -24,15 +25,13 @@ STEPS_IN_A_LINE: Final = 100
 
 
 def golden_text(log: Log) -> str:
-    """Tell a recording: what was run, how it ended, every event, who decided what, and the final hash."""
-    from fireworld.recording.golden.order import order_of
-
-    blocks = (_facts(log, order_of(log.header)), _events(log), _decisions(log), [_hash(log)])
+    """Return a recording as text: what was run, how it ended, every event, all decisions, and the final hash."""
+    blocks = (_facts(log, spec_of(log.header)), _events(log), _decisions(log), [_hash(log)])
     return "\n\n".join("\n".join(block) for block in blocks) + "\n"
 
 
-def tells_of(text: str, log: Log) -> bool:
-    """Whether a text tells of this recording; how it is worded is another matter."""
+def is_text_of(text: str, log: Log) -> bool:
+    """Return whether a text describes this recording, in whatever words."""
     return _hash(log) in text.splitlines()
 
 
@@ -40,20 +39,16 @@ def _hash(log: Log) -> str:
     return f"hash {log.digest}"
 
 
-def _facts(log: Log, order: Order) -> list[str]:
-    """Say what was run and what came of it."""
-    from fireworld_recorder.totals import final_outcome
-
-    from fireworld.recording.golden.order import kind_of, recorded_scenario
-
+def _facts(log: Log, spec: GoldenSpec) -> list[str]:
+    """List what was run and how it came out; the numbers are written as they were in the first goldens."""
     outcome, city = final_outcome(log), log.city
     ended = "still burning" if outcome.time_to_complete is None else "the fire is out"
-    settings = "".join(f", {key}={text}" for key, text in order.settings.items())
-    exceptions = [f"{field} to {tolerance:g}" for field, tolerance in order.tolerances.items()]
-    exceptions += [f"not {name}" for name in order.ignore]
+    settings = "".join(f", {key}={text}" for key, text in spec.settings.items())
+    exceptions = [f"{field} to {tolerance:g}" for field, tolerance in spec.tolerances.items()]
+    exceptions += [f"not {name}" for name in spec.ignore]
     facts = {
         "scenario": f"{log.header.scenario}{settings}",
-        "kind": kind_of(recorded_scenario(log.header)),
+        "kind": scenario_kind(recorded_scenario(log.header)),
         "policy": log.header.policy,
         "seed": str(log.header.seed),
         "steps": f"{outcome.steps} of at most {log.header.n_steps_max}, {ended}",
@@ -87,7 +82,7 @@ def _step_events(kinds: Array, entities: Array) -> str:
 
 
 def _decisions(log: Log) -> list[str]:
-    """Draw a strip of letters for each brigade, one for each step, and list where its targets change."""
+    """Write a strip of letters for each brigade, one for each step, and list where its targets change."""
     lines = [f"decisions, a letter for each step: {LEGEND}"]
     steps = log.steps.tolist()
     actions, targets = log.ragged("decisions", "action"), log.ragged("decisions", "target")
@@ -103,7 +98,7 @@ def _decisions(log: Log) -> list[str]:
 
 
 def _changes_of(targets: list[tuple[int, int]]) -> list[str]:
-    """Say from which step on a brigade had which building as its target."""
+    """List from which step on a brigade had which building as its target."""
     changes = [next(group) for _, group in groupby(targets, key=lambda entry: entry[1])]
     words = [f"{step} {'none' if target < 0 else target}" for step, target in changes]
     return [f"       targets from step: {', '.join(words)}"] if words else []

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from fireworld.cli.difference_text import SPREAD_HEADS, SPREAD_NOTE, reached, shortened, spread_cells, totals_rows
 from fireworld.html_page import html_figure, html_mark, html_page, html_table, text_cell
+from fireworld.recording.difference_text import (
+    SPREAD_HEADS,
+    SPREAD_NOTE,
+    shortened,
+    spread_cells,
+    spread_sentences,
+    totals_rows,
+)
 from fireworld.records import PHASES
 
 if TYPE_CHECKING:
-    from fireworld_recorder.diff import Difference
-    from fireworld_recorder.reader import Log
+    from fireworld_recorder.diff import RunComparison
+
+    from fireworld.recording.difference import Difference
 
 _STYLE: Final = """
 .maps { grid-template-columns: repeat(2, 1fr); } .first { font-size: 1.25rem; margin: .8rem 0 1.2rem; }
@@ -22,48 +30,50 @@ td.text { overflow-wrap: anywhere; }
 _HEADER: Final = ("scenario", "scenario_digest", "seed", "policy", "policy_digest", "fireworld_version", "forked_from")
 
 
-def difference_page(
-    logs: tuple[Log, Log], difference: Difference, images: Mapping[str, bytes], *, names: tuple[str, str]
-) -> str:
+def difference_page(compared: Difference, images: Mapping[str, bytes]) -> str:
     """Write the page; it needs no other file.
 
     Args:
-        logs: both recordings.
-        difference: how they differ.
+        compared: how two runs differ.
         images: PNG files by name, from `draw_all`; what is missing is left out.
-        names: what the recordings are called.
     """
-    first = difference.first
+    a, b = compared.names
+    title = f"<h1>{escape(Path(b).name)} against {escape(Path(a).name)}</h1>"
+    return html_page(f"fireworld: {b} against {a}", [title, *difference_body(compared, images)], style=_STYLE)
+
+
+def difference_body(compared: Difference, images: Mapping[str, bytes]) -> list[str]:
+    """Write what stands below the title of the page; arguments as for `difference_page`."""
+    difference, first = compared.found, compared.first
     verdict = html_mark("the same", "good") if first is None else html_mark("different", "bad")
     sentence = f"{difference.n_steps_compared} steps are the same" if first is None else first.sentence
-    body = [
-        f"<h1>{escape(Path(names[1]).name)} against {escape(Path(names[0]).name)}</h1>",
+    return [
         f'<p class="first">{verdict} {escape(sentence)}</p>',
-        *(f'<p class="caveat">{escape(f"{name}: {log.damage}; nothing is compared beyond")}</p>'
-          for log, name in zip(logs, names, strict=True) if log.damage is not None),
-        _header(logs, difference, names),
+        *(f'<p class="caveat">{escape(f"{name}: {run.damage}; nothing is compared beyond")}</p>'
+          for run, name in zip(compared.runs, compared.names, strict=True) if run.damage is not None),
+        _header(compared),
         *_maps("The first difference", "first", images),
         *_spread(difference),
         *_curves(images),
         *_maps("The last step of both", "last", images),
         *_topics(difference),
     ]  # fmt: skip
-    return html_page(f"fireworld: {names[1]} against {names[0]}", body, style=_STYLE)
 
 
-def _header(logs: tuple[Log, Log], difference: Difference, names: tuple[str, str]) -> str:
-    """Say what was compared, and what both came to."""
-    rows = [["recording", *names]]
+def _header(compared: Difference) -> str:
+    """Write what was compared, and how both runs came out."""
+    runs = compared.runs
+    rows: list[Sequence[str]] = [("recording", *compared.names)]
     for key in _HEADER:
-        values = [shortened(key, getattr(log.header, key)) for log in logs]
+        values = [shortened(key, getattr(run.header, key)) for run in runs]
         if any(values):
             rows.append([key.replace("_", " "), *values])
-    rows.append(["digest", *(log.digest[:12] for log in logs)])
-    rows += [list(row) for row in totals_rows(difference)]
+    rows += [("digest", *(run.digest[:12] for run in runs)), *totals_rows(*compared.totals)]
     marked = [
-        [label, *(f"<b>{escape(value)}</b>" if a != b else escape(value) for value in (a, b))] for label, a, b in rows
+        [text_cell(label), *(f"<b>{escape(value)}</b>" if a != b else escape(value) for value in (a, b))]
+        for label, a, b in rows
     ]
-    return html_table(["", "A", "B"], [[text_cell(label), a, b] for label, a, b in marked])
+    return html_table(["", "A", "B"], marked)
 
 
 def _maps(title: str, moment: str, images: Mapping[str, bytes]) -> Iterator[str]:
@@ -78,10 +88,10 @@ def _maps(title: str, moment: str, images: Mapping[str, bytes]) -> Iterator[str]
         yield f'<div class="maps">{"".join(shown)}</div>'
 
 
-def _spread(difference: Difference) -> Iterator[str]:
+def _spread(difference: RunComparison) -> Iterator[str]:
     if difference.spread.rows:
         yield "<h2>How it spread</h2>"
-        yield "".join(f"<p>{escape(sentence)}</p>" for sentence in reached(difference))
+        yield "".join(f"<p>{escape(sentence)}</p>" for sentence in spread_sentences(difference))
         yield html_table(SPREAD_HEADS, [spread_cells(row) for row in difference.spread.rows], n_text=0)
         yield f"<p>{escape(SPREAD_NOTE[0].upper() + SPREAD_NOTE[1:])}.</p>"
 
@@ -94,8 +104,8 @@ def _curves(images: Mapping[str, bytes]) -> Iterator[str]:
         )
 
 
-def _topics(difference: Difference) -> Iterator[str]:
-    """Say of each topic when it came to differ, how often it does, and where that began."""
+def _topics(difference: RunComparison) -> Iterator[str]:
+    """Write of each topic when it came to differ, how often it does, and where that began."""
     if not difference.n_steps_differing:
         return
     yield "<h2>Topics</h2>"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
 from fireworld_recorder.spread import differing_entities
@@ -12,59 +12,47 @@ from fireworld_viewer.pictures.run_differences import draw_difference_curves, dr
 from fireworld_viewer.story.series import LABELS
 
 if TYPE_CHECKING:
-    from fireworld_recorder.diff import Difference
-    from fireworld_recorder.match import Rules
-    from fireworld_recorder.reader import Log
-    from fireworld_recorder.spread import SpreadRow
+    from fireworld.recording.difference import Difference
 
 _CURVES: Final = ("score", "n_burning", "n_burnt_out")
 
 
-def draw_all(
-    logs: tuple[Log, Log], difference: Difference, rules: Rules, rows: Sequence[SpreadRow]
-) -> Mapping[str, bytes]:
-    """Draw what there is to see of a difference.
+def draw_all(difference: Difference) -> Mapping[str, bytes]:
+    """Draw two runs where they differ.
 
     Args:
-        logs: both recordings.
-        difference: how they differ.
-        rules: by which they differ.
-        rows: of every step.
+        difference: how the runs differ.
 
     Returns:
-        PNG files: "curves" if there are rows, and "first-a", "first-b", "first-difference", "last-a", "last-b",
-        "last-difference": maps of the steps where they first and last differ, if they differ in a step that both have.
+        PNG files: "curves" if the runs do not have one digest, and "first-a", "first-b", "first-difference", "last-a",
+        "last-b", "last-difference": maps of the steps where they first and last differ, if both have such a step.
 
     Raises:
         ViewError: matplotlib is not installed.
         LogError: a recording changed since it was opened.
     """
     images: dict[str, bytes] = {}
-    for moment, row in zip(("first", "last"), _ends(difference.spread.rows), strict=False):
-        images |= {f"{moment}-{name}": image for name, image in _draw_maps(logs, row.step, rules).items()}
-    if rows:
-        images["curves"] = _draw_curves(rows, difference)
+    rows = difference.spread.rows
+    for moment, row in zip(("first", "last"), [*rows[:1], *rows[1:][-1:]], strict=False):
+        images |= {f"{moment}-{name}": image for name, image in _draw_maps(difference, row.step).items()}
+    if difference.rows:
+        images["curves"] = _draw_curves(difference)
     return images
 
 
-def _ends(rows: Sequence[SpreadRow]) -> Sequence[SpreadRow]:
-    """Return the first row and the last, if they are two."""
-    return [*rows[:1], *rows[1:][-1:]]
-
-
-def _draw_maps(logs: tuple[Log, Log], step: int, rules: Rules) -> dict[str, bytes]:
+def _draw_maps(difference: Difference, step: int) -> dict[str, bytes]:
     """Draw one step of both runs, and what of it differs."""
-    city, (a, b) = logs[0].city, (log.step(step) for log in logs)
-    figures = {"difference": draw_difference_map(city, a, b, differing_entities(a, b, rules, city))}
+    city, (a, b) = difference.runs[0].city, (run.step(step) for run in difference.runs)
+    figures = {"difference": draw_difference_map(city, a, b, differing_entities(a, b, difference.rules, city))}
     for name, record in (("a", a), ("b", b)):
         score = f"score {record.score.score:.4g} of {record.score.score_max:.0f}"
         figures[name] = draw_record(city, record, title=f"{name.upper()}: step {record.step}, {score}")
     return {name: png_bytes(figure) for name, figure in figures.items()}
 
 
-def _draw_curves(rows: Sequence[SpreadRow], difference: Difference) -> bytes:
+def _draw_curves(difference: Difference) -> bytes:
     """Draw score, burning and burnt out of both runs, and how many buildings differ."""
-    curves = {}
+    rows, curves = difference.rows, {}
     for name in _CURVES:
         both = [getattr(row, name) for row in rows]
         curves[LABELS[f"score.{name}"]] = [one.a for one in both], [one.b for one in both]

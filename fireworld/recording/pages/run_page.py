@@ -1,37 +1,71 @@
-"""One recording, or two of one city, as an HTML page: outcome, maps, curves, choices, events, how to repeat it."""
+"""One recording, or two of one city, as an HTML page: outcome, maps, curves, decisions, events, how to repeat it."""
 
 from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
-from typing import TYPE_CHECKING, Final
+from pathlib import Path
+from typing import Final
 
 import numpy as np
 from fireworld_recorder.totals import final_outcome
+from fireworld_viewer.pictures.curves import draw_curves
+from fireworld_viewer.pictures.decision_timeline import draw_timeline
+from fireworld_viewer.pictures.figure_files import plain_style, png_bytes
+from fireworld_viewer.pictures.maps import draw_steps
 from fireworld_viewer.story.counts import Counts, count_choices
 from fireworld_viewer.story.narration import event_lines
+from fireworld_viewer.story.steps import evenly_spaced
 
 from fireworld.errors import one_line
+from fireworld.files import check_output, write_file
 from fireworld.html_page import html_figure, html_page, html_table, text_cell
-from fireworld.records import ACTION_NAMES, EVENT_KINDS
-
-if TYPE_CHECKING:
-    from fireworld_recorder.reader import Log
+from fireworld.outcome import QUANTITIES
+from fireworld.recording.inputs import AnyRun, open_one_or_two, run_name
+from fireworld.records import ACTION_NAMES, EVENT_KINDS, StoredRun
 
 _STYLE: Final = """
 pre { background: #f0ede6; padding: .7rem 1rem; overflow-x: auto; font-size: 13px; }
 td.text { overflow-wrap: anywhere; } summary { cursor: pointer; }
 """
+ENDINGS: Final = (".html", ".htm")
+"""Of the page's file."""
 SCENARIO: Final = "scenario.yaml"
 """Every recording has its scenario in a file of that name."""
 _ALWAYS_OF_NOTE: Final = frozenset({"civilian-hurt", "civilian-died", "brigade-hurt", "brigade-died", "site-out"})
 _FIRST_OF_NOTE: Final = frozenset({"ignited", "burnt-out", "extinguished", "tank-empty"})
+_MAPS: Final = 4
+"""Maps in the strip."""
 _EVENTS_SHOWN: Final = 40
 _TARGETS_SHOWN: Final = 12
 
 
-def run_page(logs: Sequence[Log], images: Mapping[str, bytes]) -> str:
+def report(logs: AnyRun | Sequence[AnyRun], output: Path | str, *, force: bool = False) -> None:
+    """Write one recording, or two of one city, as an HTML page that needs no other file.
+
+    Args:
+        logs: paths of recordings, or runs; those that were cut off or damaged are reported as far as they are good.
+        output: a .html file.
+        force: replace an existing file.
+
+    Raises:
+        OutputError: the file cannot be written.
+        ViewError: matplotlib is not installed, a recording has no steps, or the cities differ.
+        LogError: a recording cannot be read.
+    """
+    check_output(Path(output), endings=ENDINGS, force=force)
+    runs = open_one_or_two(logs)
+    with plain_style():
+        images = {
+            "maps": png_bytes(draw_steps(runs, evenly_spaced(runs, _MAPS))),
+            "curves": png_bytes(draw_curves(runs)),
+            "timeline": png_bytes(draw_timeline(runs)),
+        }
+    write_file(Path(output), run_page(runs, images).encode())
+
+
+def run_page(logs: Sequence[StoredRun], images: Mapping[str, bytes]) -> str:
     """Write the page; it needs no other file.
 
     Args:
@@ -43,7 +77,7 @@ def run_page(logs: Sequence[Log], images: Mapping[str, bytes]) -> str:
     title = " against ".join(f"{one_line(one.scenario)}, {one_line(one.policy)}, seed {one.seed}" for one in headers)
     body = [
         f"<h1>{escape(title)}</h1>",
-        *(f'<p class="caveat">{escape(f"{log.path.name}: {log.damage}; only what is good is told of")}</p>'
+        *(f'<p class="caveat">{escape(f"{_name(log)}: {log.damage}; the page ends with the last good step")}</p>'
           for log in logs if log.damage is not None),
         "<h2>Outcome</h2>",
         _outcome(logs, names),
@@ -64,18 +98,22 @@ def run_page(logs: Sequence[Log], images: Mapping[str, bytes]) -> str:
     return html_page(f"fireworld: {title}", body, style=_STYLE)
 
 
-def _names(logs: Sequence[Log]) -> list[str]:
-    """Call a recording by its file's name, A and B if there are two."""
+def _names(logs: Sequence[StoredRun]) -> list[str]:
+    """Return the names of the recordings, with A and B if there are two."""
     if len(logs) == 1:
-        return [one_line(logs[0].path.name)]
-    return [f"{letter}: {one_line(log.path.name)}" for letter, log in zip("AB", logs, strict=True)]
+        return [one_line(_name(logs[0]))]
+    return [f"{letter}: {one_line(_name(log))}" for letter, log in zip("AB", logs, strict=True)]
 
 
-def _rows_note(logs: Sequence[Log]) -> str:
+def _name(log: StoredRun) -> str:
+    return Path(run_name(log)).name
+
+
+def _rows_note(logs: Sequence[StoredRun]) -> str:
     return " Above A, below B; a run that ended before the other keeps its last state." if len(logs) > 1 else ""
 
 
-def _outcome(logs: Sequence[Log], names: Sequence[str]) -> str:
+def _outcome(logs: Sequence[StoredRun], names: Sequence[str]) -> str:
     columns = [_outcome_of(log) for log in logs]
     rows = []
     for label in columns[0]:
@@ -85,10 +123,8 @@ def _outcome(logs: Sequence[Log], names: Sequence[str]) -> str:
     return html_table(["", *map(escape, names)], rows) + note
 
 
-def _outcome_of(log: Log) -> dict[str, str]:
-    last = log.step(int(log.steps[-1]))
-    n_buildings, n_civilians = len(log.city.building_id), len(log.city.civilian_hp)
-    complete = final_outcome(log).time_to_complete
+def _outcome_of(log: StoredRun) -> dict[str, str]:
+    outcome, last = final_outcome(log), log.step(int(log.steps[-1]))
     ended = (
         "nothing burned any more" if last.terminated else "the scenario's last step" if last.truncated else "stopped"
     )
@@ -96,22 +132,15 @@ def _outcome_of(log: Log) -> dict[str, str]:
         "scenario": one_line(log.header.scenario),
         "policy": one_line(log.header.policy),
         "seed": str(log.header.seed),
-        "score": f"{last.score.score:.4f} of {last.score.score_max:.0f}",
-        "score by today's rule": f"{last.score.score_now:.4f}",
         "last step": f"{last.step}: {ended}",
-        "time to complete": f"{complete} steps" if complete is not None else "-",
-        "burnt out": f"{last.score.n_burnt_out} of {n_buildings} buildings",
-        "still burning": f"{last.score.n_burning}",
-        "water-damaged": f"{last.score.n_water_damaged}",
-        "civilians alive": f"{last.score.n_civilians_alive} of {n_civilians}",
-        "return": f"{last.rewards.sum_so_far:,.0f}",
-        "water used": f"{last.score.water_used_litres:,.0f} litres",
+        **{quantity.label: quantity.text(outcome) for quantity in QUANTITIES},
+        "score by today's rule": f"{outcome.score_now:.3f}",
         "digest": log.digest[:12],
     }
 
 
-def _decisions(log: Log, name: str) -> Iterator[str]:
-    """Say how often each brigade chose which action, and which targets it named itself."""
+def _decisions(log: StoredRun, name: str) -> Iterator[str]:
+    """Write how often each brigade chose which action, and which targets it named itself."""
     found = count_choices(log)
     used = [k for k in range(len(ACTION_NAMES)) if any(one.n_by_action[k] for one in found)]
     explored = any(one.n_explored for one in found)
@@ -142,8 +171,8 @@ def _share(one: Counts, n: int) -> str:
     return f'{n} <span class="interval">{100 * n / max(1, total):.0f}&nbsp;%</span>' if n else "0"
 
 
-def _event_counts(logs: Sequence[Log], names: Sequence[str]) -> str:
-    """Say how often each kind of event happened, and when first and last."""
+def _event_counts(logs: Sequence[StoredRun], names: Sequence[str]) -> str:
+    """Write how often each kind of event happened, and when first and last."""
     found = [_steps_by_kind(log) for log in logs]
     kinds = [kind for kind in EVENT_KINDS if any(len(steps[kind]) for steps in found)]
     rows = [
@@ -160,7 +189,7 @@ def _count_cells(steps: Sequence[int]) -> tuple[str, str]:
     return str(len(steps)), str(steps[0]) if steps[0] == steps[-1] else f"{steps[0]} to {steps[-1]}"
 
 
-def _steps_by_kind(log: Log) -> dict[str, list[int]]:
+def _steps_by_kind(log: StoredRun) -> dict[str, list[int]]:
     steps: dict[str, list[int]] = {kind: [] for kind in EVENT_KINDS}
     for step, kinds in zip(log.steps.tolist(), log.ragged("/events", "kind"), strict=True):
         for kind in np.asarray(kinds).tolist():
@@ -168,29 +197,29 @@ def _steps_by_kind(log: Log) -> dict[str, list[int]]:
     return steps
 
 
-def _events_of_note(log: Log, name: str) -> Iterator[str]:
-    """Tell of people, of fires that are out, and of the first of what happens often."""
+def _events_of_note(log: StoredRun, name: str) -> Iterator[str]:
+    """List what happened to people, fires that are out, and the first of what happens often."""
     kinds = [EVENT_KINDS[kind] for row in log.ragged("/events", "kind") for kind in np.asarray(row).tolist()]
     met: set[str] = set()
-    told: list[tuple[int, str]] = []
+    noted: list[tuple[int, str]] = []
     for kind, (step, _, text, _) in zip(kinds, event_lines(log), strict=True):
         first = kind not in met
         if kind in _ALWAYS_OF_NOTE or (kind in _FIRST_OF_NOTE and first):
-            told.append((step, f"{text}, the first" if kind in _FIRST_OF_NOTE else text))
+            noted.append((step, f"{text}, the first" if kind in _FIRST_OF_NOTE else text))
         met.add(kind)
-    if told:
+    if noted:
         yield f"<h3>{escape(name)}</h3>"
-        rows = [[str(step), text_cell(escape(text))] for step, text in told[:_EVENTS_SHOWN]]
+        rows = [[str(step), text_cell(escape(text))] for step, text in noted[:_EVENTS_SHOWN]]
         yield html_table(["step", "of note"], rows, n_text=0)
-    if len(told) > _EVENTS_SHOWN:
-        yield f"<p>{len(told) - _EVENTS_SHOWN} more are left out; the recording has them.</p>"
+    if len(noted) > _EVENTS_SHOWN:
+        yield f"<p>{len(noted) - _EVENTS_SHOWN} more are left out; the recording has them.</p>"
 
 
-def _repetition(log: Log, name: str) -> Iterator[str]:
-    """Say what identifies a run, and which commands repeat it."""
+def _repetition(log: StoredRun, name: str) -> Iterator[str]:
+    """Write what identifies a run, and which commands repeat it."""
     header = log.header
     rows = {
-        "recording": log.path.name,
+        "recording": _name(log),
         "scenario": f"{header.scenario}, {header.scenario_digest}",
         "policy": f"{header.policy}, {header.policy_digest}",
         "seed": str(header.seed),
@@ -205,8 +234,8 @@ def _repetition(log: Log, name: str) -> Iterator[str]:
     yield f"<pre>{escape(_commands(log))}</pre>"
 
 
-def _scenarios(logs: Sequence[Log], names: Sequence[str]) -> Iterator[str]:
-    """Show the text of each scenario, once."""
+def _scenarios(logs: Sequence[StoredRun], names: Sequence[str]) -> Iterator[str]:
+    """Write the text of each scenario, once."""
     texts: dict[bytes, list[str]] = {}
     for log, name in zip(logs, names, strict=True):
         if SCENARIO in log.header.attachments:
@@ -217,9 +246,9 @@ def _scenarios(logs: Sequence[Log], names: Sequence[str]) -> Iterator[str]:
         yield f"<details><summary>{escape(title)}</summary><pre>{shown}</pre></details>"
 
 
-def _commands(log: Log) -> str:
+def _commands(log: StoredRun) -> str:
     """Return the commands that replay a run, and run it anew; a run that branched off has no beginning of its own."""
-    header, recording = log.header, shlex.quote(one_line(log.path.name))
+    header, recording = log.header, shlex.quote(one_line(_name(log)))
     lines = [f"fireworld verify {recording}   # from the recording alone: every step is computed again and compared"]
     if not header.forked_from:
         words = ["fireworld", "run", SCENARIO, "--policy", one_line(header.policy)]

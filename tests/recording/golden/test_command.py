@@ -16,8 +16,9 @@ from fireworld_recorder.writer import LogWriter
 
 from fireworld.policy.teams.table_team import TableTeam
 from fireworld.policy.words import N_STATES
-from fireworld.recording.golden import check as goldens
-from fireworld.recording.golden.check import find_goldens, store_text, text_path
+from fireworld.recording.golden import check, store
+from fireworld.recording.golden.check import find_goldens
+from fireworld.recording.golden.store import store_text, text_path
 from tests import command_line
 
 MINE = ("add", "quick", "--policy", "mine:Policy", "--steps", 8)
@@ -127,7 +128,7 @@ def test_keep_records_the_new_runs_that_differ(kept, golden, here, change_policy
     assert golden("check", "--keep", "new", "--force").code == 1
     refused = golden("check", "--keep", "recordings/../recordings/golden")
     assert (refused.code, contents(kept)) == (2, before)
-    assert "--keep: expected another folder" in refused.err
+    assert "recordings/../recordings/golden: expected another folder" in refused.err
 
 
 def test_update_renews_what_changed_and_keeps_the_reason(kept, golden, change_policy):
@@ -176,7 +177,7 @@ def test_update_needs_a_reason(kept, golden, change_policy, reason):
     before = contents(kept)
     done = golden("update", *reason)
     assert (done.code, contents(kept)) == (2, before)
-    assert "--reason" in done.err
+    assert "reason" in done.err
 
 
 def test_update_writes_nothing_unless_all_can_be_run(kept, golden, write_policy):
@@ -191,13 +192,13 @@ def test_update_writes_nothing_unless_all_can_be_run(kept, golden, write_policy)
 
 def test_update_interrupted_while_it_writes_finishes_that(kept, golden, change_policy, monkeypatch):
     change_policy("EASIEST")
-    store = goldens.store_recording
+    store_recording = store.store_recording
 
     def interrupted(path, fresh):
         signal.raise_signal(signal.SIGINT)
-        store(path, fresh)
+        store_recording(path, fresh)
 
-    monkeypatch.setattr(goldens, "store_recording", interrupted)
+    monkeypatch.setattr(store, "store_recording", interrupted)
     assert golden("update", "--reason", "The easiest fire first.").code == 0
     assert golden("check").code == 0
 
@@ -206,7 +207,7 @@ def test_check_interrupted(kept, golden, monkeypatch):
     def interrupted(run):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(goldens, "carry_out", interrupted)
+    monkeypatch.setattr(check, "run_in_memory", interrupted)
     before = contents(kept)
     assert golden("check").code == 130
     assert golden("update", "--reason", "None.").code == 130
@@ -219,7 +220,7 @@ def test_a_text_of_another_recording_is_found(kept, golden):
     assert done.code == 1
     assert "quick-easiest.txt: expected the text of this recording" in done.out
     done = golden("update", "--reason", "A wrong merge.")
-    assert "quick-easiest: the same; its text is renewed" in done.out
+    assert "quick-easiest: the same; its text is written anew" in done.out
     assert golden("check").code == 0
 
 
@@ -313,7 +314,7 @@ def test_a_damaged_golden_cannot_be_checked(kept, golden):
         (("add", "quick", "--policy", "easist"), "try easiest"),
         (("add", "quick", "--policy", "mine:Nobody"), "mine: expected a class of that name"),
         (("add", "quick", "--policy", "easiest", "--set", "brigades.m=1"), "brigades.m"),
-        (("add", "quick", "--policy", "easiest", "--name", "../up"), "--name: expected letters, digits"),
+        (("add", "quick", "--policy", "easiest", "--name", "../up"), "name: expected letters, digits"),
         (("add", "quick", "--policy", "easiest", "--dir", "mine.py/x"), "mine.py/x: cannot be made"),
     ],
 )

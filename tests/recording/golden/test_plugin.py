@@ -9,9 +9,10 @@ import pytest
 from fireworld_recorder.reader import open_log
 
 from fireworld.pytest_plugin import NAME_MAX, golden_name
-from fireworld.recording.golden.check import carry_out, check_golden, find_goldens, store_golden
-from fireworld.recording.golden.order import Order, order_of, prepare_golden
-from tests.golden.conftest import POLICY
+from fireworld.recording.golden.check import check_golden, find_goldens, run_in_memory
+from fireworld.recording.golden.spec import GoldenSpec, prepare_golden, spec_of
+from fireworld.recording.golden.store import store_golden
+from tests.recording.golden.conftest import POLICY
 
 UPDATE = "--fireworld-update"
 ONE = """
@@ -60,7 +61,7 @@ def test_stored_and_the_same_then_changed_then_updated(project):
         [
             "recordings/test_mine-test_policy.mcap: the run is not the same any more",
             "step 1, choose: brigade 0 chose easiest, was nearest-to-me",
-            "  sum of rewards: *, was *",
+            "  return: *, was *",
             "the new run: *test_mine-test_policy.mcap; *",
             "if that is meant, run with --fireworld-update",
         ]
@@ -138,7 +139,7 @@ def test_options(project):
     project.makepyfile(test_mine=test.format(seed=1, ignore=[]))
     run(project, UPDATE, outcome={"passed": 1})
     log = open_log(project.path / "recordings" / "test_mine-test_policy.mcap")
-    order = order_of(log.header)
+    order = spec_of(log.header)
     assert order.settings == {"brigades.n": "3", "choices": "simultaneous"}
     assert order.tolerances == {"energy": 1e-6}
     project.makepyfile(test_mine=test.format(seed=2, ignore=[]))
@@ -189,7 +190,7 @@ def test_mistakes_fail_in_a_line(project, call, complaint):
     failing = POLICY + "\nclass Failing:\n    def decide(self, observation):\n        return {}['a']\n"
     project.makepyfile(mine=failing, test_mine=ONE.partition("    rec")[0] + f"    recording({call})\n")
     (project.path / "recordings").mkdir()
-    good = carry_out(prepare_golden(Order(scenario="quick", policy="random", steps=2), project.path))
+    good = run_in_memory(prepare_golden(GoldenSpec(scenario="quick", policy="random", steps=2), project.path))
     store_golden(project.path / "recordings" / "test_mine-test_policy.mcap", good)
     out = run(project, outcome={"failed": 1})
     out.fnmatch_lines([complaint])

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from fireworld.recording.golden.check import carry_out
-from fireworld.recording.golden.order import Order, prepare_golden
+from fireworld.recording.golden.check import run_in_memory
+from fireworld.recording.golden.spec import GoldenSpec, prepare_golden
 from tests import command_line
 
 CACHE = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
@@ -64,7 +64,7 @@ def golden(monkeypatch):
 @pytest.fixture(scope="session")
 def _warm():
     """Let numba import all it needs: what is first imported within a test's own pytest is forgotten after it."""
-    carry_out(prepare_golden(Order(scenario="quick", policy="random", steps=2), Path()))
+    run_in_memory(prepare_golden(GoldenSpec(scenario="quick", policy="random", steps=2), Path()))
 
 
 @pytest.fixture

@@ -9,9 +9,12 @@ import subprocess
 import pytest
 from fireworld_recorder.reader import open_log
 
-from fireworld.recording.golden.check import check_golden, find_goldens, text_path
-from fireworld.recording.golden.order import kind_of, order_of, recorded_scenario
+from fireworld.recording.golden.check import check_golden, find_goldens
+from fireworld.recording.golden.kinds import scenario_kind
+from fireworld.recording.golden.spec import spec_of
+from fireworld.recording.golden.store import text_path
 from fireworld.recording.golden.text import golden_text
+from fireworld.recording.replay import recorded_scenario
 from fireworld.records import EVENT_KINDS
 from fireworld.scenario import load_scenario, scenario_names
 from fireworld.simulation.built import CityCache
@@ -37,8 +40,8 @@ def test_the_run_is_what_it_was(path, cities):
 
 
 def test_every_kind_of_scenario_has_one():
-    kinds = {kind_of(recorded_scenario(open_log(path).header)) for path in GOLDENS}
-    missing = {kind_of(scenario): scenario.name for scenario in map(load_scenario, scenario_names())}
+    kinds = {scenario_kind(recorded_scenario(open_log(path).header)) for path in GOLDENS}
+    missing = {scenario_kind(scenario): scenario.name for scenario in map(load_scenario, scenario_names())}
     missing = {kind: name for kind, name in missing.items() if kind not in kinds}
     assert not missing, "try `fireworld golden add NAME --policy POLICY --steps 15` for one of each"
 
@@ -46,7 +49,7 @@ def test_every_kind_of_scenario_has_one():
 @pytest.mark.parametrize("path", GOLDENS, ids=lambda path: path.stem)
 def test_it_runs_a_shipped_scenario(path):
     """By name, so that a change of a scenario, or of the parameters it starts from, is noticed too."""
-    assert order_of(open_log(path).header).scenario in scenario_names()
+    assert spec_of(open_log(path).header).scenario in scenario_names()
 
 
 @pytest.mark.parametrize("path", GOLDENS, ids=lambda path: path.stem)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from fireworld.recording.golden.order import kind_of
+from fireworld.recording.golden.kinds import scenario_kind
 from fireworld.scenario import load_scenario, parse_scenario
 
 QUICK = load_scenario("quick")
 
 
 def test_a_kind_is_said_in_words():
-    assert kind_of(QUICK) == (
+    assert scenario_kind(QUICK) == (
         "generated city of 10 x 8 lots, 2 brigades, fire in one place, civilians all around, "
         "choices in-turn, reward stock, parameters paper"
     )
@@ -34,9 +34,9 @@ def test_a_kind_is_said_in_words():
     ],
 )
 def test_what_makes_another_kind(key, value, words):
-    kind = kind_of(QUICK.with_settings({key: value}))
+    kind = scenario_kind(QUICK.with_settings({key: value}))
     assert words in kind
-    assert kind != kind_of(QUICK)
+    assert kind != scenario_kind(QUICK)
 
 
 @pytest.mark.parametrize(
@@ -52,9 +52,9 @@ def test_what_makes_another_kind(key, value, words):
     ],
 )
 def test_what_does_not(key, value):
-    assert kind_of(QUICK.with_settings({key: value})) == kind_of(QUICK)
+    assert scenario_kind(QUICK.with_settings({key: value})) == scenario_kind(QUICK)
 
 
 def test_a_recorded_scenario_is_of_its_kind():
     """It says every parameter, the preset's too."""
-    assert kind_of(parse_scenario(QUICK.to_yaml(), source="recorded")) == kind_of(QUICK)
+    assert scenario_kind(parse_scenario(QUICK.to_yaml(), source="recorded")) == scenario_kind(QUICK)

@@ -1,4 +1,4 @@
-"""Tables in plain text, as wide as their widest cells."""
+"""Tables in plain text, as wide as their widest cells, for what an object prints of itself."""
 
 from __future__ import annotations
 

@@ -13,14 +13,12 @@ from fireworld_recorder.diff import compare
 from fireworld_recorder.reader import open_log
 from fireworld_recorder.writer import StepFile
 
-from fireworld.policy.asking import begin
-from fireworld.policy.names import find_policy
 from fireworld.policy.teams.table_team import TableTeam
-from fireworld.recording.fork import Change, prepare_fork
+from fireworld.recording.fork import prepare_fork
 from fireworld.recording.replay import build_recorded
 from fireworld.recording.resume import resume
 from fireworld.records import ACTION_NAMES, ACTIONS, MemoryRecording
-from tests.forks.conftest import STEPS, write_log
+from tests.recording.conftest import STEPS, write_log
 
 
 def decision(log, step, brigade):
@@ -45,9 +43,7 @@ def test_without_a_change_the_fork_is_the_run_wherever_it_is_forked(recordings):
     for step in [*log.snapshots, *np.random.default_rng(1).choice(STEPS, 20, replace=False).tolist()]:
         resumed = resume(built, MemoryRecording(log.header, log.city, records[: step + 1]), source="log")
         assert compare(resumed.recorded, resumed.replayed).same
-        named = find_policy("random")
-        begin(named.policy, resumed.world.city_arrays, n_brigades=resumed.world.n_brigades, seed=resumed.world.seed)
-        fork = prepare_fork(resumed, Change(named), log, records[: step + 1], digest=log.digest, source="log")
+        fork = prepare_fork(log, at=step)
         gone, digest = list(fork), Digest(log.city)
         for record in gone:
             digest.write(record)
@@ -238,20 +234,20 @@ def test_the_table(here, fireworld):
 
 
 WRONG = {
-    "--at 99": "--at: expected a step of easiest.mcap, 0 to 60, got 99",
-    "--at 60": "--at: expected a step of easiest.mcap after which the run goes on, got 60, it is the last of the run",
+    "--at 99": "at: expected a step of easiest.mcap, 0 to 60, got 99",
+    "--at 60": "at: expected a step of easiest.mcap after which the run continues, got 60, it is the last of the run",
     "--at 5 --policy chef": "--policy: expected one of ",
-    "--at 5 --decide 7=easiest": "--decide: brigade: expected a number from 0 to 1, got 7",
+    "--at 5 --decide 7=easiest": "decide: brigade: expected a whole number from 0 to 1, got 7",
     "--at 5 --decide easiest": "--decide: expected BRIGADE=ACTION as in 2=nearest-to-me, got 'easiest'",
     "--at 5 --decide 0=nearest": "got 'nearest'; try nearest-to-civilian or nearest-to-center or nearest-to-me",
-    "--at 5 --decide 0=easiest --decide 0=nearest-to-me": "--decide: expected one action for brigade 0, got two",
+    "--at 5 --decide 0=easiest --decide 0=nearest-to-me": "--decide: expected one for brigade 0, got two",
     "--at 5 --swap chief.mcap": "--swap: expected OTHER:BRIGADE as in other.mcap:2, got 'chief.mcap'",
-    "--at 5 --swap chief.mcap:2": "--swap: brigade: expected a number from 0 to 1, got 2",
+    "--at 5 --swap chief.mcap:2": "swap: brigade: expected a whole number from 0 to 1, got 2",
     "--at 5 --swap none.mcap:1": "none.mcap",
     "--at 30 --swap stopped.mcap:1": "stopped.mcap: expected a run with decisions after step 30, got one that ends at",
-    "--at 5 --swap other-seed.mcap:1": "other-seed.mcap: seed: expected 1, as in easiest.mcap: other seeds are",
+    "--at 5 --swap other-seed.mcap:1": "other-seed.mcap: seed: expected 1, as in easiest.mcap: other seeds give",
     "--at 5 --swap other-scenario.mcap:1": "other-scenario.mcap: scenario: expected quick (",
-    "--at 5 --swap chief.mcap:0 --decide 0=easiest": "expected one of them for brigade 0, once",
+    "--at 5 --swap chief.mcap:0 --decide 0=easiest": "decide, swap: expected one of them for brigade 0, got 'both'",
     "--at 5 --force": "--force goes with --record.",
 }
 
@@ -266,11 +262,11 @@ def test_mistakes(here, fireworld, words):
 
 
 WRONG_TARGETS = {
-    "0=own-target": "--decide: 0: expected a building behind own-target, as in own-target:301, got 'own-target'",
-    "0=own-target:": "--decide: 0: expected a building behind own-target, as in own-target:301, got 'own-target:'",
+    "0=own-target": "decide: 0: expected a building behind own-target, as in own-target:301, got 'own-target'",
+    "0=own-target:": "decide: 0: expected a building behind own-target, as in own-target:301, got 'own-target:'",
     "0=own-target:-1": "expected a building behind own-target, as in own-target:301, got 'own-target:-1'",
-    "0=own-target:7": "--decide: 0: expected the id of a building of two-fires.mcap, 100 to 179, got 'own-target:7'",
-    "0=easiest:112": "--decide: 0: expected easiest without a building, got 'easiest:112'; a brigade goes for a ",
+    "0=own-target:7": "decide: 0: expected the id of a building of two-fires.mcap, 100 to 179, got 'own-target:7'",
+    "0=easiest:112": "decide: 0: expected easiest without a building, got 'easiest:112'; a brigade goes for a ",
     "0=own": "nearest-to-me, own-target, got 'own'; try own-target",
     "0=own-target:101": "that burns in the brigade's fire site in step 6, got 101, which does not burn; try 112",
     "1=own-target:112": "in step 6, got 112, which burns in another one; try 167, 176",
@@ -291,8 +287,8 @@ def test_a_decision_of_one_who_has_none(here, fireworld):
     step = next(record.step for record in log if record.step and record.decisions.action[0] < 0)
     done = fireworld("fork", "easiest.mcap", "--at", step - 1, "--decide", "0=nearest-to-me")
     assert done.code == 2
-    assert f"--decide: 0: expected a brigade that decides in step {step}, got one that refills; it decides" in done.err
-    at = int(done.err.rpartition("try --at ")[2])
+    assert f"decide: 0: expected a brigade that decides in step {step}, got one that refills; it decides" in done.err
+    at = int(done.err.rpartition("fork at ")[2])
     assert fireworld("fork", "easiest.mcap", "--at", at, "--decide", "0=nearest-to-me").code == 0
     assert fireworld("fork", "easiest.mcap", "--at", at - 1, "--decide", "0=nearest-to-me").code == 2
 
@@ -314,7 +310,7 @@ def test_a_policy_that_is_gone_or_has_changed(here, fireworld):
     changed = fireworld("fork", "counting.mcap", "--at", 5)
     assert changed.code == 2
     assert "counting.mcap: policy: expected the policy own_policies:Counting as it was recorded" in changed.err
-    assert "--policy own_policies:Counting goes on with it as it is now" in changed.err
+    assert "--policy own_policies:Counting takes it as it is now" in changed.err
     assert fireworld("fork", "counting.mcap", "--at", 5, "--policy", "own_policies:Counting").code == 0
 
 
@@ -323,7 +319,7 @@ def test_a_policy_that_cannot_be_imported(here, fireworld):
     gone = fireworld("fork", "counting.mcap", "--at", 5)
     assert gone.code == 2
     assert "counting.mcap: its policy own_policies:Counting cannot be loaded" in gone.err
-    assert "say with --policy who goes on" in gone.err
+    assert "name another one with --policy" in gone.err
     assert fireworld("fork", "counting.mcap", "--at", 5, "--policy", "recorded").code == 0
 
 
@@ -334,7 +330,7 @@ def test_a_policy_with_a_memory_that_decides_otherwise_now(here, fireworld):
     done = fireworld("fork", "f.mcap", "--at", 20)
     assert done.code == 2
     assert ": easiest is recorded, but own_policies:Counting now decides " in done.err
-    assert "--policy own_policies:Counting lets it begin anew" in done.err
+    assert "--policy own_policies:Counting starts it afresh" in done.err
 
 
 def altered(records, step, **changes):

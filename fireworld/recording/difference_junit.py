@@ -12,7 +12,7 @@ from fireworld.junit import clean, report
 from fireworld.records import STEP_TOPICS, Snapshot
 
 if TYPE_CHECKING:
-    from fireworld_recorder.diff import Difference
+    from fireworld_recorder.diff import RunComparison
     from fireworld_recorder.match import Rules
 
 COMMIT: Final = "/commit"
@@ -20,21 +20,21 @@ LENGTH: Final = "length"
 """The case of steps that only one run has."""
 
 
-def junit_xml(difference: Difference, rules: Rules, *, paths: tuple[Path, Path]) -> bytes:
+def difference_junit(difference: RunComparison, rules: Rules, *, names: tuple[str, str]) -> bytes:
     """Write a comparison as a suite with a test case for each topic, in the order in which things happen.
 
-    A topic that differs is a failure whose message, and text, is its first difference; one that was left out is
+    A topic that differs is a failure whose message, and text, is its first difference; one that is not compared is
     skipped. The class of all cases is made of the first recording's path, so that several goldens stay apart.
 
     Args:
         difference: what was found.
         rules: by which it was found.
-        paths: of the two recordings.
+        names: paths of the two recordings, or what was run.
     """
-    class_name = ".".join(["fireworld", "diff", *_words(paths[0])])
+    class_name = ".".join(["fireworld", "diff", *_words(names[0])])
     cases = [_case(name, class_name, difference, rules) for name in _names()]
     properties = {key: f"{b}, was {a}" for key, (a, b) in difference.header.items()}
-    return report("fireworld diff", f"{paths[0]} and {paths[1]}", cases, properties)
+    return report("fireworld diff", f"{names[0]} and {names[1]}", cases, properties)
 
 
 def _names() -> Iterator[str]:
@@ -42,7 +42,7 @@ def _names() -> Iterator[str]:
     yield from (Snapshot.topic, COMMIT, LENGTH)
 
 
-def _case(name: str, class_name: str, difference: Difference, rules: Rules) -> Element:
+def _case(name: str, class_name: str, difference: RunComparison, rules: Rules) -> Element:
     case = Element("testcase", {"classname": class_name, "name": name.removeprefix("/"), "time": "0"})
     failure = _failure(name, difference)
     if failure is not None:
@@ -54,7 +54,7 @@ def _case(name: str, class_name: str, difference: Difference, rules: Rules) -> E
     return case
 
 
-def _failure(name: str, difference: Difference) -> tuple[str, str] | None:
+def _failure(name: str, difference: RunComparison) -> tuple[str, str] | None:
     """Return the first difference of a topic and how often it differs, or None."""
     if name == LENGTH:
         first, (a, b) = difference.first, difference.totals
@@ -75,7 +75,7 @@ def _is_compared(name: str, rules: Rules) -> bool:
     return bool(rules.endings if name == COMMIT else rules.fields[name])
 
 
-def _words(path: Path) -> list[str]:
+def _words(path: str) -> list[str]:
     """Return the parts of a path as words of a class name, which dots separate."""
-    parts = [re.sub(r"[^\w-]+", "_", part) for part in path.with_suffix("").parts]
+    parts = [re.sub(r"[^\w-]+", "_", part) for part in Path(path).with_suffix("").parts]
     return [part for part in parts if part.strip("_")]

@@ -15,20 +15,20 @@ from fireworld_recorder.reader import open_log
 from fireworld.policy.names import find_policy
 from fireworld.policy.teams.ranking_team import RankingTeam
 from fireworld.recording.decisions import RecordedDecisions
-from fireworld.recording.explanation.search import explain
-from fireworld.recording.explanation.stretches import Stretch, find_stretches
-from fireworld.recording.explanation.worse_run import WorseRun, prepare_worse_run
+from fireworld.recording.explanation.counterfactual import CounterfactualRun, prepare_counterfactuals
+from fireworld.recording.explanation.search import search_effects
+from fireworld.recording.explanation.spans import DecisionSpan, find_spans
 from fireworld.recording.replay import build_recorded
 from fireworld.records import ACTION_NAMES, ACTIONS
 from tests import command_line
 
-EARLY, LATE, BAD = (Stretch(0, 1, 8, 3, (0,)), Stretch(1, 5, 5, 1, (0,)), Stretch(1, 9, 10, 2, (0,)))
+EARLY, LATE, BAD = (DecisionSpan(0, 1, 8, 3, (0,)), DecisionSpan(1, 5, 5, 1, (0,)), DecisionSpan(1, 9, 10, 2, (0,)))
 
 
-def made_up_score(told):
-    """Score: 1; +4 if brigade 0 is told something in step 3, +1 for LATE, -2 for BAD; the two gains are one if both."""
-    gains = [4.0 * any(stretch.holds(0, 3) for stretch in told), 1.0 * (LATE in told)]
-    bad = any(stretch.brigade == 1 and stretch.action == 2 for stretch in told)
+def made_up_score(forced):
+    """Score: 1; +4 if brigade 0 is forced in step 3, +1 for LATE, -2 for BAD; the two gains are one if both."""
+    gains = [4.0 * any(stretch.covers(0, 3) for stretch in forced), 1.0 * (LATE in forced)]
+    bad = any(stretch.brigade == 1 and stretch.action == 2 for stretch in forced)
     return 1.0 + max(gains) - 2.0 * bad
 
 
@@ -36,43 +36,43 @@ def made_up(*stretches, budget=100, n_done=10_000):
     """Explain a difference of 4 by replays of which only the first few are done."""
     calls = []
 
-    def score_all(told):
+    def score_all(forced):
         scores = []
-        for one in told:
+        for one in forced:
             calls.append(tuple(one))
             scores.append(made_up_score(one) if len(calls) <= n_done else None)
         return scores
 
-    return explain(stretches, worse_score=1.0, better_score=5.0, budget=budget, score_all=score_all), calls
+    return search_effects(stretches, worse_score=1.0, better_score=5.0, budget=budget, score_all=score_all), calls
 
 
 def test_shares_by_hand():
     explanation, calls = made_up(EARLY, LATE, BAD)
-    assert [(one.stretch, one.score, one.share) for one in explanation.found] == [
+    assert [(one.span, one.score, one.share) for one in explanation.effects] == [
         (EARLY, 5.0, 1.0),
         (LATE, 2.0, 0.25),
         (BAD, -1.0, -0.5),
     ]
     assert explanation.together == (3.0, 0.5)
-    assert [one.share_without for one in explanation.found] == [-0.25, 0.5, 1.0]
+    assert [one.share_without for one in explanation.effects] == [-0.25, 0.5, 1.0]
     assert calls[0] == (EARLY, LATE, BAD), "all at once"
     assert explanation.n_replays == len(calls)
-    assert explanation.n_stretches == 3
+    assert explanation.n_spans == 3
 
 
 def test_a_stretch_is_narrowed_down_to_the_step_that_matters():
     explanation, _ = made_up(EARLY, LATE)
-    core = explanation.found[0].core
-    assert (core.stretch.first, core.stretch.last, core.share) == (3, 3, 1.0)
-    assert explanation.found[1].core is None, "a single step"
+    core = explanation.effects[0].core
+    assert (core.span.first, core.span.last, core.share) == (3, 3, 1.0)
+    assert explanation.effects[1].core is None, "a single step"
 
 
 def test_a_stretch_whose_halves_do_not_do_it_is_left_whole():
-    def score_all(told):
-        return [1.0 + 4.0 * (EARLY in one) for one in told]
+    def score_all(forced):
+        return [1.0 + 4.0 * (EARLY in one) for one in forced]
 
-    explanation = explain([EARLY], worse_score=1.0, better_score=5.0, budget=100, score_all=score_all)
-    assert explanation.found[0].core is None
+    explanation = search_effects([EARLY], worse_score=1.0, better_score=5.0, budget=100, score_all=score_all)
+    assert explanation.effects[0].core is None
     assert explanation.n_replays == 4, "all at once, by itself, two halves"
 
 
@@ -80,40 +80,40 @@ def test_a_stretch_whose_halves_do_not_do_it_is_left_whole():
 def test_the_budget_is_kept(budget):
     explanation, calls = made_up(EARLY, LATE, BAD, budget=budget)
     assert len(calls) == explanation.n_replays <= budget
-    tried = {one.stretch for one in explanation.found}
+    tried = {one.span for one in explanation.effects}
     assert tried == set((EARLY, LATE, BAD)[: budget - 1]), "the earliest come first"
 
 
 def test_what_is_known_when_it_is_interrupted():
     explanation, _ = made_up(EARLY, LATE, BAD, n_done=3)
-    assert [one.stretch for one in explanation.found] == [EARLY, LATE]
+    assert [one.span for one in explanation.effects] == [EARLY, LATE]
     assert explanation.together == (3.0, 0.5)
     assert explanation.n_replays == 3
     nothing, _ = made_up(EARLY, n_done=0)
-    assert (nothing.found, nothing.together) == ((), None)
+    assert (nothing.effects, nothing.together) == ((), None)
 
 
 def test_no_stretches_no_replays():
     explanation, calls = made_up()
-    assert (explanation.found, explanation.together, calls) == ((), None, [])
+    assert (explanation.effects, explanation.together, calls) == ((), None, [])
 
 
 @pytest.mark.parametrize("policy", ["easiest", "random"])
 def test_compiled_replays_are_those_step_by_step(recordings, policy):
     log, other = open_log(recordings / f"{policy}.mcap"), open_log(recordings / "chief.mcap")
     better = RecordedDecisions(other)
-    run = prepare_worse_run(build_recorded(log.header), log, better, lambda: find_policy(policy).policy)
+    run = prepare_counterfactuals(build_recorded(log.header), log, better, lambda: find_policy(policy).policy)
     assert run.compiled
-    assert not run.orders
-    stretches = find_stretches(run.recorded, better, n_brigades=run.n_brigades)
+    assert not run.forced
+    stretches = find_spans(run.recorded, better, n_brigades=run.built.n_brigades)
     scores = set()
-    for told in ([stretches[0]], [stretches[-1]], stretches, [*stretches[0].halves()][1:]):
+    for forced in ([stretches[0]], [stretches[-1]], stretches, [*stretches[0].halves()][1:]):
         world = run._world_before(0)
-        run._run_stepwise(world, find_policy(policy).policy, told)
-        scores.add(run.score(told))
-        assert run.score(told) == world.state.outcome.score[0]
+        run._run_stepwise(world, find_policy(policy).policy, forced)
+        scores.add(run.score(forced))
+        assert run.score(forced) == world.state.outcome.score[0]
     assert len(scores) > 1
-    assert run.score([Stretch(0, 60, 60, 0, (1,))]) == pytest.approx(log.step(60).score.score, abs=0.1)
+    assert run.score([DecisionSpan(0, 60, 60, 0, (1,))]) == pytest.approx(log.step(60).score.score, abs=0.1)
 
 
 def test_a_stretch_of_one_step_is_what_a_fork_with_that_decision_is(here, answer):
@@ -161,7 +161,7 @@ def test_the_answer_for_people(here, fireworld, explained):
     done = fireworld("explain", "easiest.mcap", "chief.mcap")
     assert (done.code, done.err) == (0, "")
     assert done.out.startswith(f"chief.mcap scores {known['better']['score']:.6g}, easiest.mcap ")
-    assert "after them its own policy goes on" in done.out
+    assert "after them its own policy continues" in done.out
     first = known["stretches"][0]
     row = next(line for line in done.out.splitlines() if " instead of " in line)
     assert f"{first['first']}-{first['last']}" in row
@@ -175,11 +175,11 @@ def test_a_small_budget_is_told_of(here, fireworld):
     done = fireworld("explain", "random.mcap", "chief.mcap", "--budget", 4, "--limit", 1)
     assert done.code == 0
     assert "3 of " in done.out
-    assert " stretches tried, the earliest; --budget " in done.out
+    assert " spans tried, the earliest; --budget " in done.out
 
 
 def test_a_policy_that_is_gone(here, fireworld, answer):
-    """Then recorded decisions go on, and the answer says so."""
+    """Then the recorded decisions continue, and the answer says so."""
     words = ("explain", "counting.mcap", "chief.mcap", "--budget", 6)
     assert answer(*words)["goes_on"] == "policy"
     (here / "own_policies.py").unlink()
@@ -188,7 +188,7 @@ def test_a_policy_that_is_gone(here, fireworld, answer):
     assert known["goes_on"] == "recorded"
     assert "own_policies:Counting cannot be loaded" in known["why_recorded"]
     done = fireworld(*words)
-    assert "the recorded decisions go on, whatever happens (counting.mcap: its policy" in done.out
+    assert "the recorded decisions continue, whatever happens (counting.mcap: its policy" in done.out
 
 
 @pytest.mark.parametrize("other", ["easiest.mcap", "random.mcap"])
@@ -227,8 +227,8 @@ def test_a_stretch_of_one_target_is_what_a_fork_with_that_target_is(here, firewo
         score = known["worse"]["score"] if refused[-1] else json.loads(fork.out)["score"]
         assert one["score"] == score, "what cannot be done is decided by the policy"
     assert len(set(refused)) == 2
-    (told,) = (one for one in known["stretches"] if one["first"] == 6)
-    assert (told["brigade"], told["targets"], told["share"]) == (1, [44], 1.0)
+    (forced,) = (one for one in known["stretches"] if one["first"] == 6)
+    assert (forced["brigade"], forced["targets"], forced["share"]) == (1, [44], 1.0)
     assert "own-target:44 instead of" in fireworld("explain", "ranked.mcap", "f.mcap").out
 
 
@@ -246,11 +246,11 @@ def test_the_decision_of_a_fork_explains_it_all(here, answer):
 def test_the_orders_of_a_fork_are_found(here, answer):
     answer("fork", "random.mcap", "--at", 40, "--policy", "easiest", "--record", "f.mcap")
     log = open_log("f.mcap")
-    run = prepare_worse_run(
+    run = prepare_counterfactuals(
         build_recorded(log.header), log, RecordedDecisions(log), lambda: find_policy("easiest").policy
     )
-    assert run.orders
-    assert max(step for step, _ in run.orders) <= 40, "afterwards the policy decided by itself"
+    assert run.forced
+    assert max(step for step, _ in run.forced) <= 40, "afterwards the policy decided by itself"
     assert not run.compiled
 
 
@@ -262,7 +262,7 @@ def test_equal_scores(here, fireworld, answer):
 
 
 WRONG = {
-    "other-seed.mcap": "other-seed.mcap: seed: expected 1, as in easiest.mcap: other seeds are other luck, got 2",
+    "other-seed.mcap": "other-seed.mcap: seed: expected 1, as in easiest.mcap: other seeds give different ",
     "other-scenario.mcap": "other-scenario.mcap: scenario: expected quick (",
     "stopped.mcap": "stopped.mcap: expected a run that has reached its end, got one that stopped at step 20; ",
     "none.mcap": "none.mcap",
@@ -285,18 +285,18 @@ def test_another_last_step(here, fireworld):
 
 
 def test_ctrl_c_shows_what_is_known(here, fireworld, interruptible, monkeypatch):
-    score, n_calls, seen = WorseRun.score, 0, Event()
+    score, n_calls, seen = CounterfactualRun.score, 0, Event()
 
-    def interrupting(self, told):
+    def interrupting(self, forced):
         nonlocal n_calls
         n_calls += 1
         if n_calls == 5:
             os.kill(os.getpid(), signal.SIGINT)
         if n_calls >= 5:
             seen.wait(0.3)
-        return score(self, told)
+        return score(self, forced)
 
-    monkeypatch.setattr(WorseRun, "score", interrupting)
+    monkeypatch.setattr(CounterfactualRun, "score", interrupting)
     done = fireworld("explain", "random.mcap", "chief.mcap", "--json")
     assert done.code == 130
     known = json.loads(done.out)

@@ -1,0 +1,68 @@
+"""Export: a recording as tables for data tools, and what a damaged one still holds as a recording of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from importlib.util import find_spec
+from pathlib import Path
+
+from fireworld_recorder.recover import Recovery
+from fireworld_recorder.recover import recover as recover_file
+from fireworld_recorder.tables import TABLES, find_table
+
+from fireworld.errors import OutputError
+from fireworld.recording.inputs import AnyRun, open_run
+from fireworld.records import StepRecord
+
+
+def export(
+    log: AnyRun,
+    folder: Path | str,
+    *,
+    tables: Collection[str] | None = None,
+    force: bool = False,
+    on_step: Callable[[StepRecord], object] = lambda _: None,
+) -> dict[str, int]:
+    """Write a recording as a folder of Parquet files, a file for each table, for pandas, polars, DuckDB and the like.
+
+    Args:
+        log: the path of a recording, or a run; one that was cut off or damaged is exported as far as it is good.
+        folder: the folder to make.
+        tables: names of the tables to write; None: all.
+        force: replace an earlier export.
+        on_step: called after each step.
+
+    Returns:
+        Rows by table.
+
+    Raises:
+        LogError: the recording cannot be read.
+        OutputError: there is no such table, pyarrow is not installed, or the folder exists or cannot be written.
+    """
+    if find_spec("pyarrow") is None:
+        raise OutputError("export: pyarrow is not installed; try pip install 'fireworld[archive]'")
+    for name in tables or ():
+        find_table(name)
+    run = open_run(log, partial=True)
+    from fireworld_recorder import parquet
+
+    chosen = TABLES if tables is None else tables
+    return parquet.export(run, Path(folder), tables=chosen, force=force, on_step=on_step)
+
+
+def recover(log: Path | str, output: Path | str, *, force: bool = False) -> Recovery:
+    """Write the committed steps of a cut-off or damaged recording as a recording of their own.
+
+    Args:
+        log: the path of the recording, whatever its state.
+        output: the recording to write.
+        force: replace an existing file.
+
+    Returns:
+        How much was recovered, and what was wrong.
+
+    Raises:
+        LogError: the recording holds no good step, or cannot be read at all.
+        OutputError: the output exists, its folder does not, or it cannot be written.
+    """
+    return recover_file(log, output, force=force)

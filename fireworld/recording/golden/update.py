@@ -1,0 +1,158 @@
+"""Golden recordings, added and recorded anew."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from fireworld_recorder.reader import open_log
+
+from fireworld.errors import FireworldError, LogError, OutputError, expected
+from fireworld.files import write_file
+from fireworld.interrupt import gentle_interrupt
+from fireworld.recording.golden.check import FOLDER, GoldenResult, check_goldens, compare_golden, run_in_memory
+from fireworld.recording.golden.spec import GoldenSpec, make_spec, prepare_golden, spec_of
+from fireworld.recording.golden.store import SUFFIX, make_folder, store_golden, store_text
+from fireworld.records import MemoryRecording
+
+REASONS: Final = "REASONS.md"
+REASONS_TITLE: Final = "# Why golden recordings changed\n\nWritten by `fireworld golden update`; the newest last.\n"
+
+
+@dataclass(frozen=True)
+class GoldenUpdate:
+    """What was done to a golden."""
+
+    name: str
+    done: Literal["nothing", "text", "recording"]
+    """What was written anew; the text goes with the recording."""
+    sentence: str
+    """The first difference; empty if there was none."""
+
+
+def add_golden(
+    scenario: str | Path,
+    *,
+    policy: str,
+    seed: int = 1,
+    steps: int | None = None,
+    settings: Mapping[str, Any] | None = None,
+    name: str | None = None,
+    folder: Path = FOLDER,
+) -> Path:
+    """Run a scenario and store the recording and its text as a golden.
+
+    Args:
+        scenario: a shipped name, or a YAML file.
+        policy: a name as for `fireworld run --policy`.
+        seed: of the random draws.
+        steps: last step; None: the scenario's.
+        settings: keys of the scenario with other values; text is read as YAML.
+        name: of the golden; None: made of scenario, policy and seed.
+        folder: where it goes.
+
+    Returns:
+        The path of the recording.
+
+    Raises:
+        OutputError: there is such a golden already, the name is not possible, or it cannot be written.
+        ScenarioError, CityError, PolicyError, TrainingError: it cannot be run.
+    """
+    path = folder / f"{_default_name(scenario, policy, seed) if name is None else _checked_name(name)}{SUFFIX}"
+    if path.exists():
+        hint = "`fireworld golden update` records it anew; or try another name"
+        raise OutputError(expected(str(path), "", "a name that is free", "an existing golden", hint))
+    spec = make_spec(folder, scenario=scenario, policy=policy, seed=seed, steps=steps, settings=settings)
+    fresh = run_in_memory(prepare_golden(spec, folder))
+    make_folder(folder)
+    with gentle_interrupt():
+        store_golden(path, fresh)
+    return path
+
+
+def update_goldens(
+    folder: Path = FOLDER,
+    names: Collection[str] = (),
+    *,
+    reason: str,
+    on_result: Callable[[GoldenResult], object] = lambda _: None,
+) -> list[GoldenUpdate]:
+    """Record anew those goldens that changed, and write the reason into the folder's REASONS.md.
+
+    Nothing is written unless all of them can be run. Goldens that are the same stay as they are.
+
+    Args:
+        folder: of the goldens.
+        names: of those to look at; all if there are none.
+        reason: why they changed, in a sentence.
+        on_result: called after each run.
+
+    Raises:
+        OutputError: no reason, no such goldens, or they cannot be written.
+        LogError: one cannot be run or compared.
+    """
+    reason = " ".join(reason.split())
+    if not reason:
+        raise OutputError(expected("reason", "", "a sentence that says why the goldens changed", "nothing"))
+    results = []
+    for result in check_goldens(folder, names):
+        results.append(result)
+        on_result(result)
+    failed = [f"{result.name}: {result.error}" for result in results if result.difference is None]
+    if failed:
+        others = f"; {len(failed) - 1} more cannot be run" if len(failed) > 1 else ""
+        raise LogError(f"{failed[0]}{others}; nothing is updated")
+    changed = [result for result in results if result.differs]
+    with gentle_interrupt():  # what begins here takes a moment, and belongs together
+        if changed:
+            write_file(folder / REASONS, _reasons(folder / REASONS, reason, changed).encode())
+        return [_update(result) for result in results]
+
+
+def store_if_changed(path: Path, fresh: MemoryRecording, spec: GoldenSpec) -> bool:
+    """Store a golden, unless it is there already, was made by this spec and is the same as a new run of it.
+
+    Returns:
+        Whether the recording was stored; its text is written in any case if it is outdated.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    try:
+        difference = compare_golden(path, fresh, spec).difference if spec_of(open_log(path).header) == spec else None
+    except FireworldError:
+        difference = None
+    if difference is not None and difference.same:
+        store_text(path)
+        return False
+    make_folder(path.parent)
+    store_golden(path, fresh)
+    return True
+
+
+def _update(result: GoldenResult) -> GoldenUpdate:
+    if result.differs and result.fresh is not None:
+        store_golden(result.path, result.fresh)
+        return GoldenUpdate(result.name, "recording", result.sentence)
+    return GoldenUpdate(result.name, "text" if store_text(result.path) else "nothing", "")
+
+
+def _checked_name(name: str) -> str:
+    if not re.fullmatch(r"[\w.+=-]+", name) or name.startswith((".", "-")):
+        raise OutputError(expected("name", "", "letters, digits and any of _ . + = -", name))
+    return name
+
+
+def _default_name(scenario: str | Path, policy: str, seed: int) -> str:
+    """Name a golden after what it runs; after its seed too, if that is not 1."""
+    parts = [Path(scenario).stem, policy.removesuffix(".npz"), *([f"seed-{seed}"] if seed != 1 else [])]
+    return "-".join(re.sub(r"[^\w.+=]+", "-", part).strip("-.") for part in parts)
+
+
+def _reasons(path: Path, reason: str, changed: Sequence[GoldenResult]) -> str:
+    """Return the list of reasons with one more entry: the reason, and where each golden first differs."""
+    before = path.read_text(encoding="utf-8") if path.is_file() else REASONS_TITLE
+    return before + "".join([f"\n* {reason}\n", *(f"  * {result.name}: {result.sentence}\n" for result in changed)])

@@ -1,0 +1,81 @@
+"""Recordings in Rerun: its window, a browser, or a file for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from fireworld_recorder.diff import compare
+from fireworld_recorder.totals import totals_of
+from fireworld_viewer.rerun_view import app
+from fireworld_viewer.rerun_view.outcome_page import OutcomePage
+from fireworld_viewer.story.steps import select_steps
+from fireworld_viewer.story.two_runs import check_same_city
+
+from fireworld.recording.difference_text import totals_rows
+from fireworld.recording.inputs import AnyRecording, open_to_show, run_name
+from fireworld.records import Recording
+
+
+def view(
+    logs: AnyRecording | Sequence[AnyRecording],
+    *,
+    save: Path | str | None = None,
+    force: bool = False,
+    web: bool = False,
+    port: int | None = None,
+    announce: Callable[[str], None] = print,
+    focus: Sequence[int] = (),
+    first_step: int | None = None,
+    last_step: int | None = None,
+    every: int = 1,
+    air: bool = False,
+) -> None:
+    """Show one recording, or two of one city side by side, in Rerun; return when its window is closed.
+
+    Args:
+        logs: paths of recordings, or runs; those that were cut off or damaged are shown as far as they are good.
+        save: write a Rerun file instead.
+        force: replace an existing file.
+        web: serve the view to browsers on this machine instead, until Ctrl-C.
+        port: of the page that `web` serves.
+        announce: called with the address of that page.
+        focus: ids of buildings whose temperatures are plotted; by default, those that burn first.
+        first_step: first step to show.
+        last_step: last step to show.
+        every: show every n-th step.
+        air: show the heat of the air at every step, which is computed by a replay.
+
+    Raises:
+        ViewError: there is no Rerun or no display, the cities differ, or there is no such step or building.
+        OutputError: the file cannot be written.
+        LogError: a recording cannot be read, or does not replay to what is recorded.
+    """
+    held = open_to_show(logs)
+    names = [run_name(recording) for recording in held]
+    if air:
+        from fireworld.recording.replay import replay_with_air
+
+        held = [replay_with_air(recording, source=name) for recording, name in zip(held, names, strict=True)]
+    shown = [select_steps(one, first=first_step, last=last_step, every=every) for one in held]
+    outcome = _outcome([Path(name).name for name in names], shown)
+    if save is not None:
+        app.save(shown, Path(save), focus=focus, outcome=outcome, force=force)
+    elif web:
+        app.serve(shown, focus=focus, outcome=outcome, port=port or app.WEB_PORT, announce=announce)
+    else:
+        app.show(shown, focus=focus, outcome=outcome)
+
+
+def _outcome(heads: Sequence[str], recordings: Sequence[Recording]) -> OutcomePage:
+    """Return how the runs came out, and where two first differ, in the steps that are shown."""
+    if len(recordings) == 1:
+        return OutcomePage(heads=heads, rows=list(totals_rows(totals_of(recordings[0]))))
+    first_run, second_run = recordings
+    check_same_city(first_run.city, second_run.city)
+    difference = compare(first_run, second_run)
+    rows, first = list(totals_rows(*difference.totals)), difference.first
+    if first is None:
+        return OutcomePage(heads=heads, rows=rows)
+    step = int(first_run.steps[0]) if first.step is None else first.step
+    return OutcomePage(heads=heads, rows=rows, first_step=step, first_sentence=first.sentence)
