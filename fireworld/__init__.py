@@ -15,10 +15,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from fireworld.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from fireworld.errors import FireworldError as FireworldError
-    from fireworld.evaluation.compare import Comparison as Comparison
     from fireworld.evaluation.compare import compare as compare
+    from fireworld.evaluation.comparison import Comparison as Comparison
     from fireworld.outcome import Outcome as Outcome
     from fireworld.policy.names import policies as policies
     from fireworld.policy.protocol import Action as Action
@@ -27,21 +29,30 @@ if TYPE_CHECKING:
     from fireworld.policy.protocol import Policy as Policy
     from fireworld.policy.teams.team import Team as Team
     from fireworld.policy.teams.team import load_team as load_team
+    from fireworld.recording.difference import Difference as Difference
+    from fireworld.recording.difference import diff as diff
+    from fireworld.recording.explain import Explanation as Explanation
+    from fireworld.recording.explain import explain as explain
+    from fireworld.recording.export import export as export
+    from fireworld.recording.export import recover as recover
+    from fireworld.recording.fork import fork as fork
     from fireworld.recording.record import run as run
     from fireworld.recording.run import Run as Run
     from fireworld.recording.run import open_log as open_log
+    from fireworld.recording.verify import Verification as Verification
+    from fireworld.recording.verify import verify as verify
     from fireworld.reproduction.reproduce import Reproduction as Reproduction
     from fireworld.reproduction.reproduce import reproduce as reproduce
     from fireworld.scenario import Scenario as Scenario
     from fireworld.scenario import scenarios as scenarios
     from fireworld.training.train import train as train
 
-__version__ = "0.1.0"
-
 _ROOMS = {
     "Action": "policy.protocol",
-    "Comparison": "evaluation.compare",
+    "Comparison": "evaluation.comparison",
     "Decision": "policy.protocol",
+    "Difference": "recording.difference",
+    "Explanation": "recording.explain",
     "FireworldError": "errors",
     "Observation": "policy.protocol",
     "Outcome": "outcome",
@@ -50,14 +61,21 @@ _ROOMS = {
     "Run": "recording.run",
     "Scenario": "scenario",
     "Team": "policy.teams.team",
+    "Verification": "recording.verify",
     "compare": "evaluation.compare",
+    "diff": "recording.difference",
+    "explain": "recording.explain",
+    "export": "recording.export",
+    "fork": "recording.fork",
     "load_team": "policy.teams.team",
     "open_log": "recording.run",
     "policies": "policy.names",
+    "recover": "recording.export",
     "reproduce": "reproduction.reproduce",
     "run": "recording.record",
     "scenarios": "scenario",
     "train": "training.train",
+    "verify": "recording.verify",
 }
 """The module, below fireworld, that each name of the front door lives in."""
 

@@ -14,10 +14,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
-from fireworld import __version__
 from fireworld.errors import OutputError, expected
 from fireworld.evaluation.runs import KINDS, Row
 from fireworld.files import write_file
+from fireworld.version import __version__
 
 FORMAT: Final = "fireworld-results/1"
 KEYS: Final[dict[str, type]] = {

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from typing import Any, Final
 
-from fireworld import __version__
 from fireworld.arguments import ArgumentError, whole_number
 from fireworld.errors import LogError, expected
 from fireworld.policy.asking import begin
@@ -32,6 +31,7 @@ from fireworld.records import CityRecord, MemoryRecording, RunHeader, StepRecord
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.run import PreparedRun
 from fireworld.simulation.world import World
+from fireworld.version import __version__
 
 FORK_ATTACHMENT: Final = "fork.json"
 """Name of the attachment that lists the forks a recording comes from, the oldest first."""

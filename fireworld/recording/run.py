@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fireworld.arguments import ArgumentError, path_of
+from fireworld.arguments import path_of
 from fireworld.errors import FieldError, LogError, OutputError, expected, one_line
 from fireworld.outcome import QUANTITIES, Outcome, outcome_of
-from fireworld.records import Array, CityRecord, Recording, RunHeader, StepRecord, StoredRun
+from fireworld.records import Array, CityRecord, RunHeader, StepRecord, StoredRun
 
 if TYPE_CHECKING:
     import pandas
@@ -198,9 +198,11 @@ class Run:
             OutputError: it cannot be written.
             ViewError: matplotlib is not installed.
         """
-        from fireworld.recording.pages.pictures import film_of
+        from fireworld.recording.pages.render import render_film
 
-        return film_of(self, path_of("path", path), fps=fps, every=every, force=force)
+        output = path_of("path", path)
+        render_film(self._recording, output, fps=fps, every=every, force=force)
+        return output
 
     def view(self, *, save: str | os.PathLike[str] | None = None, force: bool = False) -> None:
         """Open the run in Rerun, or save it for Rerun.
@@ -213,9 +215,9 @@ class Run:
             ViewError: Rerun is not installed, or there is no display.
             OutputError: the file cannot be written.
         """
-        from fireworld.recording.pages.pictures import view_runs
+        from fireworld.recording.pages.view import view
 
-        view_runs([self], save=None if save is None else path_of("save", save), force=force)
+        view(self._recording, save=None if save is None else path_of("save", save), force=force)
 
     @property
     def _name(self) -> str:
@@ -246,17 +248,3 @@ class Run:
         outcome = self.outcome if len(self) else None
         facts = {item.label: item.text(outcome) for item in QUANTITIES} if outcome is not None else {"steps": "none"}
         return {**facts, "digest": self.digest, **({"damage": self.damage} if self.damage else {})}
-
-
-def as_recording(run: str | os.PathLike[str] | Recording, *, name: str) -> Recording:
-    """Return a run that is given as an object, or as the path of its log.
-
-    Raises:
-        LogError: the log cannot be read.
-        ArgumentError: it is neither.
-    """
-    if isinstance(run, str | os.PathLike):
-        return open_log(run)
-    if not isinstance(run, Recording):
-        raise ArgumentError(expected(name, "", "a run, or the path of a recording", run))
-    return run

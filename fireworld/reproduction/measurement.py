@@ -8,7 +8,6 @@ from functools import cached_property, lru_cache, partial
 from threading import Event, Lock
 from typing import Any
 
-from fireworld import __version__
 from fireworld.executors import AnyExecutor, in_this_process, workers_for
 from fireworld.interrupt import Interrupted
 from fireworld.policy.kernel import KernelPolicy
@@ -19,6 +18,7 @@ from fireworld.reproduction.team_tests import LEARNED, RULES, TeamTests, Tested,
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import Curriculum
 from fireworld.training.methods.sarsa import Sarsa
+from fireworld.version import __version__
 
 OnProgress = Callable[[str, int, int], object]
 """Called with what is being done, how many parts of it are done, and how many there are."""

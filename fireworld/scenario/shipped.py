@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import fireworld
 from fireworld.errors import ScenarioError, expected
 from fireworld.scenario.explain import nearest
 from fireworld.scenario.scenario import Scenario, read_scenario
@@ -56,7 +55,7 @@ def scenarios() -> list[Scenario]:
 
 def shipped_folder() -> Path:
     """Return the folder of the shipped scenarios: inside the package, or at the top of a checkout."""
-    package = Path(fireworld.__file__).parent
+    package = Path(__file__).parents[1]
     inside = package / "shipped" / "scenarios"
     return inside if inside.is_dir() else package.parent / "scenarios"
 

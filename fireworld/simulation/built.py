@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fireworld import __version__
 from fireworld.city.build import build_city
 from fireworld.city.city import City, Plan
 from fireworld.city.record import city_record
@@ -16,6 +15,7 @@ from fireworld.scenario import Scenario
 from fireworld.simulation.city_arrays import city_arrays
 from fireworld.simulation.placement import Placement, attachments, place, scenario_plan
 from fireworld.simulation.world import World
+from fireworld.version import __version__
 
 
 @dataclass(frozen=True)

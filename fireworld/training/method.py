@@ -21,7 +21,6 @@ from typing import (
     get_type_hints,
 )
 
-from fireworld import __version__
 from fireworld.errors import TrainingError, expected
 from fireworld.executors import Workers, threads
 from fireworld.kernels.arrays import Array
@@ -29,6 +28,7 @@ from fireworld.policy.teams.team import Team
 from fireworld.scenario import Scenario
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import Curriculum
+from fireworld.version import __version__
 
 COUNT_MAX: Final = 1_000_000
 

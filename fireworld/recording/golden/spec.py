@@ -11,7 +11,6 @@ from typing import Annotated, Any, Final
 
 import msgspec
 
-from fireworld import __version__
 from fireworld.errors import LogError, expected
 from fireworld.policy.names import NamedPolicy, find_policy
 from fireworld.policy.teams.npz import SUFFIX
@@ -21,6 +20,7 @@ from fireworld.records import RunHeader
 from fireworld.scenario import load_scenario, scenario_names
 from fireworld.simulation.built import CityCache
 from fireworld.simulation.run import PreparedRun, prepare_run
+from fireworld.version import __version__
 
 SPEC_ATTACHMENT: Final = "golden.json"
 """Name of the attachment of a golden recording that holds its spec."""

@@ -1,17 +1,12 @@
-"""Pictures, films and views of runs: what `Run.show`, `Run.film` and `Run.view` return or write."""
+"""Pictures of runs: what `Run.show` returns, and what notebooks show of a run."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from fireworld.files import write_file
 from fireworld.records import Recording, StepRecord
-
-if TYPE_CHECKING:
-    from fireworld.recording.run import Run
 
 
 @dataclass(frozen=True)
@@ -59,24 +54,3 @@ def map_png(run: Recording, record: StepRecord) -> bytes | None:
         return map_of(run, record).png
     except ViewError:
         return None
-
-
-def film_of(run: Run, path: Path, *, fps: float, every: int, force: bool) -> Path:
-    """Write a film of a run; arguments and errors as for `Run.film`."""
-    from fireworld_viewer.pictures.figure_files import plain_style
-    from fireworld_viewer.pictures.film import FILMS, save_film
-    from fireworld_viewer.story.steps import read_steps_between
-
-    from fireworld.files import check_output
-
-    check_output(path, force=force, endings=[*FILMS])
-    runs: list[Recording] = [run]
-    shown = read_steps_between(runs, first=None, last=None, every=every)
-    with plain_style():
-        save_film(runs, shown, path, fps=fps)
-    return path
-
-
-def view_runs(runs: Sequence[Run], *, save: Path | None, force: bool) -> None:
-    """Open one or two runs in Rerun, or save them for it; errors as for `Run.view`."""
-    raise NotImplementedError
