@@ -10,6 +10,8 @@ import pytest
 from fireworld.policy.ranking import WEIGHTS, Ranking, save_ranking
 from fireworld.policy.shipped import team_path
 
+pytestmark = pytest.mark.usefixtures("policies_file")
+
 NAMES = [weight.name for weight in WEIGHTS]
 ORIGIN = {
     "method": {"name": "search", "n_fires": 5},

@@ -10,6 +10,8 @@ import sys
 
 import pytest
 
+pytestmark = pytest.mark.usefixtures("policies_file")
+
 SHORT = ("run", "quick", "--steps", 6)
 
 
