@@ -2,26 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-
 import pytest
 
 from fireworld.errors import PolicyError
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.names import BUILT_IN, load_policy
 from fireworld.records import ACTIONS
-
-
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    """An empty current folder; what is imported from it is forgotten again."""
-    known = set(sys.modules)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", sys.path.copy())
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)
-    yield tmp_path
-    for name in set(sys.modules) - known:
-        del sys.modules[name]
 
 
 def test_the_built_in_policies():
