@@ -1,4 +1,5 @@
-# fireworld: `make demo` shows it, `make test` checks all of it. Needs Python 3.11 or newer, and pip.
+# fireworld: `make demo` shows it, `make check` checks it within a minute, `make test` checks all of it.
+# Needs Python 3.11 or newer, and pip.
 PYTHON ?= python3
 WORKERS ?= 2
 FUZZ_SECONDS ?= 60
@@ -8,7 +9,7 @@ PICTURE := recordings/picture-
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help install demo test check-format check-lint check-types check-imports check-tests format docs pictures fuzz bench check-teams clean
+.PHONY: help install demo check test static check-format check-lint check-types check-imports check-tests format docs pictures fuzz bench check-teams clean
 
 help:  ## List these targets.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -30,7 +31,13 @@ demo: install  ## Run the default scenario, record it, verify the recording and 
 	$(BIN)/fireworld view $(DEMO).mcap --save $(DEMO).rrd --force
 	@echo "look at it: $(BIN)/fireworld view $(DEMO).mcap"
 
-test: check-format check-lint check-types check-imports check-tests  ## Run everything that CI checks.
+# While you work: a minute on two cores, once the kernels and the types are cached.
+check: static  ## Check format, lint, types and imports, and run the tests that are not slow.
+	$(BIN)/python -m pytest --numprocesses $(WORKERS) -m "not slow"
+
+test: static check-tests  ## Run everything that CI checks, slow tests too.
+
+static: check-format check-lint check-types check-imports
 
 check-format: install
 	$(BIN)/ruff format --check .
@@ -45,7 +52,7 @@ check-imports: install
 	$(BIN)/lint-imports
 
 check-tests: install
-	$(BIN)/python -m pytest --numprocesses $(WORKERS)
+	$(BIN)/python -m pytest --numprocesses $(WORKERS) $(PYTEST)
 
 format: install  ## Format the code and mend what the linter can mend.
 	$(BIN)/ruff format .

@@ -48,6 +48,7 @@ def test_runs_are_those_of_the_command_run(fireworld, policy):
     assert row(found, "civilians")["b"]["mean"] == outcome["n_civilians_alive"]
 
 
+@pytest.mark.slow
 def test_a_policy_asked_step_by_step_meets_its_compiled_twin_in_processes_too(fireworld):
     words = ("nearest-to-me", "policies:Near", *QUICK, "--seeds", 16)
     alone = compared(fireworld, *words, "--jobs", 1)
@@ -122,7 +123,7 @@ def test_the_gate_is_an_exit_code(fireworld, policies, options, code, said):
 )
 def test_junit_fails_as_the_gate_does(fireworld, here, policies, seeds, wrong):
     assert fireworld("compare", *policies, *QUICK, "--seeds", seeds, "--junit", "out.xml").code == 0
-    suite = parse(here / "out.xml").getroot().find("testsuite")  # noqa: S314 - our own file
+    suite = parse(here / "out.xml").getroot().find("testsuite")
     cases = {(case.get("classname"), case.get("name")): case for case in suite.findall("testcase")}
     assert len(cases) == int(suite.get("tests")) == 8
     failed = [
@@ -133,6 +134,7 @@ def test_junit_fails_as_the_gate_does(fireworld, here, policies, seeds, wrong):
     assert "gate: score: " in cases["fireworld.compare.over all", "score"].find("system-out").text
 
 
+@pytest.mark.slow
 def test_a_plot_is_drawn_and_not_drawn_over(fireworld, here):
     words = ("compare", *BAD_FIRST, *QUICK, "--seeds", 2, "--plot", "out.png")
     assert fireworld(*words).code == 0

@@ -29,6 +29,8 @@ from fireworld.training.curriculum import load_curriculum
 from fireworld.training.method import Method
 from fireworld.training.trainer import Trainer
 
+pytestmark = pytest.mark.slow
+
 CURRICULUM = """
 stages:
   - name: alone

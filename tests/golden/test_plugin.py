@@ -13,6 +13,8 @@ from fireworld.recording.golden.check import carry_out, check_golden, find_golde
 from fireworld.recording.golden.order import Order, order_of, prepare_golden
 from tests.golden.conftest import POLICY
 
+pytestmark = pytest.mark.slow
+
 UPDATE = "--fireworld-update"
 ONE = """
 def test_policy(recording):

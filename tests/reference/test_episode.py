@@ -143,6 +143,7 @@ def shipped(name: str, *, in_turn: bool = True) -> Play:
     return Play(built.city, tables, start)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("policy", POLICIES)
 @pytest.mark.parametrize("scenario", ["quick", "test-1", "test-2", "test-3"])
 def test_shipped_scenarios(scenario, policy):
@@ -185,6 +186,7 @@ def rough(seed: int) -> Play:
     return Play(city, tables, start)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("policy", ["nearest-to-me", "random", "table", "ranking of named", "ranking of all"])
 def test_a_town_where_everything_happens(policy):
     seen: set[int] = set()

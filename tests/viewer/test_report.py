@@ -22,6 +22,8 @@ from fireworld.records import ACTION_NAMES, MemoryRecording
 from tests.viewer.conftest import make_recording
 from tests.viewer.recorded import write_log
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(autouse=True)
 def _in_a_folder(here):
