@@ -37,24 +37,24 @@ check: static  ## Check format, lint, types and imports, and run the tests that 
 
 test: static check-tests  ## Run everything that CI checks, slow tests too.
 
-static: check-format check-lint check-types check-imports
+static: check-format check-lint check-types check-imports  ## Check everything but the tests.
 
-check-format: install
+check-format: install  ## Check that the code is formatted.
 	$(BIN)/ruff format --check .
 
-check-lint: install
+check-lint: install  ## Run the linter.
 	$(BIN)/ruff check .
 
-check-types: install
+check-types: install  ## Run mypy --strict.
 	$(BIN)/mypy
 
-check-imports: install
+check-imports: install  ## Check that imports go down only.
 	$(BIN)/lint-imports
 
-check-tests: install
+check-tests: install  ## Run all tests; PYTEST=... are further options of pytest.
 	$(BIN)/python -m pytest --numprocesses $(WORKERS) $(PYTEST)
 
-format: install  ## Format the code and mend what the linter can mend.
+format: install  ## Format the code and fix what the linter can fix.
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
@@ -89,6 +89,6 @@ check-teams: install  ## Train the teams that come with fireworld again; they mu
 	$(BIN)/python -m benchmarks.shipped
 
 clean:  ## Remove what the other targets made, .venv too.
-	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist build
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist build reports
 	rm -f $(DEMO).mcap $(DEMO).mcap.partial $(DEMO).rrd $(PICTURE)*.mcap
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
