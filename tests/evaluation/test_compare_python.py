@@ -79,7 +79,7 @@ def test_several_policies_are_compared_with_the_first():
     text = repr(found)
     assert [f"A: nearest-to-me, B: {name}, 6 seeds from 9" in text for name in names] == [True] * 3
     assert found._repr_html_().count("<table>") == 3
-    cases = fromstring(found.junit()).findall(".//testcase")  # noqa: S314 - our own
+    cases = fromstring(found.junit()).findall(".//testcase")
     assert len({(case.get("classname"), case.get("name")) for case in cases}) == len(cases) == 3 * 8
     for wrong in (None, "best"):
         with pytest.raises(FireworldError, match="policy: expected one of easiest, nearest-to-me, random"):
