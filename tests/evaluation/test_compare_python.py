@@ -55,6 +55,7 @@ def test_a_class_and_an_object_are_made_anew_for_every_run(policy):
     assert found.policies[1].name.endswith("Near")
 
 
+@pytest.mark.slow
 def test_results_do_not_depend_on_the_executor(tmp_path):
     policies = ["random", Near, "each-another", "planner:horizon=5,interval=10"]
     words = {**QUICK, "seeds": 4, "first_seed": 7}

@@ -25,6 +25,8 @@ from fireworld.simulation.built import build_scenario
 from fireworld.simulation.world import World
 from tests.reference import episode, luck, sites, team
 
+pytestmark = pytest.mark.slow
+
 RANDOM = np.random.default_rng(5)
 POLICIES = {
     "easiest": always(0),
@@ -143,7 +145,6 @@ def shipped(name: str, *, in_turn: bool = True) -> Play:
     return Play(built.city, tables, start)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("policy", POLICIES)
 @pytest.mark.parametrize("scenario", ["quick", "test-1", "test-2", "test-3"])
 def test_shipped_scenarios(scenario, policy):
@@ -186,7 +187,6 @@ def rough(seed: int) -> Play:
     return Play(city, tables, start)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("policy", ["nearest-to-me", "random", "table", "ranking of named", "ranking of all"])
 def test_a_town_where_everything_happens(policy):
     seen: set[int] = set()
