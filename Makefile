@@ -1,4 +1,5 @@
-# fireworld: `make demo` shows it, `make test` checks all of it. Needs Python 3.11 or newer, and pip.
+# fireworld: `make demo` shows it, `make check` checks it within a minute, `make test` checks all of it.
+# Needs Python 3.11 or newer, and pip.
 PYTHON ?= python3
 WORKERS ?= 2
 FUZZ_SECONDS ?= 60
@@ -8,7 +9,7 @@ PICTURE := recordings/picture-
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help install demo test check-format check-lint check-types check-imports check-tests format docs pictures fuzz bench check-teams clean
+.PHONY: help install demo check test static check-format check-lint check-types check-imports check-tests format docs pictures fuzz bench check-teams clean
 
 help:  ## List these targets.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -30,24 +31,30 @@ demo: install  ## Run the default scenario, record it, verify the recording and 
 	$(BIN)/fireworld view $(DEMO).mcap --save $(DEMO).rrd --force
 	@echo "look at it: $(BIN)/fireworld view $(DEMO).mcap"
 
-test: check-format check-lint check-types check-imports check-tests  ## Run everything that CI checks.
+# While you work: a minute on two cores, once the kernels and the types are cached.
+check: static  ## Check format, lint, types and imports, and run the tests that are not slow.
+	$(BIN)/python -m pytest --numprocesses $(WORKERS) -m "not slow"
 
-check-format: install
+test: static check-tests  ## Run everything that CI checks, slow tests too.
+
+static: check-format check-lint check-types check-imports  ## Check everything but the tests.
+
+check-format: install  ## Check that the code is formatted.
 	$(BIN)/ruff format --check .
 
-check-lint: install
+check-lint: install  ## Run the linter.
 	$(BIN)/ruff check .
 
-check-types: install
+check-types: install  ## Run mypy --strict.
 	$(BIN)/mypy
 
-check-imports: install
+check-imports: install  ## Check that imports go down only.
 	$(BIN)/lint-imports
 
-check-tests: install
-	$(BIN)/python -m pytest --numprocesses $(WORKERS)
+check-tests: install  ## Run all tests; PYTEST=... are further options of pytest.
+	$(BIN)/python -m pytest --numprocesses $(WORKERS) $(PYTEST)
 
-format: install  ## Format the code and mend what the linter can mend.
+format: install  ## Format the code and fix what the linter can fix.
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
@@ -82,6 +89,6 @@ check-teams: install  ## Train the teams that come with fireworld again; they mu
 	$(BIN)/python -m benchmarks.shipped
 
 clean:  ## Remove what the other targets made, .venv too.
-	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist build
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist build reports
 	rm -f $(DEMO).mcap $(DEMO).mcap.partial $(DEMO).rrd $(PICTURE)*.mcap
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,6 +1,16 @@
-"""What all tests need before anything of fireworld is imported."""
+"""What all tests need before anything of fireworld is imported, and the fixtures that all of them share."""
+
+from __future__ import annotations
 
 import os
+import shutil
+import sys
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+POLICIES = Path(__file__).with_name("policies.py")
 
 # Tests call the inner kernels one by one; see fireworld.kernels.jit.
 os.environ["FIREWORLD_OPEN_KERNELS"] = "1"
@@ -21,3 +31,30 @@ for name in (
     os.environ.pop(name, None)
 
 pytest_plugins = ["pytester"]
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """An empty current folder; what is imported from it is forgotten again."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", sys.path.copy())
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    yield tmp_path
+    for name, module in [*sys.modules.items()]:
+        if str(tmp_path) in repr(getattr(module, "__spec__", None)):
+            del sys.modules[name]
+
+
+@pytest.fixture
+def policies_file(here):
+    """Put policies.py into the current folder."""
+    shutil.copy(POLICIES, here)
+
+
+@pytest.fixture
+def fireworld(monkeypatch):
+    """Call the command line in this process."""
+    from tests import command_line
+
+    monkeypatch.setenv("COLUMNS", "120")
+    return partial(command_line.call, monkeypatch)

@@ -14,6 +14,8 @@ from fireworld.city.city import AirCells
 from fireworld.parameters import OFFICIAL_2013, FireParameters, HealthParameters
 from tests.reference import brigades, fire, people, traces
 
+pytestmark = pytest.mark.slow
+
 MISC = np.load(traces.TRACES / "misc.npz")
 MINI = traces.Trace.named("mini").tables()
 OFFICIAL_HEALTH = HealthParameters()

@@ -17,9 +17,16 @@ HEAD: Final = """\
 
 This page is what every command says with `--help`; `make docs` renews it.
 
-Results go to standard output, progress and complaints to standard error. Whatever is wrong with a file or a flag is
-told in one line. Exit codes: 0 done, 1 done and the answer is no (recordings differ, a recording is damaged, a trace is
-not met), 2 could not be done, 130 interrupted.
+Results go to standard output, progress and complaints to standard error. Whatever is wrong with a file or a flag takes
+one line. Exit codes: 0 done, 1 done and the answer is no (recordings differ, a recording is damaged, a trace is not
+met), 2 could not be done, 130 interrupted.
+
+The tab key completes commands and options, once the shell knows how. One of these lines in the shell's own file does
+it: `~/.bashrc`, `~/.zshrc`, `~/.config/fish/completions/fireworld.fish`.
+
+    eval "$(_FIREWORLD_COMPLETE=bash_source fireworld)"
+    eval "$(_FIREWORLD_COMPLETE=zsh_source fireworld)"
+    _FIREWORLD_COMPLETE=fish_source fireworld | source
 """
 
 

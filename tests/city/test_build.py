@@ -52,6 +52,7 @@ def test_the_city_is_the_same_on_every_machine():
     assert digest(CITY) == DIGEST
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("setting", [{"PYTHONHASHSEED": "0"}, {"PYTHONHASHSEED": "9", "NUMBA_CPU_NAME": "generic"}])
 def test_the_city_is_the_same_in_every_process(setting):
     code = "from tests.city import test_build as t; print(t.digest(t.small_city()))"

@@ -9,6 +9,8 @@ import pytest
 from fireworld_recorder.reader import open_log
 from fireworld_recorder.writer import StepFile
 
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("policies_file")]
+
 RECORD = ("run", "quick", "--record", "a.mcap", "--policy")
 
 

@@ -11,6 +11,8 @@ from fireworld.policy.teams.ranking_team import RankingTeam
 from fireworld.policy.teams.ranking_words import WEIGHTS
 from fireworld.policy.teams.shipped import team_path
 
+pytestmark = pytest.mark.usefixtures("policies_file")
+
 NAMES = [weight.name for weight in WEIGHTS]
 ORIGIN = {
     "method": {"name": "search", "n_fires": 5},

@@ -11,6 +11,8 @@ from fireworld_recorder.reader import open_log
 from fireworld.city.generator import generate_plan
 from fireworld.city.plan_file import dump_plan
 
+pytestmark = pytest.mark.usefixtures("policies_file")
+
 
 def record(fireworld, name, *words):
     done = fireworld("run", "quick", "--steps", 60, "--record", name, "--json", *words)

@@ -12,6 +12,8 @@ import pytest
 
 from fireworld.records import ACTION_NAMES
 
+pytestmark = pytest.mark.usefixtures("policies_file")
+
 SHORT = ("run", "quick", "--steps", 6)
 
 
@@ -183,6 +185,7 @@ def test_a_policy_that_fails_leaves_the_steps_before(here, fireworld, files, pol
     assert "kept" not in alone.err
 
 
+@pytest.mark.slow
 def test_progress_is_shown_to_people(here):
     """On a terminal: a bar while it runs, gone when it ends; the outcome is there."""
     leader, follower = pty.openpty()

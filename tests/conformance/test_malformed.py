@@ -14,6 +14,8 @@ from fireworld.conformance.city_file import load_city_file
 from fireworld.errors import CityError, FireworldError, TraceError
 from tests.conformance.conftest import city_path, trace_arrays, trace_path
 
+pytestmark = pytest.mark.slow
+
 MINI = load_city_file(city_path("mini"))
 ARRAYS = trace_arrays("mini")
 N_DRAWS = len(ARRAYS["burn_rate_draws"])

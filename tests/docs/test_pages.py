@@ -1,6 +1,7 @@
 """Every page: links lead somewhere, commands are real, citations are met."""
 
 import re
+import tomllib
 
 import click
 import pytest
@@ -69,3 +70,15 @@ def test_the_architecture_names_folders_that_exist():
     assert len(named) > 10
     for path in named:
         assert (ROOT / path).exists(), path
+
+
+def test_the_architecture_shows_the_layers_that_are_enforced():
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    block = page.partition("\nImports go down only, and never between neighbours of one line:\n\n")[2].partition(
+        "\n\n"
+    )[0]
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    (layers,) = (
+        found["layers"] for found in settings["tool"]["importlinter"]["contracts"] if found["type"] == "layers"
+    )
+    assert [set(line.split()) for line in block.splitlines()] == [set(layer.split(" | ")) for layer in layers]

@@ -4,6 +4,7 @@ import json
 import re
 import sys
 
+import pytest
 from click.testing import CliRunner
 
 from fireworld.cli.run import command
@@ -29,6 +30,7 @@ def test_its_make_targets_exist():
     assert named <= targets
 
 
+@pytest.mark.slow
 def test_its_transcripts_are_current():
     page = README.read_text(encoding="utf-8")
     assert transcripts.renew(page) == page, "run `make docs`"

@@ -15,9 +15,8 @@ from fireworld.evaluation import comparison_runs
 from fireworld.evaluation.results import read_results
 from fireworld.policy.names import find_policy
 from fireworld.policy.teams.table_team import TableTeam
-from tests.cli.conftest import fireworld, here  # noqa: F401 - fixtures
 
-pytestmark = pytest.mark.usefixtures("here")
+pytestmark = pytest.mark.usefixtures("policies_file")
 QUICK = ("--scenarios", "quick", "--set", "steps=60")
 BAD_FIRST = ("nearest-to-me", "nearest-to-civilian")
 """A policy that loses a civilian under every seed, and one that loses none."""
@@ -37,7 +36,7 @@ def row(found, metric="score", scenario=None):
 
 
 @pytest.mark.parametrize("policy", ["random", "policies:Near", "planner:horizon=5,interval=10"])
-def test_runs_are_those_of_the_command_run(fireworld, policy):  # noqa: F811
+def test_runs_are_those_of_the_command_run(fireworld, policy):
     found = compared(fireworld, "each-another", policy, *QUICK, "--seeds", 1, "--first-seed", 7)
     assert found["b"]["name"] == policy
     done = fireworld("run", "quick", "--set", "steps=60", "--policy", policy, "--seed", 7, "--json")
@@ -49,7 +48,8 @@ def test_runs_are_those_of_the_command_run(fireworld, policy):  # noqa: F811
     assert row(found, "civilians")["b"]["mean"] == outcome["n_civilians_alive"]
 
 
-def test_a_policy_asked_step_by_step_meets_its_compiled_twin_in_processes_too(fireworld):  # noqa: F811
+@pytest.mark.slow
+def test_a_policy_asked_step_by_step_meets_its_compiled_twin_in_processes_too(fireworld):
     words = ("nearest-to-me", "policies:Near", *QUICK, "--seeds", 16)
     alone = compared(fireworld, *words, "--jobs", 1)
     assert not alone["same_policy"]
@@ -58,7 +58,7 @@ def test_a_policy_asked_step_by_step_meets_its_compiled_twin_in_processes_too(fi
     assert compared(fireworld, *words, "--jobs", 2) == alone
 
 
-def test_json_has_what_its_page_says(fireworld):  # noqa: F811
+def test_json_has_what_its_page_says(fireworld):
     found = compared(fireworld, *BAD_FIRST, "--scenarios", "quick,train-5", "--set", "steps=20", "--seeds", 6)
     assert list(found) == [
         "format", "version", "a", "b", "same_policy", "scenarios", "first_seed", "n_seeds", "comparisons", "gate",
@@ -82,7 +82,7 @@ def test_json_has_what_its_page_says(fireworld):  # noqa: F811
     assert found == compared(fireworld, *BAD_FIRST, "--scenarios", "quick,train-5", "--set", "steps=20", "--seeds", 6)
 
 
-def test_people_get_a_table_a_sentence_and_what_to_mind(fireworld, monkeypatch):  # noqa: F811
+def test_people_get_a_table_a_sentence_and_what_to_mind(fireworld, monkeypatch):
     monkeypatch.setenv("COLUMNS", "40")
     done = fireworld("compare", *BAD_FIRST, *QUICK, "--seeds", 6)
     assert (done.code, done.err) == (0, "")
@@ -108,7 +108,7 @@ def test_people_get_a_table_a_sentence_and_what_to_mind(fireworld, monkeypatch):
         (("policies:Near", "policies:Near"), ("--seeds", 1), 0, "the same policy"),
     ],
 )
-def test_the_gate_is_an_exit_code(fireworld, policies, options, code, said):  # noqa: F811
+def test_the_gate_is_an_exit_code(fireworld, policies, options, code, said):
     words = ("compare", *policies, *QUICK, "--seeds", 6, *options)
     gated = fireworld(*words, "--gate")
     assert (gated.code, said in gated.out) == (code, True), gated.out + gated.err
@@ -121,9 +121,9 @@ def test_the_gate_is_an_exit_code(fireworld, policies, options, code, said):  # 
     ("policies", "seeds", "wrong"),
     [(BAD_FIRST, 6, None), (BAD_FIRST[::-1], 6, "failure"), (BAD_FIRST, 2, "error")],
 )
-def test_junit_fails_as_the_gate_does(fireworld, here, policies, seeds, wrong):  # noqa: F811
+def test_junit_fails_as_the_gate_does(fireworld, here, policies, seeds, wrong):
     assert fireworld("compare", *policies, *QUICK, "--seeds", seeds, "--junit", "out.xml").code == 0
-    suite = parse(here / "out.xml").getroot().find("testsuite")  # noqa: S314 - our own file
+    suite = parse(here / "out.xml").getroot().find("testsuite")
     cases = {(case.get("classname"), case.get("name")): case for case in suite.findall("testcase")}
     assert len(cases) == int(suite.get("tests")) == 8
     failed = [
@@ -134,7 +134,8 @@ def test_junit_fails_as_the_gate_does(fireworld, here, policies, seeds, wrong): 
     assert "gate: score: " in cases["fireworld.compare.over all", "score"].find("system-out").text
 
 
-def test_a_plot_is_drawn_and_not_drawn_over(fireworld, here):  # noqa: F811
+@pytest.mark.slow
+def test_a_plot_is_drawn_and_not_drawn_over(fireworld, here):
     words = ("compare", *BAD_FIRST, *QUICK, "--seeds", 2, "--plot", "out.png")
     assert fireworld(*words).code == 0
     first = (here / "out.png").read_bytes()
@@ -149,7 +150,7 @@ def test_a_plot_is_drawn_and_not_drawn_over(fireworld, here):  # noqa: F811
     assert (here / "out.png").read_bytes() == first
 
 
-def test_known_runs_are_not_run_again(fireworld, here, monkeypatch):  # noqa: F811
+def test_known_runs_are_not_run_again(fireworld, here, monkeypatch):
     words = ("compare", *BAD_FIRST, *QUICK, "--results", "runs.parquet")
     assert fireworld(*words, "--seeds", 3).err == ""
     more = fireworld(*words, "--seeds", 5, "--json")
@@ -168,7 +169,7 @@ def test_known_runs_are_not_run_again(fireworld, here, monkeypatch):  # noqa: F8
     assert (here / "runs.parquet").read_bytes() == kept
 
 
-def test_another_policy_scenario_seed_or_simulator_is_another_run(fireworld, here, monkeypatch):  # noqa: F811
+def test_another_policy_scenario_seed_or_simulator_is_another_run(fireworld, here, monkeypatch):
     def n_rows(*words):
         assert fireworld("compare", *words, "--seeds", 1, "--results", "runs.parquet").code == 0
         return len(read_results(here / "runs.parquet"))
@@ -184,7 +185,7 @@ def test_another_policy_scenario_seed_or_simulator_is_another_run(fireworld, her
     assert n_rows("policies:Near", "easiest", *QUICK) == 9
 
 
-def test_team_files_of_one_name_are_told_apart(fireworld, here):  # noqa: F811
+def test_team_files_of_one_name_are_told_apart(fireworld, here):
     import numpy as np
 
     for number, folder in enumerate(("old", "new")):
@@ -199,7 +200,7 @@ def test_team_files_of_one_name_are_told_apart(fireworld, here):  # noqa: F811
     assert row(found)["difference"] == row(twin)["difference"]
 
 
-def test_ctrl_c_keeps_what_is_done(fireworld, here, monkeypatch):  # noqa: F811
+def test_ctrl_c_keeps_what_is_done(fireworld, here, monkeypatch):
     runs = []
 
     def interrupted_run(built, policy, *, seed):
@@ -222,7 +223,7 @@ def test_ctrl_c_keeps_what_is_done(fireworld, here, monkeypatch):  # noqa: F811
     assert (again.code, again.err) == (0, f"{n_kept} of 100 runs are known from runs.parquet\n")
 
 
-def test_a_failing_policy_says_where_and_loses_no_run(fireworld, here):  # noqa: F811
+def test_a_failing_policy_says_where_and_loses_no_run(fireworld, here):
     words = ("compare", "chief", "policies:Failing", *QUICK, "--results", "runs.parquet")
     for n_seeds, n_kept in ((2, 2), (16, 16)):
         done = fireworld(*words, "--seeds", n_seeds, "--jobs", 1)
@@ -252,7 +253,7 @@ def test_a_failing_policy_says_where_and_loses_no_run(fireworld, here):  # noqa:
         (("chief", "random", "--results", "policies.py"), "policies.py: expected a results file"),
     ],
 )
-def test_mistakes_take_one_line(fireworld, here, words, message):  # noqa: F811
+def test_mistakes_take_one_line(fireworld, here, words, message):
     before = (here / "policies.py").read_text()
     done = fireworld("compare", *words)
     assert (done.code, done.out) == (2, "")
@@ -267,7 +268,7 @@ def test_mistakes_take_one_line(fireworld, here, words, message):  # noqa: F811
         ("matplotlib", ("--plot", "out.png"), "fireworld[figures]"),
     ],
 )
-def test_without_a_library_nothing_is_begun(fireworld, here, monkeypatch, module, words, extra):  # noqa: F811
+def test_without_a_library_nothing_is_begun(fireworld, here, monkeypatch, module, words, extra):
     monkeypatch.setitem(sys.modules, module, None)
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
     done = fireworld("compare", "chief", "random", *words)

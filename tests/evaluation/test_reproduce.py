@@ -27,7 +27,8 @@ from fireworld.scenario import load_scenario
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import load_curriculum
 from fireworld.training.methods.sarsa import Sarsa, SarsaTrainer
-from tests.cli.conftest import fireworld  # noqa: F401 - a fixture
+
+pytestmark = pytest.mark.slow
 
 CURRICULUM = """
 stages:
@@ -137,7 +138,7 @@ def test_random_tables_differ_between_brigades_and_repetitions():
     assert 0.2 < (one[0].argmax(axis=1) == other[0].argmax(axis=1)).mean() < 0.3
 
 
-def test_everything_is_written_and_twice_the_same(small, fireworld):  # noqa: F811
+def test_everything_is_written_and_twice_the_same(small, fireworld):
     done = fireworld(*FEW)
     assert done.code == 0, done.err
     assert "findings" in done.out
@@ -248,7 +249,7 @@ WHOLE = {}
 
 
 @pytest.fixture
-def whole(small, undrawn, fireworld):  # noqa: F811
+def whole(small, undrawn, fireworld):
     """The files of a reproduction without an interruption, by their path in its folder; made once for all tests."""
     if not WHOLE:
         assert fireworld(*FEW[:-1], "whole").code == 0
@@ -283,7 +284,7 @@ def kept_files(small):
     return sorted(path.name for path in (small / "found" / "kept").iterdir())
 
 
-def test_ctrl_c_and_resume(small, fireworld, whole, monkeypatch):  # noqa: F811
+def test_ctrl_c_and_resume(small, fireworld, whole, monkeypatch):
     at_write(monkeypatch, "tests-1.json", lambda: signal.raise_signal(signal.SIGINT))
     done = fireworld(*FEW, "--jobs", 1)
     assert done.code == 130
@@ -304,7 +305,7 @@ def test_ctrl_c_and_resume(small, fireworld, whole, monkeypatch):  # noqa: F811
     assert trained == [2], "what is done can be judged and drawn once more"
 
 
-def test_a_kill_and_resume(small, fireworld, whole, monkeypatch):  # noqa: F811
+def test_a_kill_and_resume(small, fireworld, whole, monkeypatch):
     def die():
         raise Killed
 
@@ -316,7 +317,7 @@ def test_a_kill_and_resume(small, fireworld, whole, monkeypatch):  # noqa: F811
     assert_whole(small / "found", whole)
 
 
-def test_a_full_disk_keeps_what_was_done(small, fireworld, monkeypatch):  # noqa: F811
+def test_a_full_disk_keeps_what_was_done(small, fireworld, monkeypatch):
     def fail():
         raise OutputError("found/kept/tests-2.json: cannot be written: No space left on device")
 
@@ -327,7 +328,7 @@ def test_a_full_disk_keeps_what_was_done(small, fireworld, monkeypatch):  # noqa
 
 
 @pytest.fixture
-def begun(small, undrawn, fireworld, monkeypatch):  # noqa: F811
+def begun(small, undrawn, fireworld, monkeypatch):
     """A folder with one repetition kept."""
     with monkeypatch.context() as once:
         at_write(once, "tests-1.json", lambda: signal.raise_signal(signal.SIGINT))
@@ -335,7 +336,7 @@ def begun(small, undrawn, fireworld, monkeypatch):  # noqa: F811
     return small / "found"
 
 
-def refusal(fireworld, folder, *words):  # noqa: F811
+def refusal(fireworld, folder, *words):
     """Ask to go on; return what is said against it. Nothing is changed."""
     before = contents(folder)
     done = fireworld(*FEW, *words, "--resume")
@@ -344,7 +345,7 @@ def refusal(fireworld, folder, *words):  # noqa: F811
     return done.err
 
 
-def test_other_settings_are_refused(begun, fireworld, monkeypatch):  # noqa: F811
+def test_other_settings_are_refused(begun, fireworld, monkeypatch):
     settings = "fireworld: found/kept/settings.json: "
     hint = "; name what it was begun with, or begin again with --force\n"
     assert refusal(fireworld, begun, "--repetitions", 3) == f"{settings}repetitions: expected 3, got 2{hint}"
@@ -356,20 +357,20 @@ def test_other_settings_are_refused(begun, fireworld, monkeypatch):  # noqa: F81
     assert refusal(fireworld, begun) == f"{settings}fireworld: expected 9, got '0.1.0'{hint}"
 
 
-def test_a_changed_curriculum_is_refused(begun, fireworld, curriculum):  # noqa: F811
+def test_a_changed_curriculum_is_refused(begun, fireworld, curriculum):
     curriculum.write_text(CURRICULUM.replace("steps: 40", "steps: 41"))
     assert "settings.json: curriculum.digest: expected " in refusal(fireworld, begun)
 
 
 @pytest.mark.parametrize("name", ["settings.json", "training-1.json", "tests-1.json"])
 @pytest.mark.parametrize("damage", ["cut off", "{}", "[1]"])
-def test_damage_is_named(begun, fireworld, name, damage):  # noqa: F811
+def test_damage_is_named(begun, fireworld, name, damage):
     path = begun / "kept" / name
     path.write_bytes(path.read_bytes()[:-9] if damage == "cut off" else damage.encode())
     assert refusal(fireworld, begun, "--jobs", 1).startswith(f"fireworld: found/kept/{name}: ")
 
 
-def test_changed_tests_and_teams_are_named(begun, fireworld):  # noqa: F811
+def test_changed_tests_and_teams_are_named(begun, fireworld):
     path = begun / "kept" / "tests-1.json"
     whole = json.loads(path.read_text())
     whole["quick"][TOGETHER]["score"].pop()
@@ -386,7 +387,7 @@ def test_changed_tests_and_teams_are_named(begun, fireworld):  # noqa: F811
     assert "expected a team file, got No such file" in refusal(fireworld, begun, "--jobs", 1)
 
 
-def test_nothing_to_resume(small, fireworld):  # noqa: F811
+def test_nothing_to_resume(small, fireworld):
     done = fireworld(*FEW, "--resume")
     assert (done.code, done.out) == (2, "")
     assert done.err == (
@@ -405,13 +406,13 @@ def test_nothing_to_resume(small, fireworld):  # noqa: F811
         (("--repetitions", "0"), "Invalid value for '--repetitions'"),
     ],
 )
-def test_mistakes_take_one_line(small, fireworld, words, message):  # noqa: F811
+def test_mistakes_take_one_line(small, fireworld, words, message):
     done = fireworld("reproduce", *words)
     assert (done.code, done.out) == (2, "")
     assert message in done.err
 
 
-def test_without_matplotlib_nothing_is_begun(small, fireworld, monkeypatch):  # noqa: F811
+def test_without_matplotlib_nothing_is_begun(small, fireworld, monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
     done = fireworld(*FEW)
     assert (done.code, done.err.count("\n")) == (2, 1)

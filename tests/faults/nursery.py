@@ -86,7 +86,7 @@ def main() -> None:
     record = {"writer": make_writer, "run": make_run}[kind]()
     output, sys.stdout = sys.stdout, open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115, PTH123 - for good
     record(folder / "whole.mcap")
-    generator = random.Random(1)  # noqa: S311
+    generator = random.Random(1)
     for number in range(n):
         step, moment_seconds = generator.randrange(N_STEPS[kind]), generator.uniform(0, 0.0005)
         killed = kill_one(record, folder / f"{number}.mcap", counter, step, moment_seconds)

@@ -15,6 +15,8 @@ from fireworld.scenario import load_scenario
 from fireworld.simulation.built import build_scenario
 from fireworld.simulation.run import prepare_run
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def clean_logs(tmp_path_factory):
@@ -46,7 +48,7 @@ def rescue(folder, data, clean_logs):
 
 
 def test_every_cut_and_every_altered_byte_leaves_a_log_that_replays(tmp_path, clean_logs):
-    generator = random.Random(3)  # noqa: S311
+    generator = random.Random(3)
     whole = clean_logs[-1]
     rescued = set()
     for _ in range(100):

@@ -14,6 +14,8 @@ from fireworld.recording.replay import Replay
 from tests.docs.pages import ROOT
 from tests.faults.nursery import N_STEPS
 
+pytestmark = pytest.mark.slow
+
 
 def kill(kind, n, folder):
     """Kill n children; return what became of each."""

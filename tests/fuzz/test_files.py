@@ -21,6 +21,8 @@ from fireworld.training.curriculum import load_curriculum
 from tests.city.test_plan_file import CITY
 from tests.fuzz.support import FOLDER, FUZZ, altered, changed, file_of, only_complaints, target
 
+pytestmark = pytest.mark.slow
+
 SCENARIO = (shipped_folder() / "test-1.yaml").read_bytes()
 CURRICULUM = b"""description: two stages
 stages:

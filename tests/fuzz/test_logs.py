@@ -30,6 +30,8 @@ from fireworld.records import DTYPES, STEP_TOPICS
 from tests.fuzz.support import FOLDER, FUZZ, altered, file_of, only_complaints, target
 from tests.recorder import synthetic
 
+pytestmark = pytest.mark.slow
+
 CITY = synthetic.city(n_buildings=4, n_brigades=2, n_civilians=2)
 RECORDS = synthetic.run(3, city_record=CITY)
 GOOD = Path(FOLDER.name) / "good.mcap"

@@ -64,7 +64,7 @@ class TestOwn(PolicyConformance):
 
 class Global:
     def decide(self, observation):
-        return Decision(random.randrange(4))  # noqa: S311 - the fault
+        return Decision(random.randrange(4))
 
 
 class GlobalNumpy:
@@ -132,7 +132,7 @@ class Moody(AlwaysNear):
 
 class GlobalKeeps(AlwaysNear):
     def keeps(self, brigade, last_action, step):
-        return random.random() < 2  # noqa: S311 - the fault
+        return random.random() < 2
 
 
 @pytest.mark.parametrize(

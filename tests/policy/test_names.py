@@ -19,18 +19,6 @@ from fireworld.policy.teams.shipped import team_names
 from fireworld.records import ACTIONS
 
 
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    """An empty current folder; what is imported from it is forgotten again."""
-    known = set(sys.modules)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", sys.path.copy())
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)
-    yield tmp_path
-    for name in set(sys.modules) - known:
-        del sys.modules[name]
-
-
 def test_the_built_in_policies():
     assert list(BUILT_IN) == [*ACTIONS, "each-another", "random", "chief"]
     loaded = {name: find_policy(name) for name in BUILT_IN}

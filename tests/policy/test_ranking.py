@@ -18,7 +18,6 @@ from fireworld.policy.teams.ranking_words import WEIGHTS
 from fireworld.recording.replay import RecordedPolicy
 from fireworld.records import MemoryRecording
 from fireworld.simulation.observer import Observer
-from tests.cli.conftest import fireworld  # noqa: F401 - the fixture that calls the command line
 from tests.kernels.small import burn, make_city, make_world, square
 from tests.simulation.town import begin, play, town_world
 
@@ -108,16 +107,15 @@ def test_the_digest_tells_rankings_apart():
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch):
+def here(here):
     """The current folder, with a file of each kind of ranking."""
-    monkeypatch.chdir(tmp_path)
     for name, own_targets in (("all.npz", True), ("named.npz", False)):
-        make_ranking(own_targets=own_targets).save(tmp_path / name)
-    return tmp_path
+        make_ranking(own_targets=own_targets).save(here / name)
+    return here
 
 
 @pytest.mark.parametrize("name", ["all.npz", "named.npz"])
-def test_a_recording_of_a_ranking_is_replayed_from_itself(here, fireworld, name):  # noqa: F811 - the fixture
+def test_a_recording_of_a_ranking_is_replayed_from_itself(here, fireworld, name):
     run = fireworld("run", "quick", "--policy", name, "--record", "a.mcap", "--json")
     assert (run.code, run.err) == (0, "")
     log = open_log(here / "a.mcap")
@@ -136,7 +134,7 @@ def test_a_recording_of_a_ranking_is_replayed_from_itself(here, fireworld, name)
         assert (first.target_value == first.q_values.reshape(2, 4).max(axis=1)).all()
 
 
-def test_other_weights_are_another_run(here, fireworld):  # noqa: F811 - the fixture
+def test_other_weights_are_another_run(here, fireworld):
     changed = make_ranking()
     changed.weights[0, 0] -= 3.0
     changed.save(here / "other.npz")
@@ -147,7 +145,7 @@ def test_other_weights_are_another_run(here, fireworld):  # noqa: F811 - the fix
     assert digests[0] == digests[2] != digests[1]
 
 
-def test_what_is_written_is_what_was_recorded(here, fireworld):  # noqa: F811 - the fixture
+def test_what_is_written_is_what_was_recorded(here, fireworld):
     """The values of a log are those of the run, bit by bit."""
     fireworld("run", "quick", "--policy", "all.npz", "--record", "a.mcap", "--steps", 9)
     from fireworld.scenario import load_scenario

@@ -26,6 +26,8 @@ from fireworld.errors import LogError, OutputError
 from tests.recorder import synthetic
 from tests.recorder.conftest import write_log
 
+pytestmark = pytest.mark.slow
+
 
 def raw_steps(path):
     return [[(topic, bytes(payload)) for topic, payload in raw] for raw in open_log(path, partial=True).raw_steps()]
@@ -119,7 +121,7 @@ def test_truncation_anywhere_keeps_every_committed_step(tmp_path, small_log):
 
 
 def test_a_flipped_byte_anywhere_is_noticed(checker, small_log):
-    generator = random.Random(5)  # noqa: S311
+    generator = random.Random(5)
     positions = [generator.randrange(len(small_log)) for _ in range(600)]
     # and every byte of the places where the file is held together
     offsets, end = chunk_offsets(small_log)
@@ -138,7 +140,7 @@ def test_a_flipped_byte_anywhere_is_noticed(checker, small_log):
 
 
 def test_several_bytes_changed_inserted_or_lost_are_noticed(checker, small_log):
-    generator = random.Random(6)  # noqa: S311
+    generator = random.Random(6)
     for _ in range(150):
         position, length = generator.randrange(len(small_log)), generator.randrange(1, 40)
         checker.check(small_log[:position] + small_log[position + length :])

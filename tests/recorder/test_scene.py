@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from functools import partial
 
 import numpy as np
 import pytest
@@ -14,8 +13,6 @@ from fireworld_viewer.city_mesh import STOREY_M
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
 from fireworld.recording.pages.foxglove_scene import CITY, FIRE, LOG, POINTS, TEAM
-from tests.cli.conftest import here  # noqa: F401 - a folder of its own
-from tests.command_line import call
 from tests.viewer.rrd import rerun_program
 
 RUN = ("run", "quick", "--steps", 12, "--policy", "easiest", "--json")
@@ -83,12 +80,7 @@ ENUMERATIONS = {
 
 
 @pytest.fixture
-def fireworld(monkeypatch):
-    return partial(call, monkeypatch)
-
-
-@pytest.fixture
-def log(here, fireworld):  # noqa: F811
+def log(here, fireworld):
     assert fireworld(*RUN, "--record", "a.mcap", "--scene", "foxglove").code == 0
     return open_log("a.mcap")
 
@@ -239,7 +231,7 @@ def test_every_event_is_a_line(log):
     assert sum(map(len, messages_of(log, LOG))) > 0
 
 
-def test_the_digest_does_not_know_of_scenes(here, fireworld, log):  # noqa: F811
+def test_the_digest_does_not_know_of_scenes(here, fireworld, log):
     plain = json.loads(fireworld(*RUN, "--record", "plain.mcap").out)
     assert log.digest == plain["digest"]
     assert (log.state, log.damage) == ("complete", None)
@@ -258,7 +250,7 @@ def topics_of_events(log):
     return sum(len(record.events.kind) for record in log)
 
 
-def test_recover_keeps_the_scene_of_the_good_steps(here, fireworld, log):  # noqa: F811
+def test_recover_keeps_the_scene_of_the_good_steps(here, fireworld, log):
     whole = (here / "a.mcap").read_bytes()
     (here / "cut.mcap").write_bytes(whole[: len(whole) // 2])
     done = fireworld("recover", "cut.mcap", "-o", "b.mcap")
@@ -274,12 +266,12 @@ def test_recover_keeps_the_scene_of_the_good_steps(here, fireworld, log):  # noq
     ]
 
 
-def test_the_same_run_gives_the_same_bytes(here, fireworld, log):  # noqa: F811
+def test_the_same_run_gives_the_same_bytes(here, fireworld, log):
     assert fireworld(*RUN, "--record", "b.mcap", "--scene", "foxglove").code == 0
     assert (here / "a.mcap").read_bytes() == (here / "b.mcap").read_bytes()
 
 
-def test_a_changed_scene_is_damage(here, log):  # noqa: F811
+def test_a_changed_scene_is_damage(here, log):
     """The chain does not hold the scene; the checksums of the file do."""
     content = bytearray((here / "a.mcap").read_bytes())
     content[len(content) // 2] ^= 1
@@ -287,7 +279,7 @@ def test_a_changed_scene_is_damage(here, log):  # noqa: F811
     assert open_log("b.mcap", partial=True).state == "damaged"
 
 
-def test_rerun_draws_the_points_and_the_log(here, log):  # noqa: F811
+def test_rerun_draws_the_points_and_the_log(here, log):
     from rerun.chunk import RrdReader
 
     done = rerun_program("mcap", "convert", "a.mcap", "-o", "a.rrd", "--include-topic-regex", "^/scene/")
@@ -319,7 +311,7 @@ def test_rerun_draws_the_points_and_the_log(here, log):  # noqa: F811
         (("--scene", "gazebo", "--record", "a.mcap"), "'gazebo' is not 'foxglove'"),
     ],
 )
-def test_wrong_words(here, fireworld, words, message):  # noqa: F811
+def test_wrong_words(here, fireworld, words, message):
     done = fireworld("run", "quick", *words)
     assert (done.code, done.out) == (2, "")
     assert message in done.err

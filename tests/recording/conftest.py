@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import signal
 import sys
-from functools import partial
 
 import pytest
 from fireworld_recorder.reader import open_log
@@ -93,20 +92,12 @@ def two_fires(recordings):
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch, recordings, two_fires):
-    """An empty folder to work in, beside which the recordings lie; what is imported from it is forgotten again."""
-    take_folder(tmp_path, monkeypatch)
+def here(here, recordings, two_fires):
+    """The current folder, with own_policies.py and the recordings in it."""
+    (here / "own_policies.py").write_text(POLICIES)
     for path in (*recordings.glob("*.mcap"), *recordings.glob("town.*")):
-        (tmp_path / path.name).symlink_to(path)
-    yield tmp_path
-    sys.modules.pop("own_policies", None)
-
-
-@pytest.fixture
-def fireworld(monkeypatch):
-    """Call the command line in this process."""
-    monkeypatch.setenv("COLUMNS", "120")
-    return partial(command_line.call, monkeypatch)
+        (here / path.name).symlink_to(path)
+    return here
 
 
 @pytest.fixture

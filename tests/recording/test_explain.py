@@ -22,6 +22,8 @@ from fireworld.recording.replay import build_recorded
 from fireworld.records import ACTION_NAMES, ACTIONS
 from tests import command_line
 
+pytestmark = pytest.mark.slow
+
 EARLY, LATE, BAD = (DecisionSpan(0, 1, 8, 3, (0,)), DecisionSpan(1, 5, 5, 1, (0,)), DecisionSpan(1, 9, 10, 2, (0,)))
 
 

@@ -33,6 +33,7 @@ def one_deciding(log, *, after):
     raise AssertionError
 
 
+@pytest.mark.slow
 def test_without_a_change_the_fork_is_the_run_wherever_it_is_forked(recordings):
     """At every snapshot and at 20 other steps: the same records, so the same digest."""
     log = open_log(recordings / "random.mcap")

@@ -25,6 +25,8 @@ from fireworld.simulation.built import build_scenario
 from fireworld.simulation.world import World
 from tests.reference import episode, luck, sites, team
 
+pytestmark = pytest.mark.slow
+
 RANDOM = np.random.default_rng(5)
 POLICIES = {
     "easiest": always(0),

@@ -10,6 +10,8 @@ import pytest
 
 from tests.simulation.golden import RUNS, digest_of, golden
 
+pytestmark = pytest.mark.slow
+
 SAY_DIGESTS = (
     "from tests.simulation.golden import RUNS, digest_of\nfor run in RUNS.values():\n    print(digest_of(*run))\n"
 )

@@ -7,7 +7,6 @@ import pytest
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import load_curriculum
 from fireworld.training.methods.sarsa import Sarsa
-from tests.cli.conftest import fireworld  # noqa: F401 - the fixture that calls the command line
 
 TINY = """
 stages:
@@ -27,11 +26,10 @@ SHORT_WORDS = ("--set", "n_episodes_max=6", "--set", "n_episodes_unchanged=3")
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch):
-    """The current folder, empty but for tiny.yaml."""
-    (tmp_path / "tiny.yaml").write_text(TINY)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+def here(here):
+    """The current folder, with tiny.yaml in it."""
+    (here / "tiny.yaml").write_text(TINY)
+    return here
 
 
 @pytest.fixture

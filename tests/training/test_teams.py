@@ -46,6 +46,7 @@ def whole(make_training):
     return training
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stops", [(1,), (4, 1, 9), (7, 8)])
 def test_resumed_bit_for_bit(make_training, whole, here, stops):
     n_done = 0
@@ -73,6 +74,7 @@ def test_the_log_has_a_line_for_every_episode(whole, make_trainer):
     assert (row["scenario"], row["episode"], row["epsilon"], row["converged"]) == ("alone-1", "0", "1.0", "False")
 
 
+@pytest.mark.slow
 def test_several_at_a_time_are_those_one_by_one(make_training, whole, here):
     trainings = [make_training(f"t-{k}.npz", seed=k) for k in (1, 2, 3)]
     train_all(trainings, jobs=2)

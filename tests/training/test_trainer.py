@@ -132,6 +132,7 @@ print(trainer.team().digest)
 """
 
 
+@pytest.mark.slow
 def test_the_same_tables_in_every_process(make_trainer, here):
     trainer = make_trainer(5)
     list(trainer)

@@ -21,6 +21,8 @@ from fireworld.errors import OutputError, ViewError
 from tests.viewer import rrd
 from tests.viewer.conftest import make_recording
 
+pytestmark = pytest.mark.slow
+
 
 def test_rerun_verifies_what_is_saved(small, slower, tmp_path: Path):
     app.save([small], tmp_path / "one.rrd", focus=[100])

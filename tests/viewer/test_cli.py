@@ -175,6 +175,7 @@ assert not heavy, heavy
     assert "Open one recording in Rerun" in done.stdout
 
 
+@pytest.mark.slow
 def test_saving_never_imports_the_simulator():
     program = """
 import sys, tempfile

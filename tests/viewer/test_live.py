@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-from functools import partial
 from pathlib import Path
 from threading import Event
 
@@ -19,8 +18,6 @@ from fireworld_viewer.rerun_view.live_sender import BackgroundSender
 from fireworld.errors import ViewError
 from fireworld.policy.teams.ranking_words import OF_BRIGADE, OF_BUILDING, OF_TEAM, WEIGHTS
 from fireworld.policy.teams.team import load_team
-from tests.cli.conftest import here  # noqa: F401 - a folder with policies in it
-from tests.command_line import call
 from tests.training.conftest import SHORT_WORDS, TINY
 from tests.viewer import rrd
 
@@ -28,11 +25,6 @@ SHORT = ("run", "quick", "--steps", 9, "--json")
 TRAIN = ("train", "tiny.yaml", *SHORT_WORDS, "--stages", "alone", "-o")
 DYING = (sys.executable, "-S", "-c", "import os; os.read(0, 1)")
 NOTE = "view: the viewer is closed; the run continues without it\n"
-
-
-@pytest.fixture
-def fireworld(monkeypatch):
-    return partial(call, monkeypatch)
 
 
 @pytest.fixture
@@ -161,7 +153,7 @@ def test_step_by_step_shows_what_a_recording_shows(small, tmp_path: Path):
     assert texts[0] == texts[1] != []
 
 
-def test_a_watched_run_is_the_same_run(here, fireworld, window):  # noqa: F811
+def test_a_watched_run_is_the_same_run(here, fireworld, window):
     alone = json.loads(fireworld(*SHORT, "--record", "alone.mcap").out)
     done = fireworld(*SHORT, "--record", "seen.mcap", "--view")
     assert (done.code, done.err) == (0, "")
@@ -174,7 +166,7 @@ def test_a_watched_run_is_the_same_run(here, fireworld, window):  # noqa: F811
     assert sorted(step for step, _ in scores) == sorted([*range(10)])
 
 
-def test_a_viewer_closed_in_mid_run(here, fireworld, monkeypatch):  # noqa: F811
+def test_a_viewer_closed_in_mid_run(here, fireworld, monkeypatch):
     alone = json.loads(fireworld(*SHORT).out)
     monkeypatch.setattr(live, "own_window", lambda: live.Screen(DYING, stays=True))
     done = fireworld(*SHORT, "--view", "--record", "a.mcap")
@@ -194,7 +186,7 @@ class Killer:
 """
 
 
-def test_a_server_that_dies_in_mid_run(here, fireworld, monkeypatch):  # noqa: F811
+def test_a_server_that_dies_in_mid_run(here, fireworld, monkeypatch):
     (here / "killing.py").write_text(KILLER)
     port = app.free_port()
     words = [str(app.viewer_executable()), "--serve-grpc", "--bind", app.LOCALHOST, "--port", str(port)]
@@ -238,7 +230,7 @@ def until_it_listens(url: str) -> None:
     ],
 )
 @pytest.mark.parametrize("command", [("run", "quick", "--record", "a.mcap"), ("train", "-o", "a.npz")])
-def test_no_view_no_run(here, fireworld, monkeypatch, command, words, message):  # noqa: F811
+def test_no_view_no_run(here, fireworld, monkeypatch, command, words, message):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     done = fireworld(*command, *words)
@@ -247,7 +239,7 @@ def test_no_view_no_run(here, fireworld, monkeypatch, command, words, message): 
     assert [path.name for path in here.iterdir() if path.suffix != ".py"] == []
 
 
-def test_without_rerun(here, fireworld, monkeypatch):  # noqa: F811
+def test_without_rerun(here, fireworld, monkeypatch):
     monkeypatch.setitem(sys.modules, "rerun", None)
     done = fireworld(*SHORT, "--view")
     assert done.code == 2
@@ -255,13 +247,13 @@ def test_without_rerun(here, fireworld, monkeypatch):  # noqa: F811
 
 
 @pytest.mark.parametrize("words", [("run", "quick"), ("train", "-o", "a.npz")])
-def test_both_at_once(here, fireworld, words):  # noqa: F811
+def test_both_at_once(here, fireworld, words):
     done = fireworld(*words, "--view", "--view-url", "rerun+http://127.0.0.1:9876/proxy")
     assert done.code == 2
     assert "--view and --view-url exclude each other." in done.err
 
 
-def test_a_watched_training_is_the_same_training(here, fireworld, window):  # noqa: F811
+def test_a_watched_training_is_the_same_training(here, fireworld, window):
     (here / "tiny.yaml").write_text(TINY)
     assert fireworld(*TRAIN, "alone.npz").code == 0
     done = fireworld(*TRAIN, "seen.npz", "--log", "seen.csv", "--view")
@@ -282,7 +274,7 @@ SEARCH_FIGURES = ("n_generations=3", "n_candidates=4", "n_best=2", "n_fires=2", 
 SEARCH = ("train", "tiny.yaml", "--method", "search", *(word for one in SEARCH_FIGURES for word in ("--set", one)))
 
 
-def test_a_watched_search_is_the_same_search(here, fireworld, window):  # noqa: F811
+def test_a_watched_search_is_the_same_search(here, fireworld, window):
     (here / "tiny.yaml").write_text(TINY)
     alone = fireworld(*SEARCH, "-o", "alone.npz")
     assert alone.code == 0
@@ -317,7 +309,7 @@ def weights_drawn(seen: dict[str, rrd.Rows], *, seed: int) -> dict[str, float]:
     return {drawn[path]["SeriesLines:names"][0][1].as_py()[0]: row.as_py()[0] for path, (_, row) in lasts.items()}
 
 
-def test_only_weights_that_are_searched_for_are_drawn(here, fireworld, window):  # noqa: F811
+def test_only_weights_that_are_searched_for_are_drawn(here, fireworld, window):
     (here / "tiny.yaml").write_text(TINY)
     words = ("--set", "cooperation=false", "--set", "own_targets=false", "--repetitions", 2)
     assert fireworld(*SEARCH, *words, "-o", "seen.npz", "--view").code == 0
@@ -333,7 +325,7 @@ def test_only_weights_that_are_searched_for_are_drawn(here, fireworld, window): 
         assert ("**nearest-to-me**" in last, "**others_here**" in last) == (True, False)
 
 
-def test_a_viewer_closed_in_mid_search(here, fireworld, monkeypatch):  # noqa: F811
+def test_a_viewer_closed_in_mid_search(here, fireworld, monkeypatch):
     (here / "tiny.yaml").write_text(TINY)
     assert fireworld(*SEARCH, "-o", "alone.npz").code == 0
     monkeypatch.setattr(live, "own_window", lambda: live.Screen(DYING, stays=True))

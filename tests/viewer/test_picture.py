@@ -16,10 +16,13 @@ from tests.viewer.conftest import make_recording
 from tests.viewer.headless import has_driver, headless, loaded, opened, picture
 from tests.viewer.pixels import n_near, part
 
-pytestmark = pytest.mark.skipif(
-    not has_driver(),
-    reason="no Vulkan driver here; on Debian: apt-get install mesa-vulkan-drivers libvulkan1",
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        not has_driver(),
+        reason="no Vulkan driver here; on Debian: apt-get install mesa-vulkan-drivers libvulkan1",
+    ),
+]
 
 
 @pytest.fixture

@@ -15,6 +15,8 @@ from fireworld_viewer.rerun_view.plots import COUNTS, REWARDS, SCORES
 from tests import command_line
 from tests.viewer import rrd
 
+pytestmark = pytest.mark.slow
+
 GOLDEN = Path(__file__).parents[2] / "recordings" / "golden"
 
 

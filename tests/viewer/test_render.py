@@ -19,6 +19,8 @@ from tests import command_line
 from tests.viewer.conftest import make_recording
 from tests.viewer.recorded import write_log
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory, small, slower):

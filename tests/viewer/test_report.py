@@ -19,16 +19,15 @@ from fireworld_viewer.story.counts import OwnTarget, count_choices
 
 from fireworld.cli import root
 from fireworld.records import ACTION_NAMES, MemoryRecording
-from tests import command_line
 from tests.viewer.conftest import make_recording
 from tests.viewer.recorded import write_log
 
+pytestmark = pytest.mark.slow
 
-@pytest.fixture
-def fireworld(monkeypatch, tmp_path):
-    """Call the command line in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-    return lambda *words: command_line.call(monkeypatch, *words)
+
+@pytest.fixture(autouse=True)
+def _in_a_folder(here):
+    """Every page is made in a folder of its own."""
 
 
 @pytest.fixture

@@ -23,9 +23,12 @@ from tests.viewer.pixels import n_near, part
 PATIENCE_SECONDS = 120.0
 """Drawing by software takes long where others compute too."""
 
-pytestmark = pytest.mark.skipif(
-    executable() is None, reason="no browser here; on Debian: apt-get install chromium chromium-driver"
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        executable() is None, reason="no browser here; on Debian: apt-get install chromium chromium-driver"
+    ),
+]
 
 
 @pytest.fixture

@@ -26,15 +26,10 @@ class Policy:
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch):
-    """The current folder, empty but for mine.py; what is imported from it is forgotten again."""
-    (tmp_path / "mine.py").write_text(POLICY)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", sys.path.copy())
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)
-    sys.modules.pop("mine", None)
-    yield tmp_path
-    sys.modules.pop("mine", None)
+def here(here):
+    """The current folder, with mine.py in it."""
+    (here / "mine.py").write_text(POLICY)
+    return here
 
 
 @pytest.fixture

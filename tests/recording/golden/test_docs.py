@@ -12,6 +12,8 @@ import yaml
 from tests import command_line
 from tests.docs.pages import ROOT, fenced
 
+pytestmark = pytest.mark.slow
+
 PAGE = ROOT / "docs" / "ci.md"
 POLICY, TESTS = fenced(PAGE, "python")
 (SCRIPT,) = fenced(PAGE, "sh")

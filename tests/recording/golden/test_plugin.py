@@ -14,6 +14,8 @@ from fireworld.recording.golden.spec import GoldenSpec, prepare_golden, spec_of
 from fireworld.recording.golden.store import store_golden
 from tests.recording.golden.conftest import POLICY
 
+pytestmark = pytest.mark.slow
+
 UPDATE = "--fireworld-update"
 ONE = """
 def test_policy(recording):

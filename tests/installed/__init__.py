@@ -1,0 +1,1 @@
+"""fireworld as it is installed: what a wheel holds, what names it takes, what importing it costs."""
