@@ -1,6 +1,6 @@
 """The trained teams that come with fireworld: train them again by the documented commands, and compare or replace them.
 
-`python -m benchmarks.shipped` trains each anew, a minute on two cores, and says whether it is the shipped one;
+`python -m benchmarks.shipped` trains each anew, a minute on two cores, and prints whether it is the shipped one;
 `--write` puts what was trained in its place.
 """
 
@@ -44,7 +44,7 @@ def train_all(folder: Path) -> dict[str, Team]:
 
 
 def same(team: Team, other: Team) -> bool:
-    """Tell whether two teams have learned the same from the same; the version of fireworld may be another."""
+    """Return whether two teams have learned the same from the same; the version of fireworld may be another."""
     origins = [{**one.provenance, "fireworld": ""} for one in (team, other)]
     if isinstance(team, TableTeam) and isinstance(other, TableTeam) and (team.visits != other.visits).any():
         return False
@@ -55,7 +55,7 @@ def same(team: Team, other: Team) -> bool:
 @click.option("--write", is_flag=True, help="Replace the shipped teams by those trained now, where they differ.")
 @click.pass_context
 def main(context: click.Context, *, write: bool) -> None:
-    """Train the shipped teams again; exit code 1 if one comes out otherwise."""
+    """Train the shipped teams again; exit code 1 if one comes out differently."""
     n_others = 0
     with TemporaryDirectory() as folder:
         for name, team in train_all(Path(folder)).items():

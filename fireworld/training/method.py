@@ -227,7 +227,7 @@ class Trainer(ABC, Generic[AMethod, AReport]):
         """Return what is drawn of the last report: by plot, then by curve; "" is a plot's only curve."""
 
     def page(self) -> str:
-        """Return what there is to say of the team as it is now, in Markdown, to be read beside its own plots."""
+        """Return a text about the team as it is now, in Markdown, to be read beside its own plots."""
         return ""
 
     def play(self, report: AReport) -> Play | None:

@@ -24,7 +24,7 @@ def make_ranking(*rows, own_targets=True):
 
 
 def test_every_weight_has_words_for_both_signs():
-    words = [text for weight in WEIGHTS for text in (weight.more, weight.less)]
+    words = [text for weight in WEIGHTS for text in (weight.above, weight.below)]
     assert len(set(words)) == 2 * len(NAMES)
 
 

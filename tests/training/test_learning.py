@@ -7,6 +7,7 @@ import pytest
 
 from fireworld.kernels import learning
 from fireworld.kernels.learning import choose_and_learn, forget, go_on_and_learn, take_reward, update, value_of
+from fireworld.policy.asking import complete
 from fireworld.policy.kernel import from_tables
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import build_scenario
@@ -199,7 +200,7 @@ def test_the_compiled_episode_learns_as_the_textbook(seed, n_steps_max, terminat
     else:  # the choices that would come next
         world.step_number += 1
         world._look()
-        world._decide(textbook)
+        world._decide(complete(textbook))
     np.testing.assert_array_equal(learner.tables, textbook.tables)
     assert learner.visits.sum() > 40
     assert n_refilling > 5

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 
 import numpy as np
 import pytest
@@ -56,6 +57,18 @@ def test_by_its_name(name):
     assert named.name == name
     assert named.attachments == {"policy.npz": team_path(name).read_bytes()}
     assert named.digest == find_policy(str(team_path(name))).digest
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_it_shows_itself(name):
+    team = load_team(name)
+    kind, what = ("RankingTeam", "own targets") if name == "best" else ("TableTeam", "states")
+    assert repr(team).startswith(f"<{kind}: ")
+    assert what in repr(team)
+    assert repr(team).endswith(f"digest {team.digest[:12]}>")
+    assert team._repr_html_().count("<table>") == 1
+    assert team.digest in team._repr_html_()
+    assert pickle.loads(pickle.dumps(team)).policy().digest == team.policy().digest  # noqa: S301 - our own
 
 
 def test_run_and_recorded(here, fireworld):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import zipfile
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 import pytest
@@ -88,8 +89,12 @@ def test_one_that_fails_stops_the_others_gently(make_training, here):
         make_training(f"t-{k}.npz", seed=k, n_episodes_unchanged="1000", n_episodes_max="2000") for k in (1, 2)
     ]
 
+    both_train = Event()
+
     def report(training, episode):
-        if training is trainings[0] and episode.episode == 3:
+        if training is trainings[1]:
+            both_train.set()
+        elif both_train.is_set():
             raise OutputError("disk full")
 
     with pytest.raises(OutputError, match="disk full"):

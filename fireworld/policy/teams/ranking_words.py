@@ -20,9 +20,9 @@ class Weight(NamedTuple):
     name: str
     meaning: str
     """With the unit in which it is counted."""
-    more: str
+    above: str
     """What a weight above 0 comes to."""
-    less: str
+    below: str
     """What a weight below 0 comes to."""
 
 
@@ -123,7 +123,7 @@ class Preference:
     @property
     def words(self) -> str:
         """What the brigade does because of it."""
-        return self.weight.more if self.value > 0 else self.weight.less
+        return self.weight.above if self.value > 0 else self.weight.below
 
     def as_dict(self) -> dict[str, Any]:
         """Return the preference as plain values."""
@@ -182,7 +182,7 @@ class RankingDifference(TeamDifference):
 
     @property
     def same_actions(self) -> bool:
-        """Raise TrainingError: a ranking tells no actions from values."""
+        """Raise TrainingError: a ranking has no actions beside its values."""
         raise TrainingError(expected("--actions-only", "", "two teams with tables of actions", "two rankings"))
 
     def describe(self, *, limit: int = SHOWN_MAX) -> Iterator[Block]:

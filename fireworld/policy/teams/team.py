@@ -64,7 +64,7 @@ class Team(Shown):
         """Return what the file holds, by name."""
 
     def header(self) -> dict[str, Any]:
-        """Return what the file's header says besides kind and provenance, as plain values."""
+        """Return what the file's header holds besides kind and provenance, as plain values."""
         return {}
 
     @classmethod
@@ -106,13 +106,13 @@ class Team(Shown):
 
     @property
     def choices(self) -> str:
-        """The scenario's `choices` that the brigades were trained with; empty if the file does not say."""
+        """The scenario's `choices` that the brigades were trained with; empty if unknown."""
         found = self._method.get("choices")
         return str(found) if found in ("in-turn", "simultaneous") else ""
 
     @property
     def origin(self) -> list[str]:
-        """Where the team comes from, in lines, as far as its file says."""
+        """Where the team comes from, in lines, as far as it is known."""
         curriculum = self.provenance.get("curriculum")
         lines = []
         if isinstance(curriculum, dict):
@@ -164,7 +164,7 @@ class TeamDifference(Shown):
 
     @property
     def same_actions(self) -> bool:
-        """Whether they do the same, where the kind tells actions from values.
+        """Whether they do the same, where the kind has actions beside values.
 
         Raises:
             TrainingError: it does not.
@@ -193,10 +193,10 @@ def compare_teams(a: Team, b: Team, *, names: tuple[str, str] = ("A", "B")) -> T
 
 
 def no_states(what: str, states: Sequence[str]) -> None:
-    """Refuse to explain states of a kind of team that has none.
+    """Check that no states are asked for, of a kind of team that has none.
 
     Raises:
-        PolicyError: some are named.
+        PolicyError: some are.
     """
     if states:
         raise PolicyError(expected("STATE", "", f"none: {what} has no states", states[0]))
