@@ -98,7 +98,8 @@ def test_a_comparison_shows_itself(tmp_path):
     assert head.split() == ["A", "B", "B", "-", "A", "P", "B", "is"]
     assert (set(line), scenario) == ({"-"}, "quick")
     assert [row.startswith(f" {metric.label} ") for row, metric in zip(rows, METRICS, strict=False)] == [True] * 4
-    assert rows[-1] == found.sentence
+    assert rows[-1] == found.notes[-1]
+    assert found.sentence.startswith("nearest-to-civilian against nearest-to-me: score ")
     page = found._repr_html_()
     assert page.count("<tr>") == 1 + 4
     assert 'class="mark ' in page
