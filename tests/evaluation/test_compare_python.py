@@ -47,12 +47,17 @@ def without_source():
     return space["Bare"]
 
 
-@pytest.mark.parametrize("policy", [Near, Near()])
-def test_a_class_and_an_object_are_made_anew_for_every_run(policy):
+def near(observation):
+    return Decision(Action.NEAREST_TO_ME)
+
+
+@pytest.mark.parametrize("policy", [Near, Near(), near, lambda seen: "nearest-to-me", f"{__name__}:Near"])
+def test_classes_objects_and_functions_are_made_anew_for_every_run(policy):
     found = compare(["nearest-to-me", policy], seeds=6, **QUICK)
     assert [pairing.n_differing for pairing in found.pairings] == [0] * 8
     assert not found.same_policy
-    assert found.policies[1].name.endswith("Near")
+    assert "nearest-to-me against" not in found.sentence
+    assert found.policies[1].digest
 
 
 def test_results_do_not_depend_on_the_executor(tmp_path):
