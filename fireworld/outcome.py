@@ -81,7 +81,7 @@ def outcome_of(record: StepRecord, city: CityRecord) -> Outcome:
 
 @dataclass(frozen=True, kw_only=True)
 class Quantity:
-    """One thing that is said of how a run came out."""
+    """One part of how a run came out."""
 
     name: str
     """Attribute of `Outcome`, and key in JSON."""
@@ -92,7 +92,7 @@ class Quantity:
     higher_is_better: bool | None
     """None: neither is better by itself."""
     text: Callable[[Outcome], str]
-    """Write it for people, with its unit."""
+    """Returns it as text, with its unit."""
     field: str = ""
     """Where a log has it step by step, as in "score.n_burnt_out"; empty if it only follows from other fields."""
 
@@ -174,7 +174,7 @@ QUANTITIES: Final = (
         field="score.water_used_litres",
     ),
 )
-"""What is said of a run, the most important first."""
+"""How a run came out, the most important first."""
 
 
 @dataclass(frozen=True, kw_only=True)

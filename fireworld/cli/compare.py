@@ -122,9 +122,10 @@ def command(
         write_file(junit, comparison.junit())
     if plot is not None:
         comparison.save_figure(plot, force=force)
-    click.echo(json.dumps(comparison.to_dict(gate=gate), indent=2) if as_json else repr(comparison))
-    if gate and not as_json:
-        click.echo(comparison.gate)
+    if as_json:
+        click.echo(json.dumps(comparison.to_dict(gate=gate), indent=2))
+    else:
+        click.echo("\n".join([repr(comparison), comparison.sentence, *([comparison.gate] if gate else [])]))
     context.exit(EXIT_CODES[comparison.judgement] if gate else 0)
 
 

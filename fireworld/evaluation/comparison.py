@@ -207,7 +207,7 @@ class Comparison:
     def __repr__(self) -> str:
         def text(one: Comparison) -> str:
             table = text_table(_HEADS, _text_rows(one), "<>>>><")
-            return "\n".join([_title(one), table, _CAPTION, *one.notes, one.sentence])
+            return "\n".join([_title(one), table, _CAPTION, *one.notes])
 
         return "\n\n".join(map(text, self.each))
 

@@ -47,12 +47,17 @@ def without_source():
     return space["Bare"]
 
 
-@pytest.mark.parametrize("policy", [Near, Near()])
-def test_a_class_and_an_object_are_made_anew_for_every_run(policy):
+def near(observation):
+    return Decision(Action.NEAREST_TO_ME)
+
+
+@pytest.mark.parametrize("policy", [Near, Near(), near, lambda seen: "nearest-to-me", f"{__name__}:Near"])
+def test_classes_objects_and_functions_are_made_anew_for_every_run(policy):
     found = compare(["nearest-to-me", policy], seeds=6, **QUICK)
     assert [pairing.n_differing for pairing in found.pairings] == [0] * 8
     assert not found.same_policy
-    assert found.policies[1].name.endswith("Near")
+    assert "nearest-to-me against" not in found.sentence
+    assert found.policies[1].digest
 
 
 @pytest.mark.slow
@@ -99,7 +104,8 @@ def test_a_comparison_shows_itself(tmp_path):
     assert head.split() == ["A", "B", "B", "-", "A", "P", "B", "is"]
     assert (set(line), scenario) == ({"-"}, "quick")
     assert [row.startswith(f" {metric.label} ") for row, metric in zip(rows, METRICS, strict=False)] == [True] * 4
-    assert rows[-1] == found.sentence
+    assert rows[-1] == found.notes[-1]
+    assert found.sentence.startswith("nearest-to-civilian against nearest-to-me: score ")
     page = found._repr_html_()
     assert page.count("<tr>") == 1 + 4
     assert 'class="mark ' in page
