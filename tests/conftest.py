@@ -34,8 +34,8 @@ pytest_plugins = ["pytester"]
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch):
-    """An empty current folder; what is imported from it is forgotten again."""
+def empty_folder(tmp_path, monkeypatch):
+    """The current folder, an empty one; what is imported from it is forgotten again."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", sys.path.copy())
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
@@ -43,6 +43,12 @@ def here(tmp_path, monkeypatch):
     for name, module in [*sys.modules.items()]:
         if str(tmp_path) in repr(getattr(module, "__spec__", None)):
             del sys.modules[name]
+
+
+@pytest.fixture
+def here(empty_folder):
+    """The current folder; folders of tests put into it what their tests need."""
+    return empty_folder
 
 
 @pytest.fixture

@@ -9,8 +9,8 @@ import zipfile
 from pathlib import Path, PurePosixPath
 
 import pytest
-from fireworld.policy.shipped import team_names
 
+from fireworld.policy.teams.shipped import team_names
 from fireworld.scenario import scenario_names
 from tests.docs.pages import ROOT
 

@@ -9,6 +9,7 @@ from fireworld.kernels import learning
 from fireworld.kernels.learning import choose_and_learn, forget, go_on_and_learn, take_reward, update, value_of
 from fireworld.policy.asking import complete
 from fireworld.policy.kernel import from_tables
+from fireworld.policy.protocol import Policy
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import build_scenario
 from fireworld.simulation.state import fresh_learner
@@ -151,7 +152,7 @@ def test_a_terminated_episode_does_not():
     assert learner.tables[0, learner.state[0], learner.action[0]] == world.state.outcome.reward[4]
 
 
-class Textbook:
+class Textbook(Policy):
     """SARSA as a textbook has it, for brigades that are asked one after another."""
 
     def __init__(self, tables, n_brigades, epsilon):

@@ -26,10 +26,10 @@ class Policy:
 
 
 @pytest.fixture
-def here(here):
+def here(empty_folder):
     """The current folder, with mine.py in it."""
-    (here / "mine.py").write_text(POLICY)
-    return here
+    (empty_folder / "mine.py").write_text(POLICY)
+    return empty_folder
 
 
 @pytest.fixture
