@@ -45,6 +45,8 @@ if TYPE_CHECKING:
     from fireworld.reproduction.reproduce import reproduce as reproduce
     from fireworld.scenario import Scenario as Scenario
     from fireworld.scenario import scenarios as scenarios
+    from fireworld.simulation.session import Session as Session
+    from fireworld.simulation.session import world as world
     from fireworld.training.train import train as train
 
 _ROOMS = {
@@ -60,6 +62,7 @@ _ROOMS = {
     "Reproduction": "reproduction.reproduce",
     "Run": "recording.run",
     "Scenario": "scenario",
+    "Session": "simulation.session",
     "Team": "policy.teams.team",
     "Verification": "recording.verify",
     "compare": "evaluation.compare",
@@ -76,6 +79,7 @@ _ROOMS = {
     "scenarios": "scenario",
     "train": "training.train",
     "verify": "recording.verify",
+    "world": "simulation.session",
 }
 """The module, below fireworld, that each name of the front door lives in."""
 

@@ -15,6 +15,7 @@ from fireworld.kernels.health import harm
 from fireworld.kernels.observation import can_choose, find_target, observe
 from fireworld.kernels.outcome import assess
 from fireworld.kernels.sites import find_sites
+from fireworld.outcome import Outcome
 from fireworld.parameters import Parameters
 from fireworld.policy.asking import ask, complete, keeps
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
@@ -105,6 +106,28 @@ class World:
         return len(self.state.brigades.hp)
 
     @property
+    def outcome(self) -> Outcome:
+        """How the world stands after the last step."""
+        outcome, people = self.state.outcome, self.state.civilians
+        score, score_max, score_now = outcome.score.tolist()
+        n_burning, n_water_damaged, n_burnt_out, n_alive = outcome.counts.tolist()
+        return Outcome(
+            steps=self.step_number,
+            completed=self.terminated,
+            score=score,
+            score_max=score_max,
+            score_now=score_now,
+            n_buildings=self.city.n_buildings,
+            n_burning=n_burning,
+            n_water_damaged=n_water_damaged,
+            n_burnt_out=n_burnt_out,
+            n_civilians=len(people.hp),
+            n_civilians_alive=n_alive,
+            total_reward=float(outcome.reward[5]),
+            water_used_litres=float(outcome.water[0]),
+        )
+
+    @property
     def terminated(self) -> bool:
         """Whether nothing burns any more."""
         return bool(self.state.outcome.counts[0] == 0)
@@ -120,11 +143,33 @@ class World:
         copied.state = copy_world(self.state)
         return copied
 
+    def observe(self) -> tuple[Observation | None, ...]:
+        """Return what each brigade sees before anyone decides in the next step; None of one that will not decide.
+
+        The world stays as it is; the observations have its state in that moment, in arrays of their own.
+        """
+        ahead = self.copy()
+        ahead.step_number += 1
+        ahead._look()  # noqa: SLF001 - a world as this one
+        brigades, sites, features = ahead.state.brigades, ahead.state.sites, np.zeros(8, dtype=np.int64)
+        known, seen = brigades.target.copy(), list[Observation | None]()
+        for brigade in range(self.n_brigades):
+            state = int(observe(brigade, brigades.action, brigades, sites, self.constants.observation, features))
+            decides = can_choose(brigade, brigades, sites)
+            seen.append(ahead._observation(brigade, features, state, known) if decides else None)  # noqa: SLF001
+        return tuple(seen)
+
     def step(self, policy: Policy) -> Choices:
         """Run one step: look, decide one after another, act, burn, hurt, assess."""
         self.step_number += 1
         self._look()
-        choices = self._decide(complete(policy))
+        brigades, before = self.state.brigades, (self.state.brigades.action.copy(), self.state.brigades.target.copy())
+        try:
+            choices = self._decide(complete(policy))
+        except BaseException:  # nothing but the choices has changed: the step can be tried again
+            self.step_number -= 1
+            brigades.action[:], brigades.target[:] = before
+            raise
         self._act()
         self._burn()
         self._hurt()
@@ -208,24 +253,24 @@ class World:
         return int(find_target(brigade, action, arrays.brigades, tables.buildings, arrays.fire, geometry, sites))
 
     def _ask(self, policy: Policy, brigade: int, features: Array, state: int, known: Array) -> Decision:
+        return ask(policy, self._observation(brigade, features, state, known))
+
+    def _observation(self, brigade: int, features: Array, state: int, known: Array) -> Observation:
         seen = [int(feature) for feature in features]
-        return ask(
-            policy,
-            Observation(
-                brigade=brigade,
-                step=self.step_number,
-                seed=self.seed,
-                state_index=state,
-                free_edges=seen[0],
-                distance_from_center=seen[1],
-                distance_from_civilian=seen[2],
-                volume=seen[3],
-                others=(bool(seen[4]), bool(seen[5]), bool(seen[6]), bool(seen[7])),
-                known_targets=known,
-                city=self.city_arrays,
-                world=self.state,
-                constants=self.constants,
-            ),
+        return Observation(
+            brigade=brigade,
+            step=self.step_number,
+            seed=self.seed,
+            state_index=state,
+            free_edges=seen[0],
+            distance_from_center=seen[1],
+            distance_from_civilian=seen[2],
+            volume=seen[3],
+            others=(bool(seen[4]), bool(seen[5]), bool(seen[6]), bool(seen[7])),
+            known_targets=known,
+            city=self.city_arrays,
+            world=self.state,
+            constants=self.constants,
         )
 
     def _act(self) -> None:
