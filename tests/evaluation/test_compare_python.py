@@ -51,7 +51,7 @@ def near(observation):
     return Decision(Action.NEAREST_TO_ME)
 
 
-@pytest.mark.parametrize("policy", [Near, Near(), near, lambda seen: "nearest-to-me", f"{__name__}:Near"])
+@pytest.mark.parametrize("policy", [Near, Near(), near, lambda _: "nearest-to-me", f"{__name__}:Near"])
 def test_classes_objects_and_functions_are_made_anew_for_every_run(policy):
     found = compare(["nearest-to-me", policy], seeds=6, **QUICK)
     assert [pairing.n_differing for pairing in found.pairings] == [0] * 8
