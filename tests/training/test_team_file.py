@@ -23,7 +23,7 @@ def test_written_and_read_again(tmp_path):
     team = make_team(seed=4, method={"commit": 3})
     team.save(tmp_path / "a.npz")
     team.save(tmp_path / "b.npz")
-    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes() == team.to_bytes()
     read = load_team(tmp_path / "a.npz")
     np.testing.assert_array_equal(read.tables, team.tables)
     np.testing.assert_array_equal(read.visits, team.visits)

@@ -7,7 +7,7 @@ import json
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import IO, Any, Final
 
 import numpy as np
 
@@ -34,8 +34,14 @@ def write_arrays(path: Path, header: Mapping[str, Any], arrays: Mapping[str, Arr
         OutputError: the file exists, or cannot be written.
     """
     check_output(path, force=force)
+    with written_beside(path) as partial:
+        pack_arrays(partial, header, arrays)
+
+
+def pack_arrays(place: Path | IO[bytes], header: Mapping[str, Any], arrays: Mapping[str, Array]) -> None:
+    """Write the content of such a file to a path or a binary stream; arguments as for `write_arrays`."""
     text = np.frombuffer(json.dumps(header, sort_keys=True).encode(), dtype=np.uint8)
-    with written_beside(path) as partial, zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(place, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, array in {"header": text, **arrays}.items():
             with archive.open(_entry(name), "w", force_zip64=True) as file:
                 np.lib.format.write_array(file, array, allow_pickle=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import io
 import pkgutil
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,7 +14,7 @@ from typing import Any, ClassVar, Final, Self
 from fireworld.errors import PolicyError, TrainingError, expected
 from fireworld.kernels.arrays import Array
 from fireworld.policy.kernel import KernelPolicy
-from fireworld.policy.teams.npz import SUFFIX, parse_arrays, read_bytes, write_arrays
+from fireworld.policy.teams.npz import SUFFIX, pack_arrays, parse_arrays, read_bytes, write_arrays
 from fireworld.policy.teams.shipped import team_names, team_path
 from fireworld.policy.teams.shown import SHOWN_MAX, Block, Shown
 
@@ -144,6 +145,12 @@ class Team(Shown):
         """
         write_team(self, Path(path), force=force)
 
+    def to_bytes(self) -> bytes:
+        """Return the content of the team file."""
+        stream = io.BytesIO()
+        pack_arrays(stream, _header(self), self.arrays())
+        return stream.getvalue()
+
     def __repr__(self) -> str:
         origin = self.origin[:1] if isinstance(self.provenance.get("curriculum"), dict) else []
         return f"<{type(self).__name__}: {', '.join([self.summary, *origin])}, digest {self.digest[:12]}>"
@@ -252,8 +259,7 @@ def write_team(team: Team, path: Path, *, force: bool = False, extra: Mapping[st
         force: replace an existing file.
         extra: more arrays by name, as a checkpoint has.
     """
-    header = {"format": FORMAT, "kind": team.kind, "provenance": team.provenance, **team.header()}
-    write_arrays(path, header, {**team.arrays(), **(extra or {})}, force=force)
+    write_arrays(path, _header(team), {**team.arrays(), **(extra or {})}, force=force)
 
 
 def kinds() -> Mapping[str, type[Team]]:
@@ -263,6 +269,10 @@ def kinds() -> Mapping[str, type[Team]]:
         if module.name.endswith("_team"):
             importlib.import_module(f"{package}.{module.name}")
     return KINDS
+
+
+def _header(team: Team) -> dict[str, Any]:
+    return {"format": FORMAT, "kind": team.kind, "provenance": team.provenance, **team.header()}
 
 
 def _parse(content: bytes, *, source: str) -> tuple[Team, dict[str, Array]]:
