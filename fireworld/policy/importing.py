@@ -15,8 +15,8 @@ from types import CodeType, FunctionType, ModuleType
 from typing import Any, Final
 
 from fireworld.errors import PolicyError, expected
-from fireworld.policy.arguments import Parameters, check_no_parameters, check_signature, takes
 from fireworld.policy.asking import complete, users_code
+from fireworld.policy.parameter_text import Parameters, check_no_parameters, check_signature, takes
 from fireworld.policy.protocol import Policy
 
 CODE_SUFFIX: Final = ".py"

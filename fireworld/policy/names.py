@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import pickle
 import re
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import partial
@@ -13,7 +15,12 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from fireworld.errors import PolicyError, expected
-from fireworld.policy.arguments import (
+from fireworld.policy.asking import complete, name_of
+from fireworld.policy.chief import chief
+from fireworld.policy.identity import can_be_imported, covering, digest_of, digest_of_module
+from fireworld.policy.importing import CODE_SUFFIX, find_in, import_source, make_policy
+from fireworld.policy.kernel import KernelPolicy, always, at_random, each_another
+from fireworld.policy.parameter_text import (
     Parameters,
     check_no_parameters,
     check_plain,
@@ -21,11 +28,6 @@ from fireworld.policy.arguments import (
     read_parameters,
     write_parameters,
 )
-from fireworld.policy.asking import complete, name_of
-from fireworld.policy.chief import chief
-from fireworld.policy.identity import can_be_imported, covering, digest_of, digest_of_module
-from fireworld.policy.importing import CODE_SUFFIX, find_in, import_source, make_policy
-from fireworld.policy.kernel import KernelPolicy, always, at_random, each_another
 from fireworld.policy.protocol import Policy
 from fireworld.policy.teams.npz import SUFFIX, read_bytes
 from fireworld.policy.teams.shipped import team_names, team_path
@@ -99,8 +101,13 @@ class NamedPolicy:
 
     @property
     def can_be_found_again(self) -> bool:
-        """Whether another process finds the same policy: one with a name, or whose class or function is in a module."""
-        return isinstance(self.given, str) or can_be_imported(self.policy if self.given is None else self.given)
+        """Whether other processes find the same policy: by its name, or by importing its class and unpickling it."""
+        if isinstance(self.given, str):
+            return True
+        found = self.policy if self.given is None else self.given
+        with suppress(Exception):
+            return can_be_imported(found) and bool(pickle.dumps(found))
+        return False
 
     def fresh(self) -> Policy:
         """Return the policy for another run: made anew, unless an object was given."""
@@ -111,19 +118,17 @@ class NamedPolicy:
         """Return the identity; raise PolicyError if there is none.
 
         Args:
-            purpose: what it is for: what the message begins with, as in "--results".
+            purpose: what it is for: what the message begins with, as in "results".
         """
         if not self.identity:
-            wanted = "a policy whose source can be read, and whose values are plain"
-            hint = "write it into a file, or give it an attribute `digest`: a text that changes with what it does"
-            raise PolicyError(expected(purpose, self.name, wanted, "another", hint))
+            wanted = "a policy whose source is in a file and whose values are plain, or with an attribute `digest`"
+            raise PolicyError(expected(purpose, "", wanted, self.name))
         return self.identity
 
     def require_found_again(self, purpose: str) -> None:
         """Raise PolicyError if other processes cannot find the policy; `purpose` as for `require_identity`."""
         if not self.can_be_found_again:
-            wanted, hint = "a policy that other processes can import", "write it into a file"
-            raise PolicyError(expected(purpose, self.name, wanted, "one that only this process has", hint))
+            raise PolicyError(expected(purpose, "", "a policy that other processes can import or unpickle", self.name))
 
     def _found_again(self) -> NamedPolicy:
         return find_policy(self.given, parameters=None if isinstance(self.given, str) else self.parameters)

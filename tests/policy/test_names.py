@@ -334,7 +334,7 @@ def test_policies_are_found_again_by_other_processes():
         named = find_policy(given)
         assert not named.can_be_found_again
         with pytest.raises(
-            PolicyError, match=r"^--jobs: .*: expected a policy that other processes can import, got one"
+            PolicyError, match=r"^--jobs: expected a policy that other processes can import or unpickle, got '.*"
         ):
             named.require_found_again("--jobs")
 
