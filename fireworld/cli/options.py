@@ -8,6 +8,13 @@ from typing import Any, Final, TypeVar
 
 import click
 
+from fireworld.policy.teams.shipped import team_names
+
+POLICY_HELP: Final = (
+    "easiest, nearest-to-civilian, nearest-to-center, nearest-to-me, each-another, random, chief, planner; "
+    f"{', '.join(team_names())} (teams); a team file (TEAM.npz); FILE.py:CLASS or MODULE:CLASS of your own. With "
+    "parameters as in planner:horizon=60,interval=2 or mine.py:Mine:k=3. `fireworld policy list` says what each does."
+)
 SEED_MAX: Final = 2**32 - 1
 Command = TypeVar("Command", bound=Callable[..., Any])
 

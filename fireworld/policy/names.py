@@ -42,13 +42,13 @@ BUILT_IN: Final[dict[str, Callable[[], KernelPolicy]]] = {
 }
 """Rules by name."""
 RULES: Final = {
-    "easiest": "all brigades go for the burning building with the lowest temperature",
-    "nearest-to-civilian": "all brigades go for the burning building nearest to a civilian",
-    "nearest-to-center": "all brigades go for the burning building nearest to the center of the fire site",
-    "nearest-to-me": "every brigade goes for the burning building nearest to itself",
-    "each-another": "brigade 0 always takes the first of these four actions, brigade 1 the second, and so on",
-    "random": "every brigade takes one of the four actions at random, in every step",
-    "chief": "one brigade between the fire and the civilians, the others at the nearest front",
+    "easiest": "goes for the burning building that is coolest",
+    "nearest-to-civilian": "goes for the one nearest to a civilian",
+    "nearest-to-center": "goes for the one nearest to the city's center",
+    "nearest-to-me": "goes for the one nearest to the brigade",
+    "each-another": "brigade b always takes action b modulo 4 of these",
+    "random": "takes one of these actions at random, every step",
+    "chief": "one protects civilians, the others the front",
 }
 """What each rule does."""
 PLANNERS: Final = {"planner": "fireworld.planning.planner:planner"}
@@ -182,14 +182,12 @@ def find_policy(given: object, *, parameters: Parameters | None = None) -> Named
 def policies() -> list[KnownPolicy]:
     """List the policies that come with fireworld."""
     known = [KnownPolicy(name, "rule", doc) for name, doc in RULES.items()]
-    known += [
-        KnownPolicy(name, "planner", "tries out assignments of actions in copies of the world") for name in PLANNERS
-    ]
+    known += [KnownPolicy(name, "planner", "tries out actions in copies of the world") for name in PLANNERS]
     for name in team_names():
         origin = load_team(name).provenance
         method, curriculum = (dict(origin.get(key, {})) for key in ("method", "curriculum"))
         learned = method.get("name") or method.get("rule")
-        known.append(KnownPolicy(name, "team", f"learned by {learned}, with the curriculum {curriculum.get('name')}"))
+        known.append(KnownPolicy(name, "team", f"learned by {learned} on the curriculum {curriculum.get('name')}"))
     return known
 
 
