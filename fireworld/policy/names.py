@@ -8,10 +8,11 @@ import pickle
 import re
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
 
 from fireworld.errors import PolicyError, expected
@@ -31,7 +32,7 @@ from fireworld.policy.parameter_text import (
 from fireworld.policy.protocol import Policy
 from fireworld.policy.teams.npz import SUFFIX, read_bytes
 from fireworld.policy.teams.shipped import team_names, team_path
-from fireworld.policy.teams.team import load_team, parse_team
+from fireworld.policy.teams.team import Team, load_team, parse_team
 from fireworld.records import ACTIONS
 
 BUILT_IN: Final[dict[str, Callable[[], KernelPolicy]]] = {
@@ -152,16 +153,17 @@ def find_policy(given: object, *, parameters: Parameters | None = None) -> Named
         given: the name of a policy or team that comes with fireworld, or a team file; FILE.py:CLASS or MODULE:CLASS,
             without the class where there is only one, and instead of it also a function that returns a policy, a
             function of the observation, or an object; all of these with parameters, as in `mine.py:Mine:k=3,near=true`.
-            Or a class, an object with a method `decide`, or a function of the observation. Or a NamedPolicy.
+            Or a class, an object with a method `decide`, a function of the observation, a team, or a NamedPolicy.
         parameters: plain values that the class or function takes as keywords; more of them, if `given` has some.
 
     Raises:
         PolicyError: there is no such policy, it does not take the parameters, or making it fails.
         TrainingError: a team file that cannot be read or makes no sense.
     """
-    if isinstance(given, NamedPolicy):
-        check_no_parameters(parameters or {}, where=f"policy: {given.name}")
-        return given
+    if isinstance(given, NamedPolicy | Team):
+        named = given if isinstance(given, NamedPolicy) else _named_team(given)
+        check_no_parameters(parameters or {}, where=f"policy: {named.name}")
+        return named
     if isinstance(given, str | Path):
         return _by_name(str(given), parameters or {})
     is_named = inspect.isclass(given) or inspect.isroutine(given)
@@ -189,6 +191,12 @@ def policies() -> list[KnownPolicy]:
         learned = method.get("name") or method.get("rule")
         known.append(KnownPolicy(name, "team", f"learned by {learned} on the curriculum {curriculum.get('name')}"))
     return known
+
+
+def with_file(name: str, changed: Callable[[str], str]) -> str:
+    """Return the name of a policy with another path of its file, if it names one."""
+    file = _FILE.fullmatch(name)
+    return name if file is None else changed(file[1]) + name[len(file[1]) :]
 
 
 def note_on_team(named: NamedPolicy, n_brigades: int, *, choices: str = "") -> str:
@@ -232,7 +240,7 @@ def _by_name(text: str, more: Parameters) -> NamedPolicy:
     name = _with_parameters(text, more)
     if source.endswith(SUFFIX) or (source in team_names() and target is None):
         check_no_parameters(values, where=where)
-        return _team(source)
+        return _team_by_name(source)
     if target is None and source in BUILT_IN | PLANNERS:
         make = BUILT_IN.get(source) or _function(PLANNERS[source])
         check_signature(make, values, where=where)
@@ -273,13 +281,22 @@ def _function(place: str) -> Callable[..., Policy]:
     return function
 
 
-def _team(source: str) -> NamedPolicy:
+def _team_by_name(source: str) -> NamedPolicy:
     """Return the policy of a team; a recording names a file without its folder and takes it along."""
     path, name = (Path(source), Path(source).name) if source.endswith(SUFFIX) else (team_path(source), source)
     content = read_bytes(path)
-    team = parse_team(content, source=str(path))
+    return replace(_named_team(parse_team(content, source=str(path)), content), name=name, given=source)
+
+
+def _named_team(team: Team, content: bytes = b"") -> NamedPolicy:
+    """Return the policy of a team, with its file."""
+    if not content:
+        with TemporaryDirectory() as folder:
+            path = Path(folder) / TEAM_ATTACHMENT
+            team.save(path)
+            content = path.read_bytes()
     policy = team.policy()
-    return NamedPolicy(name, policy.digest, policy, {TEAM_ATTACHMENT: content}, team.choices, given=source)
+    return NamedPolicy("team", policy.digest, policy, {TEAM_ATTACHMENT: content}, team.choices, given=team)
 
 
 def _unknown(name: str) -> PolicyError:
