@@ -19,7 +19,7 @@ SEED_MAX: Final = 2**32 - 1
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 seed_option = click.option(
-    "--seed", default=1, show_default=True, type=click.IntRange(0, SEED_MAX), help="Seed of all luck."
+    "--seed", default=1, show_default=True, type=click.IntRange(0, SEED_MAX), help="Seed of all random draws."
 )
 steps_option = click.option(
     "--steps", type=click.IntRange(min=1), help="Stop after this step.  [default: the scenario's]"

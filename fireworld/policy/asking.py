@@ -106,7 +106,7 @@ def users_code(what: object, moment: str | Observation) -> Iterator[None]:
 
     Args:
         what: a policy, or what the message begins with.
-        moment: when it is called: what the message goes on with.
+        moment: when it is called, which the message says next.
     """
     try:
         yield

@@ -18,7 +18,7 @@ from typing import Any, Final, NamedTuple
 from fireworld.errors import PolicyError, expected
 from fireworld.policy.asking import complete, name_of
 from fireworld.policy.chief import chief
-from fireworld.policy.identity import can_be_imported, covering, digest_of, digest_of_module
+from fireworld.policy.identity import NOTEBOOK, can_be_imported, covering, digest_of, digest_of_module
 from fireworld.policy.importing import CODE_SUFFIX, find_in, import_source, make_policy
 from fireworld.policy.kernel import KernelPolicy, always, at_random, each_another
 from fireworld.policy.parameter_text import (
@@ -110,11 +110,6 @@ class NamedPolicy:
             return can_be_imported(found) and bool(pickle.dumps(found))
         return False
 
-    def fresh(self) -> Policy:
-        """Return the policy for another run: made anew, unless an object was given."""
-        anew = isinstance(self.given, str) or inspect.isclass(self.given)
-        return self._found_again().policy if anew else self.policy
-
     def require_identity(self, purpose: str) -> str:
         """Return the identity; raise PolicyError if there is none.
 
@@ -131,19 +126,16 @@ class NamedPolicy:
         if not self.can_be_found_again:
             raise PolicyError(expected(purpose, "", "a policy that other processes can import or unpickle", self.name))
 
-    def _found_again(self) -> NamedPolicy:
-        return find_policy(self.given, parameters=None if isinstance(self.given, str) else self.parameters)
-
     def __getstate__(self) -> dict[str, Any]:
         """Return what another process finds the policy by."""
-        kept = vars(self)
-        return kept if self.given is None else {"given": self.given, "parameters": self.parameters}
+        return vars(self) if self.given is None else {"given": self.given, "parameters": self.parameters}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Find the policy again."""
-        vars(self).update(state)
         if "name" not in state:
-            vars(self).update(vars(self._found_again()))
+            given, written = state["given"], isinstance(state["given"], str)  # a name says its parameters
+            state = vars(find_policy(given, parameters=None if written else state["parameters"]))
+        vars(self).update(state)
 
 
 def find_policy(given: object, *, parameters: Parameters | None = None) -> NamedPolicy:
@@ -251,7 +243,7 @@ def _by_name(text: str, more: Parameters) -> NamedPolicy:
     module = import_source(source)
     thing = find_in(module, target or "", where=f"--policy: {source}")
     policy = make_policy(thing, values, where=where)
-    digest = covering(digest_of_module(module), values)
+    digest = covering(digest_of(thing) if module.__name__ == NOTEBOOK else digest_of_module(module), values)
     return NamedPolicy(name, digest, policy, part=target or thing.__qualname__, parameters=values, given=name)
 
 

@@ -171,6 +171,7 @@ class A:
         return 1
 
 print(*(find_policy(given).digest for given in (A, A(), lambda seen: "easiest")), sep=",")
+assert find_policy(find_policy(A).name).digest == find_policy(A).digest, "its recordings can be forked here"
 """
 
 
