@@ -117,7 +117,7 @@ class Recorder:
         if not (self._update or path.exists()):
             raise _failure(f"{_shown(path)}: there is no such recording; run with {UPDATE} to store it")
         try:
-            named = None if isinstance(policy, str) else find_policy(policy)
+            named = None if isinstance(policy, str | Path) else find_policy(policy)
             spec = make_spec(
                 path.parent,
                 scenario=scenario,

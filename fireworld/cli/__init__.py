@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 from typing import Final
 
@@ -14,7 +15,7 @@ INTERRUPTED: Final = 130
 COMMANDS: Final = {
     "run": "Run a scenario and record it.",
     "train": "Train a team, or several.",
-    "policy": "Say what a trained team does, or how two differ.",
+    "policy": "List policies; show what a team does, or how two differ.",
     "reproduce": "Repeat the paper: its tables beside ours.",
     "scenarios": "List the scenarios, or draw one.",
     "info": "Show what a recording holds and how far it is good.",
@@ -31,6 +32,7 @@ COMMANDS: Final = {
     "report": "Write a recording, or two, as an HTML page.",
     "conformance": "Check the fire model against traces of another simulator.",
 }
+DEBUG: Final = click.Option(["--debug"], is_flag=True, expose_value=False, help="Show the traceback of an error.")
 
 
 class LazyGroup(click.Group):
@@ -47,8 +49,7 @@ class LazyGroup(click.Group):
         if cmd_name not in COMMANDS:
             return None
         module = importlib.import_module(f"fireworld.cli.{cmd_name}")
-        command: click.Command = module.command
-        return command
+        return _with_debug(module.command)
 
     def invoke(self, ctx: click.Context) -> object:
         """Run a command; one that was interrupted says itself what is left of its work."""
@@ -77,19 +78,43 @@ def root() -> None:
     """Run, record, view and compare teams of fire brigades."""
 
 
+root.params.append(DEBUG)
+
+
 def main() -> None:
-    """Run the command line; a user's mistake ends in one line and exit code 2, Ctrl-C in exit code 130."""
-    from fireworld.errors import FireworldError
+    """Run the command line; an error ends in one line and exit code 2, one of fireworld's own too, Ctrl-C in 130."""
+    from fireworld.errors import FireworldError, described
 
     try:
         code = root.main(standalone_mode=False)
     except FireworldError as error:
-        click.echo(f"fireworld: {error}", err=True)
-        code = USER_ERROR
+        code = _show(error, str(error))
     except click.ClickException as error:
         error.show()
         code = error.exit_code
     except (click.Abort, KeyboardInterrupt):
         click.echo("interrupted", err=True)
         code = INTERRUPTED
+    except Exception as error:  # noqa: BLE001 - a fault of fireworld's own: never the exit code of a verdict
+        code = _show(error, f"internal error: {described(error)}; run it again with --debug")
     sys.exit(code)
+
+
+def _show(error: Exception, line: str) -> int:
+    """Write the line of an error, with --debug also its traceback; return the exit code."""
+    if "--debug" in sys.argv or os.environ.get("FIREWORLD_DEBUG", "0") not in {"", "0"}:
+        import traceback
+
+        traceback.print_exception(error)
+    click.echo(f"fireworld: {line}", err=True)
+    return USER_ERROR
+
+
+def _with_debug(command: click.Command) -> click.Command:
+    """Let a command, and those below it, take --debug."""
+    if DEBUG not in command.params:
+        command.params.append(DEBUG)
+    if isinstance(command, click.Group):
+        for below in command.commands.values():
+            _with_debug(below)
+    return command

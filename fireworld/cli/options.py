@@ -8,11 +8,18 @@ from typing import Any, Final, TypeVar
 
 import click
 
+from fireworld.policy.teams.shipped import team_names
+
+POLICY_HELP: Final = (
+    "easiest, nearest-to-civilian, nearest-to-center, nearest-to-me, each-another, random, chief, planner; "
+    f"{', '.join(team_names())} (teams); a team file (TEAM.npz); FILE.py:CLASS or MODULE:CLASS of your own. With "
+    "parameters as in planner:horizon=60,interval=2 or mine.py:Mine:k=3. `fireworld policy list` says what each does."
+)
 SEED_MAX: Final = 2**32 - 1
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 seed_option = click.option(
-    "--seed", default=1, show_default=True, type=click.IntRange(0, SEED_MAX), help="Seed of all luck."
+    "--seed", default=1, show_default=True, type=click.IntRange(0, SEED_MAX), help="Seed of all random draws."
 )
 steps_option = click.option(
     "--steps", type=click.IntRange(min=1), help="Stop after this step.  [default: the scenario's]"

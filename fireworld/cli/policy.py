@@ -1,4 +1,4 @@
-"""`fireworld policy`: what a trained team does and why, and how two teams differ."""
+"""`fireworld policy`: the policies there are, what a trained team does and why, and how two teams differ."""
 
 from __future__ import annotations
 
@@ -25,10 +25,27 @@ SHOWN_OPTION = click.option(
 
 @click.group()
 def command() -> None:
-    """Show what a trained team does and why, or how two teams differ.
+    """List the policies; show what a trained team does and why, or how two teams differ.
 
     A team is a team file, or the name of a team that comes with fireworld.
     """
+
+
+@command.command("list")
+@click.option("--json", "as_json", is_flag=True, help="Write JSON.")
+def list_policies(*, as_json: bool) -> None:
+    """List the policies that come with fireworld: rules, teams that learned, and the planner.
+
+    Your own are named FILE.py:CLASS or MODULE:CLASS.
+    """
+    from fireworld.cli.tables import print_table
+    from fireworld.policy.names import policies
+
+    known = policies()
+    if as_json:
+        click.echo(json.dumps([one._asdict() for one in known], indent=2))
+    else:
+        print_table(["name", "kind", "what it does"], known, left=(0, 1, 2), whole=(0, 1))
 
 
 @command.command()

@@ -12,9 +12,8 @@ import click
 from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.live import find_screen, view_options, watched_run
-from fireworld.cli.options import record_options, seed_option, settings_option, steps_option
+from fireworld.cli.options import POLICY_HELP, record_options, seed_option, settings_option, steps_option
 from fireworld.cli.progress import BAR, ELAPSED, bars, is_watched
-from fireworld.policy.teams.shipped import team_names
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -24,18 +23,13 @@ if TYPE_CHECKING:
 
     from fireworld.records import CityRecord, RunHeader, StepRecord, Steps
 
-POLICIES_HELP: Final = (
-    "easiest, nearest-to-civilian, nearest-to-center, nearest-to-me, each-another, random, chief, "
-    "planner (planner:horizon=30,interval=4,rollouts=1), "
-    f"{', '.join(team_names())} (teams), a team file (TEAM.npz), or MODULE:CLASS of your own."
-)
 STEP: Final = "step {task.completed:.0f} of at most {task.total:.0f}"
 STATE: Final = "{task.fields[burning]} burning, score {task.fields[score]:.2f}"
 
 
 @click.command()
 @click.argument("scenario", default="default")
-@click.option("--policy", default="best", show_default=True, help=POLICIES_HELP)
+@click.option("--policy", default="best", show_default=True, help=POLICY_HELP)
 @seed_option
 @steps_option
 @record_options

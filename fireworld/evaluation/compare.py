@@ -9,7 +9,7 @@ from threading import Event
 from typing import Any, Final
 
 from fireworld.arguments import SEED_MAX, ArgumentError, path_of, seed_of, settings_of, whole_number
-from fireworld.errors import PolicyError, ScenarioError, expected
+from fireworld.errors import ScenarioError, expected
 from fireworld.evaluation.comparison import ComparedPolicy, Comparison, find_metric
 from fireworld.evaluation.comparison_runs import ComparisonRuns, RunnablePolicy, runnable
 from fireworld.evaluation.paired import compare_outcomes
@@ -136,12 +136,10 @@ def _check_policy(policy: RunnablePolicy, *, results: Path | None, processes: bo
     Raises:
         PolicyError: they cannot.
     """
-    if results is not None and not policy.identity:
-        wanted = "a policy whose source is in a file, or with an attribute `digest`"
-        raise PolicyError(expected("results", "", wanted, policy.name, "leave out the results file"))
-    if processes and not policy.portable:
-        wanted = "a policy that other processes can import or unpickle"
-        raise PolicyError(expected("executor", "", wanted, policy.name, "leave out the executor"))
+    if results is not None:
+        policy.named.require_identity("results")
+    if processes:
+        policy.named.require_found_again("executor")
 
 
 def _built(scenarios: object, values: Mapping[str, Any]) -> dict[str, BuiltScenario]:

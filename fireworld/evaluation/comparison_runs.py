@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import copy
 import os
-import pickle
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from pathlib import Path
 from threading import Event
 from typing import Any, Final
 
@@ -55,15 +53,7 @@ class RunnablePolicy:
     @property
     def portable(self) -> bool:
         """Whether other processes can make it."""
-        if isinstance(self.given, str | Path) or self.compiled:
-            return True
-        if not (self.identity and self.named.can_be_found_again):
-            return False
-        try:
-            pickle.dumps(self.given)
-        except Exception:  # noqa: BLE001 - whatever the user's object raises
-            return False
-        return True
+        return self.compiled or self.named.can_be_found_again
 
 
 def runnable(given: Any, place: int) -> RunnablePolicy:

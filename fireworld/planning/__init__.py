@@ -1,1 +1,1 @@
-"""Planning: choosing by trying out, on copies of the world, what would come of it."""
+"""Planning: policies that choose by simulating on copies of the world."""

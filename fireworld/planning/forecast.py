@@ -1,4 +1,4 @@
-"""Forecast: what comes of a joint assignment of actions, tried out on a copy of the world."""
+"""Forecast: the value of a joint assignment of actions, tried out on a copy of the world."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ Assignment = tuple[int, ...]
 """(b,) the action of each brigade."""
 
 FIRST_SEED: Final = 1 << 32
-"""Seeds of runs lie below, those of rollouts at and above: no plan is made on the luck that the run will meet."""
+"""Seeds of runs lie below, those of rollouts at and above: no plan knows the random draws of the run."""
 BURNING_COST: Final = 0.005
-"""What a building that still burns at the end of a rollout costs: a share of the maximal score."""
+"""Cost of a building that still burns at the end of a rollout, as a share of the maximal score."""
 
 
 class Forecast:
     """Values of assignments at one moment; each is computed once.
 
-    All assignments meet the same luck, so that their values differ by what the brigades do, not by chance.
+    All assignments see the same random draws, so their values differ by what the brigades do, not by chance.
 
     Args:
         observation: the moment.
         copy: arrays of the same shapes as the world's, overwritten by every rollout.
         horizon: steps of a rollout.
-        rollouts: rollouts of each assignment, each with luck of its own.
+        rollouts: rollouts of each assignment, each with random draws of its own.
     """
 
     def __init__(self, observation: Observation, copy: WorldState, *, horizon: int, rollouts: int) -> None:
@@ -39,10 +39,10 @@ class Forecast:
         self._values: dict[Assignment, float] = {}
 
     def value(self, assignment: Assignment) -> float:
-        """Return what an assignment is worth that all brigades keep to until the horizon: a mean over the rollouts.
+        """Return the value of an assignment that all brigades follow until the horizon: a mean over the rollouts.
 
-        score / maximal score - 0.005 * burning buildings, at the end of the rollout. The second term stands for what
-        the fire that is left will still cost.
+        score / maximal score - 0.005 * burning buildings, at the end of the rollout. The second term stands for the
+        further cost of the fire that is left.
         """
         held = self._values.get(assignment)
         if held is None:

@@ -16,14 +16,14 @@ def with_action(assignment: Assignment, brigade: int, action: int) -> Assignment
 
 
 def action_values(value: Value, assignment: Assignment, brigade: int) -> tuple[float, ...]:
-    """Return the values of a brigade's four actions while the others keep to the assignment."""
+    """Return the values of a brigade's four actions while the others follow the assignment."""
     return tuple(value(with_action(assignment, brigade, action)) for action in range(len(ACTIONS)))
 
 
 def climb(value: Value, starts: Iterable[Assignment]) -> Assignment:
-    """Return an assignment that no brigade can better alone: coordinate ascent.
+    """Return an assignment that no brigade can improve alone: coordinate ascent.
 
-    The best start (ties: the lowest assignment) is bettered brigade after brigade, until a whole round changes
+    The best start (ties: the lowest assignment) is improved brigade after brigade, until a whole round changes
     nothing. A change must be worth strictly more, so the climb ends; equal changes: the lowest action. The number of
     values grows with the number of brigades, that of all assignments as its power.
 

@@ -9,13 +9,12 @@ import sysconfig
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from difflib import get_close_matches
 from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
-from fireworld.errors import FireworldError, PolicyError, described, expected, shown
+from fireworld.errors import FireworldError, PolicyError, described, expected, nearest, shown
 from fireworld.kernels.arrays import CityArrays
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
 from fireworld.records import ACTION_NAMES, ACTIONS
@@ -107,7 +106,7 @@ def users_code(what: object, moment: str | Observation) -> Iterator[None]:
 
     Args:
         what: a policy, or what the message begins with.
-        moment: when it is called: what the message goes on with.
+        moment: when it is called, which the message says next.
     """
     try:
         yield
@@ -153,8 +152,7 @@ def _checked(answer: Any, policy: Policy, observation: Observation) -> Decision:
     bare = not isinstance(answer, Decision)
     action = _action_index(answer if bare else answer.action)
     if action is None or (bare and isinstance(answer, bool)):
-        near = get_close_matches(answer, ACTION_NAMES, n=1) if isinstance(answer, str) else []
-        hint = f"try {near[0]}" if near else ""
+        hint = nearest(answer, ACTION_NAMES) if isinstance(answer, str) else ""
         raise refusal(AN_ANSWER, answer if bare else f"action {shown(answer.action)}", hint)
     answer = Decision(action) if bare else answer
     target = None

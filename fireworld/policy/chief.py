@@ -1,4 +1,4 @@
-"""A sensible chief's rule: one brigade between the fire and the people, the others at the nearest front."""
+"""The rule `chief`: one brigade between the fire and the civilians, the others at the nearest front."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ HIGH: Final = 2
 
 
 def rule(distance_from_civilian: int, *, others_protect: bool) -> Action:
-    """Choose an action: protect people whom the fire comes near, unless another brigade does; else fight the front."""
+    """Return an action: protect civilians near the fire, unless another brigade does; else fight the front."""
     if distance_from_civilian < HIGH and not others_protect:
         return Action.NEAREST_TO_CIVILIAN
     return Action.NEAREST_TO_ME

@@ -6,7 +6,6 @@ import hashlib
 import importlib
 import inspect
 import sys
-from difflib import get_close_matches
 from functools import partial
 from importlib.machinery import ModuleSpec, SourceFileLoader
 from importlib.util import module_from_spec
@@ -14,9 +13,9 @@ from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, Final
 
-from fireworld.errors import PolicyError, expected
-from fireworld.policy.arguments import Parameters, check_no_parameters, check_signature, takes
+from fireworld.errors import PolicyError, expected, nearest
 from fireworld.policy.asking import complete, users_code
+from fireworld.policy.parameter_text import Parameters, check_no_parameters, check_signature, takes
 from fireworld.policy.protocol import Policy
 
 CODE_SUFFIX: Final = ".py"
@@ -66,8 +65,7 @@ def find_in(module: ModuleType, target: str, *, where: str) -> Any:
         (target,) = classes
     found = getattr(module, target, None)
     if found is None:
-        near = get_close_matches(target, classes, n=1)
-        raise PolicyError(expected(where, "", "a class of that name", target, f"try {near[0]}" if near else ""))
+        raise PolicyError(expected(where, "", "a class of that name", target, nearest(target, classes)))
     return found
 
 

@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import pickle
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
 
 from fireworld.errors import PolicyError, expected
-from fireworld.policy.arguments import (
+from fireworld.policy.asking import complete, name_of
+from fireworld.policy.chief import chief
+from fireworld.policy.identity import NOTEBOOK, can_be_imported, covering, digest_of, digest_of_module
+from fireworld.policy.importing import CODE_SUFFIX, find_in, import_source, make_policy
+from fireworld.policy.kernel import KernelPolicy, always, at_random, each_another
+from fireworld.policy.parameter_text import (
     Parameters,
     check_no_parameters,
     check_plain,
@@ -21,15 +29,10 @@ from fireworld.policy.arguments import (
     read_parameters,
     write_parameters,
 )
-from fireworld.policy.asking import complete, name_of
-from fireworld.policy.chief import chief
-from fireworld.policy.identity import can_be_imported, covering, digest_of, digest_of_module
-from fireworld.policy.importing import CODE_SUFFIX, find_in, import_source, make_policy
-from fireworld.policy.kernel import KernelPolicy, always, at_random, each_another
 from fireworld.policy.protocol import Policy
 from fireworld.policy.teams.npz import SUFFIX, read_bytes
 from fireworld.policy.teams.shipped import team_names, team_path
-from fireworld.policy.teams.team import load_team, parse_team
+from fireworld.policy.teams.team import Team, load_team, parse_team
 from fireworld.records import ACTIONS
 
 BUILT_IN: Final[dict[str, Callable[[], KernelPolicy]]] = {
@@ -40,13 +43,13 @@ BUILT_IN: Final[dict[str, Callable[[], KernelPolicy]]] = {
 }
 """Rules by name."""
 RULES: Final = {
-    "easiest": "all brigades go for the burning building with the lowest temperature",
-    "nearest-to-civilian": "all brigades go for the burning building nearest to a civilian",
-    "nearest-to-center": "all brigades go for the burning building nearest to the center of the fire site",
-    "nearest-to-me": "every brigade goes for the burning building nearest to itself",
-    "each-another": "brigade 0 always takes the first of these four actions, brigade 1 the second, and so on",
-    "random": "every brigade takes one of the four actions at random, in every step",
-    "chief": "one brigade between the fire and the civilians, the others at the nearest front",
+    "easiest": "goes for the burning building that is coolest",
+    "nearest-to-civilian": "goes for the one nearest to a civilian",
+    "nearest-to-center": "goes for the one nearest to the city's center",
+    "nearest-to-me": "goes for the one nearest to the brigade",
+    "each-another": "brigade b always takes action b modulo 4 of these",
+    "random": "takes one of these actions at random, every step",
+    "chief": "one protects civilians, the others the front",
 }
 """What each rule does."""
 PLANNERS: Final = {"planner": "fireworld.planning.planner:planner"}
@@ -99,45 +102,40 @@ class NamedPolicy:
 
     @property
     def can_be_found_again(self) -> bool:
-        """Whether another process finds the same policy: one with a name, or whose class or function is in a module."""
-        return isinstance(self.given, str) or can_be_imported(self.policy if self.given is None else self.given)
-
-    def fresh(self) -> Policy:
-        """Return the policy for another run: made anew, unless an object was given."""
-        anew = isinstance(self.given, str) or inspect.isclass(self.given)
-        return self._found_again().policy if anew else self.policy
+        """Whether other processes find the same policy: by its name, or by importing its class and unpickling it."""
+        if isinstance(self.given, str):
+            return True
+        found = self.policy if self.given is None else self.given
+        with suppress(Exception):
+            return can_be_imported(found) and bool(pickle.dumps(found))
+        return False
 
     def require_identity(self, purpose: str) -> str:
         """Return the identity; raise PolicyError if there is none.
 
         Args:
-            purpose: what it is for: what the message begins with, as in "--results".
+            purpose: what it is for: what the message begins with, as in "results".
         """
         if not self.identity:
-            wanted = "a policy whose source can be read, and whose values are plain"
-            hint = "write it into a file, or give it an attribute `digest`: a text that changes with what it does"
-            raise PolicyError(expected(purpose, self.name, wanted, "another", hint))
+            wanted = "a policy whose source is in a file and whose values are plain, or with an attribute `digest`"
+            raise PolicyError(expected(purpose, "", wanted, self.name))
         return self.identity
 
     def require_found_again(self, purpose: str) -> None:
         """Raise PolicyError if other processes cannot find the policy; `purpose` as for `require_identity`."""
         if not self.can_be_found_again:
-            wanted, hint = "a policy that other processes can import", "write it into a file"
-            raise PolicyError(expected(purpose, self.name, wanted, "one that only this process has", hint))
-
-    def _found_again(self) -> NamedPolicy:
-        return find_policy(self.given, parameters=None if isinstance(self.given, str) else self.parameters)
+            raise PolicyError(expected(purpose, "", "a policy that other processes can import or unpickle", self.name))
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what another process finds the policy by."""
-        kept = vars(self)
-        return kept if self.given is None else {"given": self.given, "parameters": self.parameters}
+        return vars(self) if self.given is None else {"given": self.given, "parameters": self.parameters}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Find the policy again."""
-        vars(self).update(state)
         if "name" not in state:
-            vars(self).update(vars(self._found_again()))
+            given, written = state["given"], isinstance(state["given"], str)  # a name says its parameters
+            state = vars(find_policy(given, parameters=None if written else state["parameters"]))
+        vars(self).update(state)
 
 
 def find_policy(given: object, *, parameters: Parameters | None = None) -> NamedPolicy:
@@ -147,16 +145,17 @@ def find_policy(given: object, *, parameters: Parameters | None = None) -> Named
         given: the name of a policy or team that comes with fireworld, or a team file; FILE.py:CLASS or MODULE:CLASS,
             without the class where there is only one, and instead of it also a function that returns a policy, a
             function of the observation, or an object; all of these with parameters, as in `mine.py:Mine:k=3,near=true`.
-            Or a class, an object with a method `decide`, or a function of the observation. Or a NamedPolicy.
+            Or a class, an object with a method `decide`, a function of the observation, a team, or a NamedPolicy.
         parameters: plain values that the class or function takes as keywords; more of them, if `given` has some.
 
     Raises:
         PolicyError: there is no such policy, it does not take the parameters, or making it fails.
         TrainingError: a team file that cannot be read or makes no sense.
     """
-    if isinstance(given, NamedPolicy):
-        check_no_parameters(parameters or {}, where=f"policy: {given.name}")
-        return given
+    if isinstance(given, NamedPolicy | Team):
+        named = given if isinstance(given, NamedPolicy) else _named_team(given)
+        check_no_parameters(parameters or {}, where=f"policy: {named.name}")
+        return named
     if isinstance(given, str | Path):
         return _by_name(str(given), parameters or {})
     is_named = inspect.isclass(given) or inspect.isroutine(given)
@@ -177,15 +176,19 @@ def find_policy(given: object, *, parameters: Parameters | None = None) -> Named
 def policies() -> list[KnownPolicy]:
     """List the policies that come with fireworld."""
     known = [KnownPolicy(name, "rule", doc) for name, doc in RULES.items()]
-    known += [
-        KnownPolicy(name, "planner", "tries out assignments of actions in copies of the world") for name in PLANNERS
-    ]
+    known += [KnownPolicy(name, "planner", "tries out actions in copies of the world") for name in PLANNERS]
     for name in team_names():
         origin = load_team(name).provenance
         method, curriculum = (dict(origin.get(key, {})) for key in ("method", "curriculum"))
         learned = method.get("name") or method.get("rule")
-        known.append(KnownPolicy(name, "team", f"learned by {learned}, with the curriculum {curriculum.get('name')}"))
+        known.append(KnownPolicy(name, "team", f"learned by {learned} on the curriculum {curriculum.get('name')}"))
     return known
+
+
+def with_file(name: str, changed: Callable[[str], str]) -> str:
+    """Return the name of a policy with another path of its file, if it names one."""
+    file = _FILE.fullmatch(name)
+    return name if file is None else changed(file[1]) + name[len(file[1]) :]
 
 
 def note_on_team(named: NamedPolicy, n_brigades: int, *, choices: str = "") -> str:
@@ -229,7 +232,7 @@ def _by_name(text: str, more: Parameters) -> NamedPolicy:
     name = _with_parameters(text, more)
     if source.endswith(SUFFIX) or (source in team_names() and target is None):
         check_no_parameters(values, where=where)
-        return _team(source)
+        return _team_by_name(source)
     if target is None and source in BUILT_IN | PLANNERS:
         make = BUILT_IN.get(source) or _function(PLANNERS[source])
         check_signature(make, values, where=where)
@@ -240,7 +243,7 @@ def _by_name(text: str, more: Parameters) -> NamedPolicy:
     module = import_source(source)
     thing = find_in(module, target or "", where=f"--policy: {source}")
     policy = make_policy(thing, values, where=where)
-    digest = covering(digest_of_module(module), values)
+    digest = covering(digest_of(thing) if module.__name__ == NOTEBOOK else digest_of_module(module), values)
     return NamedPolicy(name, digest, policy, part=target or thing.__qualname__, parameters=values, given=name)
 
 
@@ -270,13 +273,22 @@ def _function(place: str) -> Callable[..., Policy]:
     return function
 
 
-def _team(source: str) -> NamedPolicy:
+def _team_by_name(source: str) -> NamedPolicy:
     """Return the policy of a team; a recording names a file without its folder and takes it along."""
     path, name = (Path(source), Path(source).name) if source.endswith(SUFFIX) else (team_path(source), source)
     content = read_bytes(path)
-    team = parse_team(content, source=str(path))
+    return replace(_named_team(parse_team(content, source=str(path)), content), name=name, given=source)
+
+
+def _named_team(team: Team, content: bytes = b"") -> NamedPolicy:
+    """Return the policy of a team, with its file."""
+    if not content:
+        with TemporaryDirectory() as folder:
+            path = Path(folder) / TEAM_ATTACHMENT
+            team.save(path)
+            content = path.read_bytes()
     policy = team.policy()
-    return NamedPolicy(name, policy.digest, policy, {TEAM_ATTACHMENT: content}, team.choices, given=source)
+    return NamedPolicy("team", policy.digest, policy, {TEAM_ATTACHMENT: content}, team.choices, given=team)
 
 
 def _unknown(name: str) -> PolicyError:

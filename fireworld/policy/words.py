@@ -11,7 +11,7 @@ from fireworld.records import ACTIONS, LEVELS, VOLUMES
 
 
 class Feature(NamedTuple):
-    """One of the eight things that make a state."""
+    """One of the eight features that make up a state."""
 
     name: str
     values: tuple[str, ...]
@@ -26,7 +26,7 @@ FEATURES: Final = (
 )
 """The features, the most significant first; their names are those of the recorded /observations."""
 N_OWN: Final = 4
-"""Features of the fire; those after them tell what the other brigades do."""
+"""Features of the fire; those after them are what the other brigades do."""
 RADIX: Final = tuple(len(feature.values) for feature in FEATURES)
 N_STATES_ALONE: Final = math.prod(RADIX[:N_OWN])
 """270, without the cooperation flags."""
@@ -36,7 +36,7 @@ N_STATES: Final = N_STATES_ALONE * N_FLAG_VALUES
 
 
 def features_of(state: int) -> tuple[int, ...]:
-    """Take a state 0..4319 apart into its eight features."""
+    """Return the eight features of a state 0..4319."""
     found = []
     for feature in reversed(FEATURES):
         state, value = divmod(state, len(feature.values))
@@ -53,11 +53,11 @@ def state_of(features: Sequence[int]) -> int:
 
 
 def describe_state(state: int, *, with_others: bool = True) -> str:
-    """Say what a brigade sees in a state.
+    """Return in words what a brigade sees in a state.
 
     Args:
         state: 0..4319.
-        with_others: tell of what the other brigades do, which a table of 270 states does not see.
+        with_others: include what the other brigades do, which a table of 270 states does not see.
     """
     edges, center, civilian, volume, *others = features_of(state)
     fire = (
@@ -71,7 +71,7 @@ def describe_state(state: int, *, with_others: bool = True) -> str:
 
 
 def short_state(state: int, *, with_others: bool = True) -> str:
-    """Write a state as `find_states` reads it: free_edges=3,volume=high and so on; flags that are "no" are left out."""
+    """Return a state as `find_states` reads it: free_edges=3,volume=high and so on; without the flags that are "no"."""
     parts = []
     for place, (feature, value) in enumerate(zip(FEATURES, features_of(state), strict=True)):
         if place < N_OWN or (with_others and value):
@@ -97,7 +97,7 @@ def find_states(text: str) -> list[int]:
 
 
 def _wanted_values(text: str) -> dict[int, int]:
-    """Return the value asked for by the place of its feature."""
+    """Return the values asked for, by the place of their feature."""
     names = [feature.name for feature in FEATURES]
     wanted: dict[int, int] = {}
     for part in text.split(","):

@@ -171,3 +171,12 @@ def test_what_cannot_be_done(here, fireworld, words, message):
     done = fireworld("policy", *words)
     assert (done.code, done.out, done.err.count("\n")) == (2, "", 1)
     assert message in done.err
+
+
+def test_the_list(fireworld):
+    shown = lines(fireworld("policy", "list"))
+    assert shown[2].split() == ["easiest", "rule", "goes", "for", "the", "burning", "building", "that", "is", "coolest"]
+    known = json.loads(fireworld("policy", "list", "--json").out)
+    assert [one["name"] for one in known] == [line.split()[0] for line in shown[2:]]
+    assert {one["kind"] for one in known} == {"rule", "team", "planner"}
+    assert all(one["doc"] for one in known)

@@ -13,9 +13,10 @@ import pytest
 from fireworld.errors import PolicyError
 from fireworld.policy.asking import ask, name_of
 from fireworld.policy.kernel import KernelPolicy
-from fireworld.policy.names import BUILT_IN, RULES, NamedPolicy, find_policy, policies
+from fireworld.policy.names import BUILT_IN, RULES, TEAM_ATTACHMENT, NamedPolicy, find_policy, policies
 from fireworld.policy.protocol import Decision
 from fireworld.policy.teams.shipped import team_names
+from fireworld.policy.teams.team import load_team, parse_team
 from fireworld.records import ACTIONS
 
 
@@ -334,9 +335,20 @@ def test_policies_are_found_again_by_other_processes():
         named = find_policy(given)
         assert not named.can_be_found_again
         with pytest.raises(
-            PolicyError, match=r"^--jobs: .*: expected a policy that other processes can import, got one"
+            PolicyError, match=r"^--jobs: expected a policy that other processes can import or unpickle, got '.*"
         ):
             named.require_found_again("--jobs")
+
+
+def test_a_team_takes_its_file_along(tmp_path):
+    team = load_team("paper-cooperative")
+    named = find_policy(team)
+    assert (named.name, named.digest) == ("team", find_policy("paper-cooperative").digest)
+    assert parse_team(named.attachments[TEAM_ATTACHMENT], source="x").digest == team.digest
+    assert named.trained_choices == "in-turn"
+    assert pickle.loads(pickle.dumps(named)).digest == named.digest  # noqa: S301 - our own
+    with pytest.raises(PolicyError, match=r"^policy: team: expected no parameters, got 'k'$"):
+        find_policy(team, parameters={"k": 3})
 
 
 def test_a_named_policy_shows_itself_shortly():
@@ -349,5 +361,5 @@ def test_the_list_of_policies():
     assert [one.name for one in known if one.kind == "rule"] == list(BUILT_IN) == list(RULES)
     assert [one.name for one in known if one.kind == "team"] == team_names()
     assert [one.name for one in known if one.kind == "planner"] == ["planner"]
-    assert {one.name: one.doc for one in known}["best"] == "learned by search, with the curriculum contested"
+    assert {one.name: one.doc for one in known}["best"] == "learned by search on the curriculum contested"
     assert all(find_policy(one.name).name == one.name for one in known)

@@ -12,8 +12,7 @@ from typing import Annotated, Any, Final
 import msgspec
 
 from fireworld.errors import LogError, expected
-from fireworld.policy.names import NamedPolicy, find_policy
-from fireworld.policy.teams.npz import SUFFIX
+from fireworld.policy.names import NamedPolicy, find_policy, with_file
 from fireworld.recording.replay import build_recorded
 from fireworld.recording.resume import refind_policy
 from fireworld.records import RunHeader
@@ -32,7 +31,7 @@ class GoldenSpec(msgspec.Struct, frozen=True, kw_only=True):
     scenario: str
     """A shipped one's name; the path of a file, from the folder of the golden; empty: the scenario as recorded."""
     policy: str
-    """As on the command line; a team file by its path from the folder of the golden."""
+    """As on the command line; a team file or a file of code by its path from the folder of the golden."""
     seed: Annotated[int, msgspec.Meta(ge=0, le=2**32 - 1)] = 1
     steps: Annotated[int, msgspec.Meta(ge=1)] | None = None
     """Last step; None: the scenario's."""
@@ -60,7 +59,7 @@ def make_spec(
     Args:
         folder: where the golden is going to be.
         scenario: a shipped name, or a file as seen from the current folder.
-        policy: a name as on the command line; a team file as seen from the current folder.
+        policy: a name as on the command line; a file in it as seen from the current folder.
         seed: of the random draws.
         steps: last step; None: the scenario's.
         settings: values by dotted key; text is read as YAML.
@@ -76,7 +75,7 @@ def make_spec(
     texts = {key: value if isinstance(value, str) else json.dumps(value) for key, value in (settings or {}).items()}
     return GoldenSpec(
         scenario=str(scenario) if shipped else _path_from(folder, Path(scenario)),
-        policy=_path_from(folder, Path(policy)) if policy.endswith(SUFFIX) else policy,
+        policy=with_file(policy, lambda path: _path_from(folder, Path(path))),
         seed=seed,
         steps=steps,
         settings=texts,
@@ -124,9 +123,11 @@ def prepare_golden(
         return _prepare_recorded(spec, recorded)
     path = spec.scenario if spec.scenario in scenario_names() else _path_to(folder, spec.scenario)
     scenario = load_scenario(path).with_settings(spec.settings)
-    name = str(_path_to(folder, spec.policy)) if spec.policy.endswith(SUFFIX) else spec.policy
+    named = policy or find_policy(with_file(spec.policy, lambda way: str(_path_to(folder, way))))
+    if not named.attachments:  # a recording names a file of code as its spec does, not by where it is on this machine
+        named = replace(named, name=spec.policy)
     built = (cities or CityCache()).build(scenario)
-    run = prepare_run(built, policy or find_policy(name), seed=spec.seed, n_steps_max=spec.steps)
+    run = prepare_run(built, named, seed=spec.seed, n_steps_max=spec.steps)
     attachments = {**run.header.attachments, SPEC_ATTACHMENT: msgspec.json.encode(spec)}
     return replace(run, header=replace(run.header, attachments=attachments))
 

@@ -358,3 +358,13 @@ def test_help_imports_nothing_heavy():
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert "Exit code: 0 all the same, 1 one is different, 2 one cannot be run" in done.stdout
     assert not {"numpy", "numba", "rich", "mcap", "msgspec", "yaml"} & set(done.stdout.splitlines())
+
+
+def test_a_policy_in_a_file_of_code(here, golden, monkeypatch):
+    """It is found by its path from the golden, from wherever goldens are checked."""
+    assert golden("add", "quick", "--policy", "mine.py:Policy", "--steps", 4, "--dir", "kept", "--name", "a").code == 0
+    log = open_log(here / "kept" / "a.mcap")
+    assert log.header.policy == "../mine.py:Policy"
+    (here / "elsewhere").mkdir()
+    monkeypatch.chdir(here / "elsewhere")
+    assert golden("check", "../kept").code == 0

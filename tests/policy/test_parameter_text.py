@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fireworld.errors import PolicyError
-from fireworld.policy.arguments import check_plain, check_signature, read_parameters, write_parameters
+from fireworld.policy.parameter_text import check_plain, check_signature, read_parameters, write_parameters
 
 
 @pytest.mark.parametrize(

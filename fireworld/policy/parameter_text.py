@@ -7,10 +7,9 @@ import json
 import math
 import re
 from collections.abc import Callable, Mapping
-from difflib import get_close_matches
 from typing import Any, Final
 
-from fireworld.errors import PolicyError, ScenarioError, expected
+from fireworld.errors import PolicyError, ScenarioError, expected, nearest
 from fireworld.scenario.yaml_text import read_yaml
 
 Parameters = Mapping[str, Any]
@@ -92,9 +91,8 @@ def check_signature(target: Callable[..., Any], parameters: Parameters, *, where
     known = {one.name: one for one in taken if one.kind in (one.POSITIONAL_OR_KEYWORD, one.KEYWORD_ONLY)}
     for name in parameters:
         if name not in known and not open_ended:
-            near = get_close_matches(name, known, n=1)
             wanted = f"parameters {', '.join(known)}" if known else "no parameters"
-            raise PolicyError(expected(where, "", wanted, name, f"try {near[0]}" if near else ""))
+            raise PolicyError(expected(where, "", wanted, name, nearest(name, known)))
     for name, one in known.items():
         if one.default is one.empty and name not in parameters:
             raise PolicyError(expected(where, "", f"a value for {name}, as in {name}=VALUE", "none"))

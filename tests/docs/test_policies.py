@@ -1,0 +1,54 @@
+"""The page on policies: its policies run by the commands that it shows, from Python, and pass the conformance test."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from fireworld.policy.names import find_policy
+from tests import command_line
+from tests.docs.pages import ROOT, commands, fenced
+
+PAGE = ROOT / "docs" / "policies.md"
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    (tmp_path / "mine.py").write_text(fenced(PAGE, "python")[0], encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    yield tmp_path
+    sys.modules.pop("mine", None)
+
+
+def test_its_commands_run(here, monkeypatch):
+    shown = [words for words in commands(PAGE) if "mine.py:" in " ".join(words)]
+    assert len(shown) >= 4
+    for words in shown:
+        more = ("--scenarios", "quick", "--seeds", "1") if words[0] == "compare" else ("--steps", "5")
+        done = command_line.call(monkeypatch, *words, *more)
+        assert done.code == 0, done.err
+
+
+def test_of_several_classes_one_must_be_named(here, monkeypatch):
+    done = command_line.call(monkeypatch, "run", "quick", "--policy", "mine.py")
+    assert (done.code, done.out) == (2, "")
+    assert "got SpreadOut, Steady" in done.err
+
+
+def test_its_python_runs(here):
+    _, python, test = fenced(PAGE, "python")
+    exec(python, {"__name__": "__main__"})  # noqa: S102 - our own page
+    names = {}
+    exec(test, names)  # noqa: S102 - our own page
+    conformance = names["TestSteady"]()
+    for name in dir(conformance):
+        if name.startswith("test_"):
+            getattr(conformance, name)()
+
+
+def test_its_names_are_found(here):
+    for name in ("mine.py:hottest", "mine.py:SpreadOut", "mine:Steady", "mine.py:Steady:period=5"):
+        assert find_policy(name).name == name
