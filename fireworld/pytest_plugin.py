@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from fireworld.policy.protocol import Policy
     from fireworld.recording.golden.check import GoldenResult
     from fireworld.recording.golden.spec import GoldenSpec
-    from fireworld.records import MemoryRecording
+    from fireworld.recording.run import Run
     from fireworld.simulation.built import CityCache
 
 UPDATE: Final = "--fireworld-update"
@@ -90,7 +90,7 @@ class Recorder:
         tolerances: Mapping[str, float] | None = None,
         ignore: Collection[str] = (),
         name: str = "",
-    ) -> MemoryRecording:
+    ) -> Run:
         """Run, and compare every step with the golden recording of this test.
 
         The test fails, with the first difference and no traceback, if the runs differ, if there is no golden, or if
@@ -104,7 +104,7 @@ class Recorder:
             overrides: keys of the scenario with other values, as in {"brigades.n": 7}.
             tolerances: the largest difference that is ignored, by field, as in {"buildings.temperature": 1e-6}.
             ignore: topics and fields that are not compared, as in ["draws", "decisions.q_values"].
-            name: tells several recordings of one test apart.
+            name: of this recording, where a test has several.
 
         Returns:
             The new run, for what else a test may expect: `run.column("score", "n_burnt_out")[-1] == 0`.
@@ -140,13 +140,14 @@ class Recorder:
         self._paths.add(path)
         return path
 
-    def _run(self, path: Path, spec: GoldenSpec, named: NamedPolicy | None) -> MemoryRecording:
+    def _run(self, path: Path, spec: GoldenSpec, named: NamedPolicy | None) -> Run:
         """Run a spec; compare with the golden, or store it."""
-        from fireworld.recording.golden.check import compare_golden, run_in_memory
+        from fireworld.recording.golden.check import compare_golden
         from fireworld.recording.golden.spec import prepare_golden
         from fireworld.recording.golden.update import store_if_changed
+        from fireworld.recording.record import run_prepared
 
-        fresh = run_in_memory(prepare_golden(spec, path.parent, policy=named, cities=self._cities))
+        fresh = run_prepared(prepare_golden(spec, path.parent, policy=named, cities=self._cities))
         if not self._update:
             result = compare_golden(path, fresh, spec)
             if result.result != "same":
@@ -171,7 +172,7 @@ class Recorder:
 def golden_name(node: pytest.Item, name: str = "") -> str:
     """Return the name of a test's golden, as in test_mine-test_policy or test_mine-TestTeam.test_policy-easiest-second.
 
-    Parameters whose names no file should have are replaced, and a short hash tells them apart.
+    Parameters whose names no file should have are replaced, and a short hash makes them unique.
     """
     classes = [parent.name for parent in node.listchain() if isinstance(parent, pytest.Class)]
     full = f"{node.path.stem}-{'.'.join([*classes, node.name])}" + (f"-{name}" if name else "")

@@ -84,9 +84,12 @@ def _show_schema(log: Log | None, *, as_json: bool) -> None:
 
 def _show(log: Log, summary: dict[str, Any]) -> None:
     """Print a summary; names in a recording are anybody's, so what cannot be printed is escaped."""
-    from fireworld.errors import one_line
+    from fireworld_recorder.totals import final_outcome
 
-    header, totals, steps = summary["header"], summary["totals"], summary["steps"]
+    from fireworld.errors import one_line
+    from fireworld.outcome import QUANTITIES
+
+    header, steps = summary["header"], summary["steps"]
     span = f"{steps['n']}, from {steps['first']} to {steps['last']}" if steps["n"] else "none"
     lines = {
         "recording": f"{log.path}, {summary['n_bytes']:,} bytes, {summary['format']}",
@@ -101,11 +104,8 @@ def _show(log: Log, summary: dict[str, Any]) -> None:
         f" {summary['n_civilians']} civilians",
     }
     if steps["n"]:
-        lines["outcome"] = (
-            f"score {totals['score']:.6g} of {totals['score_max']:g}, {totals['n_burnt_out']} burnt out,"
-            f" {totals['n_civilians_alive']} civilians alive, return {totals['sum_of_rewards']:.6g},"
-            f" {totals['water_used_litres']:g} litres used"
-        )
+        outcome = final_outcome(log)
+        lines["outcome"] = ", ".join(f"{quantity.label} {quantity.text(outcome)}" for quantity in QUANTITIES)
     lines["snapshots"] = ", ".join(map(str, summary["snapshots"])) or "none"
     lines["attachments"] = ", ".join(f"{name} ({n} bytes)" for name, n in summary["attachments"].items()) or "none"
     for label, text in lines.items():

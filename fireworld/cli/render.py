@@ -52,8 +52,8 @@ def command(
     fireworld render run.mcap -o film.gif --every 2 --fps 15
     fireworld render alone.mcap together.mcap -o film.mp4 --from 10 --to 90
 
-    The ending of the file says what it becomes. A run that ended before the other keeps its last state. A recording
-    that was cut off or damaged is drawn as far as it is good. docs/pictures.md says what is to be seen.
+    The ending of the file decides what it becomes. A run that ended before the other stays in its last state. A
+    recording that was cut off or damaged is drawn as far as it is good. docs/pictures.md explains what is drawn.
 
     Exit code: 0 drawn, 2 could not draw, 130 interrupted (no half file is left).
     """

@@ -1,1 +1,1 @@
-"""Forks: what would have happened if, from some step of a recorded run on, somebody had decided otherwise."""
+"""Recordings: runs recorded, replayed, verified, compared, forked, explained, exported; golden recordings; pages."""

@@ -184,7 +184,7 @@ def diff(
     runs = _open_both(a, b, partial=partial)
     ends = [last_step] if last_step is not None else []
     ends += [int(run.steps.max(initial=-1)) for run in runs if run.damage is not None]
-    same_digest = runs[0].digest == runs[1].digest
+    same_digest = bool(runs[0].digest) and runs[0].digest == runs[1].digest  # runs in memory may have none
     difference = Difference(
         runs,
         tolerances=tolerances or {},

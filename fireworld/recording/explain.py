@@ -123,9 +123,9 @@ class Explanation:
         }
 
     def __repr__(self) -> str:
-        table = text_table(HEADS, rows(self, limit=SHOWN_MAX), ">><>>>")
-        closing = closing_lines(self, limit=SHOWN_MAX)
-        return "\n".join([*opening_lines(self), *(["", table, ""] if self.effects else []), *closing])
+        listed = rows(self, limit=SHOWN_MAX)
+        table = ["", text_table(HEADS, listed, ">><>>>"), ""] if listed else []
+        return "\n".join([*opening_lines(self), *table, *closing_lines(self, limit=SHOWN_MAX)])
 
     def _repr_html_(self) -> str:
         cells = [[text_cell(escape(cell)) for cell in row] for row in rows(self, limit=SHOWN_MAX)]

@@ -9,8 +9,9 @@ from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from typing import Any, Final
 
-from fireworld.arguments import ArgumentError, whole_number
+from fireworld.arguments import ArgumentError, path_of, whole_number
 from fireworld.errors import LogError, expected
+from fireworld.files import check_output
 from fireworld.policy.asking import begin
 from fireworld.policy.names import TEAM_ATTACHMENT, NamedPolicy, find_policy, note_on_team
 from fireworld.policy.protocol import Decision, Observation, Policy
@@ -25,8 +26,10 @@ from fireworld.recording.decisions import (
     read_decision,
 )
 from fireworld.recording.inputs import AnyRun, open_run, run_name
+from fireworld.recording.record import run_prepared
 from fireworld.recording.replay import build_recorded, check_replay
 from fireworld.recording.resume import Resumed, has_memory, recorded_policy, resume
+from fireworld.recording.run import Run
 from fireworld.records import CityRecord, MemoryRecording, RunHeader, StepRecord, StoredRun
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.run import PreparedRun
@@ -68,6 +71,8 @@ class ForkChange:
 class PreparedFork(PreparedRun):
     """A prepared run whose first steps are recorded ones; iterating runs the others.
 
+    A policy with a memory has seen the recorded steps once; with one, iterate once only.
+
     Attributes:
         recorded: the recorded steps.
         score_of_original: of the recorded run, at its last step.
@@ -87,11 +92,50 @@ class PreparedFork(PreparedRun):
             yield observer.record(world.step(self.policy))
 
 
+def fork(
+    log: AnyRun,
+    *,
+    at: int,
+    policy: object = None,
+    decide: Mapping[int, DecisionGiven] | None = None,
+    swap: Mapping[int, AnyRun] | None = None,
+    record: str | os.PathLike[str] | None = None,
+    force: bool = False,
+) -> Run:
+    """Branch off from a recorded run after one of its steps, with something changed, and run to the end.
+
+    The random draws stay the same. If nothing is changed the fork is the same as the recorded run, to the bit.
+
+    Args:
+        log: the path of a recording, or a run.
+        at: the step after which it branches off.
+        policy: the policy that takes over, as for `fireworld.run`, started afresh; "recorded" for the recorded
+            decisions, whatever happens; None: the policy of the run, which remembers what it saw.
+        decide: by brigade, what it does in the first step: an action, its name, or "own-target:301" with the id of a
+            building that burns in its fire site.
+        swap: by brigade, a recording of the same scenario and seed whose decisions it takes to the end.
+        record: the log to write; None: the run stays in memory.
+        force: replace an existing log.
+
+    Raises:
+        LogError: a run cannot be read, does not replay to what is recorded, has no such step, or ended with it; or a
+            brigade cannot do what it is to do.
+        PolicyError, TrainingError: the policy cannot be loaded, or fails.
+        ArgumentError: a brigade or decision makes no sense.
+        OutputError: the log cannot be written.
+    """
+    output = None if record is None else path_of("record", record)
+    if output is not None:
+        check_output(output, force=force)
+    prepared = prepare_fork(log, at=at, policy=policy, decide=decide, swap=swap)
+    return run_prepared(prepared, record=output, force=force)
+
+
 def prepare_fork(
     log: AnyRun,
     *,
     at: int,
-    policy: str | None = None,
+    policy: object = None,
     decide: Mapping[int, DecisionGiven] | None = None,
     swap: Mapping[int, AnyRun] | None = None,
 ) -> PreparedFork:
@@ -138,7 +182,7 @@ def _recorded_up_to(run: StoredRun, step: int) -> MemoryRecording:
 def _read_change(
     run: StoredRun,
     n_brigades: int,
-    policy: str | None,
+    policy: object,
     decide: Mapping[int, DecisionGiven],
     swap: Mapping[int, AnyRun],
 ) -> ForkChange:
@@ -159,11 +203,12 @@ def _read_change(
     return ForkChange(_policy(run, policy), decided, swaps)
 
 
-def _policy(run: StoredRun, name: str | None) -> NamedPolicy:
+def _policy(run: StoredRun, given: object) -> NamedPolicy:
     """Return the policy that takes over."""
-    if RECORDED in {name, run.header.policy if name is None else None}:
+    name = run.header.policy if given is None else given
+    if isinstance(name, str) and name == RECORDED:
         return NamedPolicy(RECORDED, run.digest, RecordedDecisions(run))
-    return find_policy(name) if name is not None else recorded_policy(run.header, source=run_name(run))
+    return recorded_policy(run.header, source=run_name(run)) if given is None else find_policy(given)
 
 
 def _check_change(change: ForkChange, resumed: Resumed, run: StoredRun) -> None:
@@ -204,7 +249,7 @@ def _observations_of_next_step(world: World) -> dict[int, Observation]:
 
 
 def _check_decides(world: World, brigade: int, run: StoredRun, asked: Mapping[int, Observation]) -> None:
-    """Refuse a decision that would not be asked for, and so change nothing."""
+    """Check that a brigade is asked for the decision; otherwise it would change nothing."""
     if brigade not in asked:
         got = "one that is dead" if world.state.brigades.hp[brigade] <= 0 else "one that refills"
         wanted = f"a brigade that decides in step {world.step_number + 1}"
@@ -215,7 +260,7 @@ def _check_decides(world: World, brigade: int, run: StoredRun, asked: Mapping[in
 
 
 def _check_possible(world: World, brigade: int, decision: Decision, city: CityRecord, seen: Observation) -> None:
-    """Refuse a target that no policy could name."""
+    """Check that a target is one that a policy could name."""
     if is_possible(decision, seen):
         return
     burns = 1 <= world.state.fire.fieryness[decision.target] <= 3

@@ -125,7 +125,6 @@ def run(
         ArgumentError: an argument that makes no sense.
     """
     from fireworld.policy.names import find_policy
-    from fireworld.recording.run import Run, open_log
     from fireworld.scenario import find_scenario
     from fireworld.simulation.built import build_scenario
     from fireworld.simulation.run import prepare_run
@@ -136,10 +135,28 @@ def run(
     chosen = find_scenario(scenario).with_values(settings_of(set))
     named = find_policy(policy)
     prepared = prepare_run(build_scenario(chosen), named, seed=seed, n_steps_max=n_steps_max)
+    return run_prepared(prepared, record=path, force=force)
+
+
+def run_prepared(prepared: Steps, *, record: Path | None = None, force: bool = False) -> Run:
+    """Run a prepared run to its end and return it: from its log if there is one, else in memory.
+
+    Args:
+        prepared: the run.
+        record: the log to write; None keeps the steps in memory.
+        force: replace an existing log.
+
+    Raises:
+        PolicyError: the policy failed.
+        Interrupted: Ctrl-C; a log holds the steps that were done.
+        OutputError: the log cannot be written.
+    """
+    from fireworld.recording.run import Run, open_log
+
     records: list[StepRecord] = []
-    played = play(prepared, record=path, force=force, on_step=records.append if path is None else lambda _: None)
+    played = play(prepared, record=record, force=force, on_step=records.append if record is None else lambda _: None)
     if played.interrupted:
         raise Interrupted(f"interrupted after step {played.last.step}")
-    if path is not None:
-        return open_log(path)
+    if record is not None:
+        return open_log(record)
     return Run(MemoryRecording(prepared.header, prepared.city, records, digest=played.digest))

@@ -41,7 +41,7 @@ def test_info_of_a_complete_log(run_cli, log_path):
         "31, from 0 to 30",
         "10, 20, 30",
         "/buildings",
-        "4.5 of 5",
+        "4.500 of 5",
     ):
         assert words in out
     code, out, _ = run_cli("info", log_path, "--json")

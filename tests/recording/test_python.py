@@ -14,7 +14,7 @@ from fireworld.policy.protocol import Action, Decision
 from fireworld.recording.difference import diff
 from fireworld.recording.explain import explain
 from fireworld.recording.export import export, recover
-from fireworld.recording.fork import prepare_fork
+from fireworld.recording.fork import fork, prepare_fork
 from fireworld.recording.pages.render import render_film, render_picture
 from fireworld.recording.pages.run_page import report
 from fireworld.recording.pages.view import view
@@ -85,12 +85,12 @@ def test_a_verification(here, fireworld):
 def test_a_decision_can_be_given_in_three_ways(here, answer, given):
     """By a step in which the brigade has to decide; the same run as by the command."""
     wanted = answer("fork", "easiest.mcap", "--at", 5, "--decide", "0=nearest-to-me", "--record", "f.mcap")
-    fork = prepare_fork("easiest.mcap", at=5, decide={0: given})
-    assert fork.header.forked_from == wanted["forked_from"]
-    records = list(fork)
+    prepared = prepare_fork("easiest.mcap", at=5, decide={0: given})
+    assert prepared.header.forked_from == wanted["forked_from"]
+    records = list(prepared)
     assert records[6].decisions.action[0] == Action.NEAREST_TO_ME
     assert records[-1].score.score == wanted["score"]
-    assert list(fork)[-1].score.score == wanted["score"], "it can be run again"
+    assert list(prepared)[-1].score.score == wanted["score"], "it can be run again"
 
 
 @pytest.mark.parametrize(
@@ -110,10 +110,28 @@ def test_forks_that_cannot_be(here, options, error, message):
         prepare_fork("easiest.mcap", **options)
 
 
+def test_a_fork_in_memory_and_recorded(here):
+    fork_in_memory = fork("easiest.mcap", at=5, decide={1: "nearest-to-me"}, policy=easiest_for_all)
+    recorded = fork("easiest.mcap", at=5, decide={1: "nearest-to-me"}, policy=easiest_for_all, record="f.mcap")
+    assert recorded.digest == fork_in_memory.digest == open_log("f.mcap").digest
+    assert diff(fork_in_memory, "f.mcap").same
+    assert diff("easiest.mcap", fork_in_memory).first.step == 6
+    assert verify("f.mcap")
+    with pytest.raises(OutputError, match="use --force to replace it"):
+        fork("easiest.mcap", at=5, record=here / "f.mcap")
+    again = fork("easiest.mcap", at=5, record=here / "f.mcap", force=True)
+    assert again.digest == open_log("easiest.mcap").digest
+
+
+def easiest_for_all(observation):
+    """Decide by a function of the observation."""
+    return Decision(Action.EASIEST)
+
+
 def test_swaps_of_open_runs(here, answer):
     other = open_log("own.mcap")
-    fork = prepare_fork(open_log("easiest.mcap"), at=0, swap={0: other, 1: "own.mcap"})
-    assert list(fork)[-1].score.score == other.step(int(other.steps[-1])).score.score
+    prepared = prepare_fork(open_log("easiest.mcap"), at=0, swap={0: other, 1: "own.mcap"})
+    assert list(prepared)[-1].score.score == other.step(int(other.steps[-1])).score.score
 
 
 def test_an_explanation_is_what_the_command_writes(here, answer):

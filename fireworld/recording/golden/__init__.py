@@ -1,1 +1,1 @@
-"""Golden recordings: kept, run again, compared."""
+"""Golden recordings: stored, run again, compared."""

@@ -20,9 +20,10 @@ from fireworld.recording.difference_text import change_lines
 from fireworld.recording.golden.spec import GoldenSpec, prepare_golden, spec_of
 from fireworld.recording.golden.store import SUFFIX, make_folder, store_recording, text_path
 from fireworld.recording.golden.text import is_text_of
-from fireworld.records import MemoryRecording, RunHeader
+from fireworld.recording.record import run_prepared
+from fireworld.recording.run import Run
+from fireworld.records import RunHeader
 from fireworld.simulation.built import CityCache
-from fireworld.simulation.run import PreparedRun
 
 if TYPE_CHECKING:
     from fireworld_recorder.diff import RunComparison
@@ -39,7 +40,7 @@ class GoldenResult:
     path: Path
     header: RunHeader | None = None
     """Of the golden; None if it cannot be read."""
-    fresh: MemoryRecording | None = None
+    fresh: Run | None = None
     """The new run; None if there was none."""
     difference: RunComparison | None = None
     error: str = ""
@@ -155,27 +156,18 @@ def _check_all(paths: Sequence[Path], keep: Path | None) -> Iterator[GoldenResul
 
 
 def check_golden(path: Path, *, cities: CityCache | None = None) -> GoldenResult:
-    """Run a golden's spec again and compare; the result says so if that is not possible."""
+    """Run a golden's spec again and compare; if that is not possible the result has the error."""
     header: RunHeader | None = None
     try:
         header = open_log(path).header
         spec = spec_of(header)
-        fresh = run_in_memory(prepare_golden(spec, path.parent, recorded=header, cities=cities))
+        fresh = run_prepared(prepare_golden(spec, path.parent, recorded=header, cities=cities))
         return compare_golden(path, fresh, spec)
     except FireworldError as error:
         return GoldenResult(path=path, header=header, error=str(error))
 
 
-def run_in_memory(run: PreparedRun) -> MemoryRecording:
-    """Run a prepared run to its end and hold its steps in memory.
-
-    Raises:
-        PolicyError: the policy fails.
-    """
-    return MemoryRecording(run.header, run.city, list(run))
-
-
-def compare_golden(path: Path, fresh: MemoryRecording, spec: GoldenSpec) -> GoldenResult:
+def compare_golden(path: Path, fresh: Run, spec: GoldenSpec) -> GoldenResult:
     """Compare a golden with a new run of its spec.
 
     Raises:

@@ -11,7 +11,7 @@ from fireworld_recorder.writer import LogWriter
 from fireworld.errors import OutputError
 from fireworld.files import write_file
 from fireworld.recording.golden.text import golden_text
-from fireworld.records import MemoryRecording
+from fireworld.records import Steps
 
 SUFFIX: Final = ".mcap"
 TEXT_SUFFIX: Final = ".txt"
@@ -22,7 +22,7 @@ def text_path(path: Path) -> Path:
     return path.with_suffix(TEXT_SUFFIX)
 
 
-def store_golden(path: Path, fresh: MemoryRecording) -> None:
+def store_golden(path: Path, fresh: Steps) -> None:
     """Write a golden and its text, replacing what is there; each is written beside and renamed.
 
     Raises:
@@ -32,7 +32,7 @@ def store_golden(path: Path, fresh: MemoryRecording) -> None:
     store_text(path)
 
 
-def store_recording(path: Path, fresh: MemoryRecording) -> None:
+def store_recording(path: Path, fresh: Steps) -> None:
     """Write a recording, replacing what is there.
 
     Raises:

@@ -13,10 +13,11 @@ from fireworld_recorder.reader import open_log
 from fireworld.errors import FireworldError, LogError, OutputError, expected
 from fireworld.files import write_file
 from fireworld.interrupt import gentle_interrupt
-from fireworld.recording.golden.check import FOLDER, GoldenResult, check_goldens, compare_golden, run_in_memory
+from fireworld.recording.golden.check import FOLDER, GoldenResult, check_goldens, compare_golden
 from fireworld.recording.golden.spec import GoldenSpec, make_spec, prepare_golden, spec_of
 from fireworld.recording.golden.store import SUFFIX, make_folder, store_golden, store_text
-from fireworld.records import MemoryRecording
+from fireworld.recording.record import run_prepared
+from fireworld.recording.run import Run
 
 REASONS: Final = "REASONS.md"
 REASONS_TITLE: Final = "# Why golden recordings changed\n\nWritten by `fireworld golden update`; the newest last.\n"
@@ -66,7 +67,7 @@ def add_golden(
         hint = "`fireworld golden update` records it anew; or try another name"
         raise OutputError(expected(str(path), "", "a name that is free", "an existing golden", hint))
     spec = make_spec(folder, scenario=scenario, policy=policy, seed=seed, steps=steps, settings=settings)
-    fresh = run_in_memory(prepare_golden(spec, folder))
+    fresh = run_prepared(prepare_golden(spec, folder))
     make_folder(folder)
     with gentle_interrupt():
         store_golden(path, fresh)
@@ -96,7 +97,7 @@ def update_goldens(
     """
     reason = " ".join(reason.split())
     if not reason:
-        raise OutputError(expected("reason", "", "a sentence that says why the goldens changed", "nothing"))
+        raise OutputError(expected("reason", "", "a sentence on why the goldens changed", "nothing"))
     results = []
     for result in check_goldens(folder, names):
         results.append(result)
@@ -112,7 +113,7 @@ def update_goldens(
         return [_update(result) for result in results]
 
 
-def store_if_changed(path: Path, fresh: MemoryRecording, spec: GoldenSpec) -> bool:
+def store_if_changed(path: Path, fresh: Run, spec: GoldenSpec) -> bool:
     """Store a golden, unless it is there already, was made by this spec and is the same as a new run of it.
 
     Returns:

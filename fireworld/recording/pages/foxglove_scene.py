@@ -156,9 +156,9 @@ class _Roofs:
 
     def of(self, chosen: NDArray[np.bool_]) -> tuple[NDArray[Any], NDArray[Any]]:
         """Corners (v, 3) and triangles (t, 3) of some buildings. (n,) whether it is chosen."""
-        kept = np.repeat(chosen, self._n_corners)
-        number = np.cumsum(kept) - 1
-        return self._corners[kept], number[self._triangles[chosen[self._building]]]
+        used = np.repeat(chosen, self._n_corners)
+        number = np.cumsum(used) - 1
+        return self._corners[used], number[self._triangles[chosen[self._building]]]
 
 
 def _triangles(xyz_m: NDArray[Any], triangle: NDArray[Any], rgb: colors.Rgb) -> bytes:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from fireworld.recording.golden.check import run_in_memory
 from fireworld.recording.golden.spec import GoldenSpec, prepare_golden
+from fireworld.recording.record import run_prepared
 from tests import command_line
 
 CACHE = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
@@ -59,7 +59,7 @@ def golden(monkeypatch):
 @pytest.fixture(scope="session")
 def _warm():
     """Let numba import all it needs: what is first imported within a test's own pytest is forgotten after it."""
-    run_in_memory(prepare_golden(GoldenSpec(scenario="quick", policy="random", steps=2), Path()))
+    run_prepared(prepare_golden(GoldenSpec(scenario="quick", policy="random", steps=2), Path()))
 
 
 @pytest.fixture

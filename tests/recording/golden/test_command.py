@@ -207,7 +207,7 @@ def test_check_interrupted(kept, golden, monkeypatch):
     def interrupted(run):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(check, "run_in_memory", interrupted)
+    monkeypatch.setattr(check, "run_prepared", interrupted)
     before = contents(kept)
     assert golden("check").code == 130
     assert golden("update", "--reason", "None.").code == 130

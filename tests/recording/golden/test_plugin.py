@@ -9,9 +9,10 @@ import pytest
 from fireworld_recorder.reader import open_log
 
 from fireworld.pytest_plugin import NAME_MAX, golden_name
-from fireworld.recording.golden.check import check_golden, find_goldens, run_in_memory
+from fireworld.recording.golden.check import check_golden, find_goldens
 from fireworld.recording.golden.spec import GoldenSpec, prepare_golden, spec_of
 from fireworld.recording.golden.store import store_golden
+from fireworld.recording.record import run_prepared
 from tests.recording.golden.conftest import POLICY
 
 pytestmark = pytest.mark.slow
@@ -192,7 +193,7 @@ def test_mistakes_fail_in_a_line(project, call, complaint):
     failing = POLICY + "\nclass Failing:\n    def decide(self, observation):\n        return {}['a']\n"
     project.makepyfile(mine=failing, test_mine=ONE.partition("    rec")[0] + f"    recording({call})\n")
     (project.path / "recordings").mkdir()
-    good = run_in_memory(prepare_golden(GoldenSpec(scenario="quick", policy="random", steps=2), project.path))
+    good = run_prepared(prepare_golden(GoldenSpec(scenario="quick", policy="random", steps=2), project.path))
     store_golden(project.path / "recordings" / "test_mine-test_policy.mcap", good)
     out = run(project, outcome={"failed": 1})
     out.fnmatch_lines([complaint])
@@ -243,7 +244,7 @@ def test_it_imports_nothing_before_a_test_asks():
         "import sys, pytest; before = {*sys.modules}; import fireworld.pytest_plugin; print(*{*sys.modules} - before)"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert set(done.stdout.split()) == {"fireworld", "fireworld.pytest_plugin"}
+    assert set(done.stdout.split()) == {"fireworld", "fireworld.version", "fireworld.pytest_plugin"}
 
 
 def test_pytest_finds_it(pytestconfig):
