@@ -86,15 +86,17 @@ _ROOMS = {
 __all__ = ["__version__", *sorted(_ROOMS)]  # noqa: PLE0604 - the names are those of the table
 
 
-def __getattr__(name: str) -> Any:
-    """Import a name of the front door from the module it lives in, at its first use."""
-    if name not in _ROOMS:
-        raise AttributeError(f"module 'fireworld' has no attribute {name!r}; there are {', '.join(sorted(_ROOMS))}")
-    from importlib import import_module
+if not TYPE_CHECKING:  # else type checkers would take every name for one that is offered
 
-    found = getattr(import_module(f"fireworld.{_ROOMS[name]}"), name)
-    globals()[name] = found
-    return found
+    def __getattr__(name: str) -> Any:
+        """Import a name of the front door from the module it lives in, at its first use."""
+        if name not in _ROOMS:
+            raise AttributeError(f"module 'fireworld' has no attribute {name!r}; there are {', '.join(sorted(_ROOMS))}")
+        from importlib import import_module
+
+        found = getattr(import_module(f"fireworld.{_ROOMS[name]}"), name)
+        globals()[name] = found
+        return found
 
 
 def __dir__() -> list[str]:

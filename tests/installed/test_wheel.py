@@ -13,14 +13,10 @@ import pytest
 from fireworld.policy.teams.shipped import team_names
 from fireworld.scenario import scenario_names
 from tests.docs.pages import ROOT
+from tests.installed.names import FRONT_DOOR
 
 pytestmark = pytest.mark.slow
 
-FRONT_DOOR = {
-    *("run", "world", "open_log", "Run", "verify", "diff", "fork", "explain", "recover", "export"),
-    *("compare", "reproduce", "train", "Team", "load_team", "Scenario", "scenarios"),
-    *("Policy", "policies", "Action", "Decision", "Observation"),
-}
 SHIPPED = {
     "scenarios": {f"{name}.yaml" for name in scenario_names()},
     "scenarios/curricula": {path.name for path in (ROOT / "scenarios" / "curricula").glob("*.yaml")},

@@ -1,0 +1,7 @@
+"""What the front door offers at least."""
+
+FRONT_DOOR = {
+    *("run", "world", "Session", "open_log", "Run", "verify", "diff", "fork", "explain", "recover", "export"),
+    *("compare", "reproduce", "train", "Team", "load_team", "Scenario", "scenarios"),
+    *("Policy", "policies", "Action", "Decision", "Observation"),
+}
