@@ -308,15 +308,6 @@ def test_a_function_is_of_the_observation_or_makes_a_policy():
     assert ask(find_policy(either).policy, None) == Decision(2)
 
 
-def test_policies_are_made_anew_for_every_run():
-    for given in ("tests.policy.test_names:Own:k=3", find_policy(Own, parameters={"k": 3})):
-        named = find_policy(given)
-        assert named.fresh().given is not named.policy.given
-        assert named.fresh().given.k == 3
-    own = Own()
-    assert find_policy(own).fresh().given is own
-
-
 def test_policies_are_found_again_by_other_processes():
     given = ["chief", "best", "planner:horizon=5", "tests.policy.test_names:Own:k=3", Own, Own(4), nearest]
     for one in map(find_policy, given):
