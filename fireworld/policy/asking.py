@@ -27,6 +27,9 @@ LIBRARIES: Final = (
 """Where code that is not the user's own comes from."""
 AN_ANSWER: Final = f"a Decision or an action ({', '.join(ACTION_NAMES)}, or 0 to {len(ACTION_NAMES) - 1})"
 
+PASSING: Final = (FireworldError, KeyboardInterrupt)
+"""What is raised in a policy and is no fault of it."""
+
 Value = TypeVar("Value")
 
 
@@ -86,8 +89,12 @@ def ask(policy: Policy, observation: Observation) -> Decision:
     Raises:
         PolicyError: the policy fails, or answers with something that is no decision.
     """
-    with users_code(policy, observation):
+    try:
         return _checked(policy.decide(observation), policy, observation)
+    except PASSING:
+        raise
+    except BaseException as error:
+        raise _failure(policy, _moment(observation), error) from error
 
 
 def keeps(policy: Policy, brigade: int, last_action: int, step: int) -> bool:
@@ -96,25 +103,28 @@ def keeps(policy: Policy, brigade: int, last_action: int, step: int) -> bool:
     Raises:
         PolicyError: the policy's own `keeps` fails.
     """
-    with users_code(policy, f"step {step}, brigade {brigade}: keeps"):
+    try:
         return last_action >= 0 and bool(policy.keeps(brigade, last_action, step))
+    except PASSING:
+        raise
+    except BaseException as error:
+        raise _failure(policy, f"step {step}, brigade {brigade}: keeps", error) from error
 
 
 @contextmanager
-def users_code(what: object, moment: str | Observation) -> Iterator[None]:
+def users_code(what: object, moment: str) -> Iterator[None]:
     """Turn whatever a user's code raises into a PolicyError; only Ctrl-C and fireworld's own errors pass.
 
     Args:
         what: a policy, or what the message begins with.
-        moment: when it is called, which the message says next.
+        moment: when the code runs, which the message says next.
     """
     try:
         yield
-    except (FireworldError, KeyboardInterrupt):
+    except PASSING:
         raise
     except BaseException as error:
-        place = what if isinstance(what, str) else f"policy {name_of(what)}"
-        raise PolicyError(f"{place}: {_said(moment)}: {describe(error)}") from error
+        raise _failure(what, moment, error) from error
 
 
 def name_of(policy: object) -> str:
@@ -132,15 +142,20 @@ def describe(error: BaseException) -> str:
     return described(error) + (f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else "")
 
 
-def _said(moment: str | Observation) -> str:
-    return moment if isinstance(moment, str) else f"step {moment.step}, brigade {moment.brigade}"
+def _failure(what: object, moment: str, error: BaseException) -> PolicyError:
+    place = what if isinstance(what, str) else f"policy {name_of(what)}"
+    return PolicyError(f"{place}: {moment}: {describe(error)}")
+
+
+def _moment(observation: Observation) -> str:
+    return f"step {observation.step}, brigade {observation.brigade}"
 
 
 def _checked(answer: Any, policy: Policy, observation: Observation) -> Decision:
     """Return a decision with nothing but plain values in it."""
 
     def refusal(wanted: str, got: object, hint: str = "") -> PolicyError:
-        return PolicyError(expected(f"policy {name_of(policy)}", _said(observation), wanted, got, hint))
+        return PolicyError(expected(f"policy {name_of(policy)}", _moment(observation), wanted, got, hint))
 
     def plain(name: str, wanted: str, convert: Callable[[Any], Value]) -> Value:
         value = getattr(answer, name)
