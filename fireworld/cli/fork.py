@@ -76,7 +76,7 @@ def command(
     if force and output is None:
         raise click.UsageError("--force goes with --record.")
     announce_compilation()
-    from fireworld.cli.run import carry_out, outcome_of, show_outcome
+    from fireworld.cli.run import play_and_watch
     from fireworld.recording.fork import prepare_fork
 
     run = prepare_fork(
@@ -88,17 +88,16 @@ def command(
     )
     if run.note:
         click.echo(run.note, err=True)
-    last, digest = carry_out(run, output=output, force=force, quiet=as_json)
-    outcome = outcome_of(run, last, digest=digest, output=output)
-    known = {"forked_from": run.header.forked_from, "score_of_original": run.score_of_original}
+    found = play_and_watch(run, output=output, force=force, quiet=as_json)
     if as_json:
-        click.echo(json.dumps(outcome | known, indent=2))
+        known = {"forked_from": run.header.forked_from, "score_of_original": run.score_of_original}
+        click.echo(json.dumps(found.as_json() | known, indent=2))
     else:
-        show_outcome(outcome)
+        found.show()
         original, _, _ = run.header.forked_from.partition(":")
-        same = "; the same run" if digest == original else f", where the score was {run.score_of_original:.3f}"
+        same = "; the same run" if found.digest == original else f", where the score was {run.score_of_original:.3f}"
         click.echo(f"forked from {log} after step {at}{same}")
-    context.exit(INTERRUPTED if outcome["ended"] == "interrupted" else 0)
+    context.exit(INTERRUPTED if found.interrupted else 0)
 
 
 def _by_brigade(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from contextlib import contextmanager
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -21,7 +22,8 @@ if TYPE_CHECKING:
     from fireworld_recorder.writer import Scene
     from fireworld_viewer.rerun_view.live import Screen
 
-    from fireworld.records import CityRecord, RunHeader, StepRecord, Steps
+    from fireworld.outcome import Outcome
+    from fireworld.records import RunHeader, StepRecord, Steps
 
 STEP: Final = "step {task.completed:.0f} of at most {task.total:.0f}"
 STATE: Final = "{task.fields[burning]} burning, score {task.fields[score]:.2f}"
@@ -59,7 +61,7 @@ def command(
 
     \b
     fireworld run                                    the default scenario
-    fireworld run test-1 --policy easiest --seed 3   another fire, policy and luck
+    fireworld run test-1 --policy easiest --seed 3   another fire, policy and random draws
     fireworld run quick --set brigades.n=4           with a changed scenario
     fireworld run --record out.mcap                  and every step recorded
     fireworld run --view                             and shown while it runs
@@ -83,16 +85,61 @@ def command(
     if note:
         click.echo(note, err=True)
     run = prepare_run(build_scenario(chosen), named, seed=seed, n_steps_max=steps)
-    last, digest = carry_out(run, output=output, force=force, quiet=as_json, foxglove=scene is not None, screen=screen)
-    outcome = outcome_of(run, last, digest=digest, output=output)
+    found = play_and_watch(run, output=output, force=force, quiet=as_json, foxglove=scene is not None, screen=screen)
     if as_json:
-        click.echo(json.dumps(outcome, indent=2))
+        click.echo(json.dumps(found.as_json(), indent=2))
     else:
-        show_outcome(outcome)
-    context.exit(INTERRUPTED if outcome["ended"] == "interrupted" else 0)
+        found.show()
+    context.exit(INTERRUPTED if found.interrupted else 0)
 
 
-def carry_out(
+@dataclass(frozen=True)
+class Ending:
+    """How a run that a command has made ended."""
+
+    header: RunHeader
+    outcome: Outcome
+    digest: str
+    interrupted: bool
+    output: Path | None
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it as plain values; the keys are those of the outcome, but for two."""
+        outcome = asdict(self.outcome)
+        completed = outcome.pop("completed")
+        return {
+            **{key: getattr(self.header, key) for key in ("scenario", "policy", "seed")},
+            "ended": "interrupted" if self.interrupted else "terminated" if completed else "truncated",
+            "steps": outcome.pop("steps"),
+            "time_to_complete": self.outcome.time_to_complete,
+            "return": outcome.pop("total_reward"),
+            **outcome,
+            "digest": self.digest,
+            "recording": None if self.output is None else str(self.output),
+        }
+
+    def show(self) -> None:
+        """Print it as a table."""
+        from rich.console import Console
+        from rich.table import Table
+
+        from fireworld.outcome import QUANTITIES
+
+        header = self.header
+        table = Table(title=f"{header.scenario}, {header.policy}, seed {header.seed}", show_header=False)
+        table.add_column(style="bold")
+        table.add_column(justify="right", overflow="fold")
+        for quantity in QUANTITIES:
+            table.add_row(quantity.label, quantity.text(self.outcome))
+        table.add_row("digest", self.digest)
+        Console().print(table)
+        if self.interrupted:
+            click.echo(f"interrupted after step {self.outcome.steps}", err=True)
+        if self.output is not None:
+            click.echo(f"recorded to {self.output}; look at it with `fireworld view {self.output}`")
+
+
+def play_and_watch(
     run: Steps,
     *,
     output: Path | None,
@@ -100,8 +147,8 @@ def carry_out(
     quiet: bool,
     foxglove: bool = False,
     screen: Screen | None = None,
-) -> tuple[StepRecord, str]:
-    """Run a prepared run under a progress display, and shown live; return its last record and its digest.
+) -> Ending:
+    """Run a prepared run under a progress display, and shown live; errors as for `recording.record.play`.
 
     Args:
         run: the run.
@@ -110,15 +157,15 @@ def carry_out(
         quiet: show no progress.
         foxglove: add to the recording what Foxglove draws.
         screen: where to show the run while it happens.
-
-    Raises:
-        PolicyError: the policy failed; the steps before are in the partial recording.
-        Interrupted: a second Ctrl-C; likewise.
-        OutputError: the recording cannot be written.
     """
+    from fireworld.outcome import outcome_of
     from fireworld.recording.record import play
 
-    scene = make_scene(run.header, run.city) if foxglove else None
+    scene: Scene | None = None
+    if foxglove:
+        from fireworld.recording.pages.foxglove_scene import FoxgloveScene
+
+        scene = FoxgloveScene(run.header, run.city)
     with watched_run(screen, run.header, run.city) as show, _progress(run.header, quiet=quiet) as advance:
 
         def on_step(record: StepRecord) -> None:
@@ -126,14 +173,9 @@ def carry_out(
             advance(record)
 
         played = play(run, record=output, force=force, scene=scene, on_step=on_step)
-    return played.last, played.digest
-
-
-def make_scene(header: RunHeader, city: CityRecord) -> Scene:
-    """Make what is recorded besides for Foxglove."""
-    from fireworld.recording.pages.foxglove_scene import FoxgloveScene
-
-    return FoxgloveScene(header, city)
+    last = played.last
+    ended = last.terminated or last.truncated
+    return Ending(run.header, outcome_of(last, run.city), played.digest, played.interrupted and not ended, output)
 
 
 @contextmanager
@@ -147,58 +189,3 @@ def _progress(header: RunHeader, *, quiet: bool) -> Iterator[Callable[[StepRecor
         yield lambda record: progress.update(
             task, completed=record.step, burning=record.score.n_burning, score=record.score.score
         )
-
-
-def outcome_of(run: Steps, last: StepRecord, *, digest: str, output: Path | None) -> dict[str, Any]:
-    """Collect how a run ended."""
-    score = last.score
-    ended = "terminated" if last.terminated else "truncated" if last.truncated else "interrupted"
-    return {
-        "scenario": run.header.scenario,
-        "policy": run.header.policy,
-        "seed": run.header.seed,
-        "ended": ended,
-        "steps": last.step,
-        "time_to_complete": last.step if last.terminated else None,
-        "score": score.score,
-        "score_max": score.score_max,
-        "score_now": score.score_now,
-        "n_buildings": len(run.city.building_id),
-        "n_burning": score.n_burning,
-        "n_burnt_out": score.n_burnt_out,
-        "n_water_damaged": score.n_water_damaged,
-        "n_civilians": len(run.city.civilian_x_m),
-        "n_civilians_alive": score.n_civilians_alive,
-        "return": last.rewards.sum_so_far,
-        "water_used_litres": score.water_used_litres,
-        "digest": digest,
-        "recording": str(output) if output is not None else None,
-    }
-
-
-def show_outcome(outcome: dict[str, Any]) -> None:
-    """Show the outcome as a table."""
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(title=f"{outcome['scenario']}, {outcome['policy']}, seed {outcome['seed']}", show_header=False)
-    table.add_column(style="bold")
-    table.add_column(justify="right", overflow="fold")
-    complete = outcome["time_to_complete"]
-    time = f"{complete} steps" if complete is not None else f"not within {outcome['steps']} steps"
-    table.add_row("score", f"{outcome['score']:.3f} of {outcome['score_max']:.0f}")
-    table.add_row("time to complete", time)
-    table.add_row("burnt out", f"{outcome['n_burnt_out']} of {outcome['n_buildings']} buildings")
-    table.add_row("still burning", str(outcome["n_burning"]))
-    table.add_row("water-damaged", str(outcome["n_water_damaged"]))
-    table.add_row("civilians alive", f"{outcome['n_civilians_alive']} of {outcome['n_civilians']}")
-    table.add_row("return", f"{outcome['return']:,.0f}")
-    table.add_row("water used", f"{outcome['water_used_litres']:,.0f} litres")
-    table.add_row("digest", outcome["digest"])
-    console = Console()
-    console.print(table)
-    if outcome["ended"] == "interrupted":
-        click.echo(f"interrupted after step {outcome['steps']}", err=True)
-    if outcome["recording"] is not None:
-        name = outcome["recording"]
-        click.echo(f"recorded to {name}; look at it with `fireworld view {name}`")

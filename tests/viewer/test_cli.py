@@ -185,7 +185,7 @@ from fireworld_viewer.rerun_view import app
 app.save([make_recording(3, 3, 2)], Path(tempfile.mkdtemp()) / "x.rrd")
 assert "numba" not in sys.modules and "matplotlib" not in sys.modules
 parts = {name.split(".")[1] for name in sys.modules if name.startswith("fireworld.")}
-assert parts <= {"errors", "files", "outcome", "records"}, parts
+assert parts <= {"errors", "files", "outcome", "records", "version"}, parts
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode == 0, done.stderr
