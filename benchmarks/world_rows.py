@@ -113,7 +113,7 @@ def run_compiled(world: World, *, policy: KernelPolicy) -> int:
 
 def assert_same_end(plain: episode.World, compiled: World) -> None:
     """Make sure that both engines have come to the same end."""
-    arrays, outcome = compiled.arrays, plain.outcome
+    arrays, outcome = compiled.state, plain.outcome
     np.testing.assert_array_equal(arrays.fire.fieryness, plain.fire.fieryness)
     np.testing.assert_array_equal(arrays.fire.water, plain.fire.water)
     np.testing.assert_allclose(arrays.fire.energy, plain.fire.energy, rtol=1e-9, atol=1e-6)
