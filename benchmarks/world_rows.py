@@ -66,7 +66,7 @@ def smallest_fire(size: int) -> int:
         for last in range(10, N_STEPS + 1, 10):
             world.n_steps_max = last
             world.run(ready)
-            total += int(world.state.outcome.counts[0])
+            total += world.outcome.n_burning
         if not world.terminated and total < fewest:
             best, fewest = building, total
     assert best >= 0, "some fire outlasts the episode"
@@ -118,8 +118,8 @@ def assert_same_end(plain: episode.World, compiled: World) -> None:
     np.testing.assert_array_equal(arrays.fire.water, plain.fire.water)
     np.testing.assert_allclose(arrays.fire.energy, plain.fire.energy, rtol=1e-9, atol=1e-6)
     assert arrays.brigades.tank.tolist() == [brigade.tank_litres for brigade in plain.team]
-    assert arrays.outcome.counts[3] == outcome.n_civilians_alive
-    assert arrays.outcome.water[0] == outcome.water_litres
+    assert compiled.outcome.n_civilians_alive == outcome.n_civilians_alive
+    assert compiled.outcome.water_used_litres == outcome.water_litres
 
 
 def stepping_row(size: int, n_steps: int, *, seconds: float) -> Row:
