@@ -97,7 +97,8 @@ def built(scenario: str) -> Any:
 
 def policy_named(name: str) -> Any:
     """Load a policy that kernels follow."""
-    return moved("load_policy", "fireworld.policy.names")(name).policy
+    names = importlib.import_module("fireworld.policy.names")
+    return (names.find_policy if hasattr(names, "find_policy") else names.load_policy)(name).policy
 
 
 def episodes(scenario: str, policy: str, *, n: int = 1) -> Work:

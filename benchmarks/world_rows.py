@@ -9,10 +9,9 @@ from functools import cache, partial
 
 import numpy as np
 
-from benchmarks.fires import KINDS, LOTS, Kind, city_of, every_eighth, from_the_middle, tables_of
-from benchmarks.runs import SEED, new_world, run_silently, start_of
+from benchmarks.fires import KINDS, LOTS, Kind, city_of, every_eighth, from_the_middle
+from benchmarks.runs import SEED, new_world, placement_of, run_silently, world_of
 from benchmarks.timing import Contender, Row, compare
-from fireworld.city.city import Array
 from fireworld.parameters import PAPER, Parameters
 from fireworld.policy.kernel import KernelPolicy, always
 from fireworld.records import ACTIONS
@@ -41,18 +40,6 @@ def parameters_of(kind: Kind) -> Parameters:
     )
 
 
-def world_of(size: int, kind: Kind, ignited: Array) -> World:
-    """Set up a compiled world of the episode rows."""
-    return World(
-        city_of(size),
-        parameters_of(kind),
-        **start_of(size, ignited),
-        seed=SEED,
-        n_steps_max=N_STEPS,
-        arrays=tables_of(size),
-    )
-
-
 @cache
 def smallest_fire(size: int) -> int:
     """Return the building whose fire stays smallest while it outlasts the episode.
@@ -61,7 +48,7 @@ def smallest_fire(size: int) -> int:
     """
     best, fewest = -1, math.inf
     for building, _ in zip(from_the_middle(city_of(size)), range(N_CANDIDATES), strict=False):
-        world, total = world_of(size, "small", np.array([building])), 0
+        world, total = world_of(size, np.array([building]), N_STEPS, parameters=parameters_of("small")), 0
         ready = POLICY.for_brigades(world.n_brigades)
         for last in range(10, N_STEPS + 1, 10):
             world.n_steps_max = last
@@ -78,8 +65,8 @@ def episode_row(size: int, kind: Kind, *, seconds: float) -> Row:
     city = city_of(size)
     ignited = every_eighth(city) if kind == "hot" else np.array([smallest_fire(size)])
     tables = episode.Tables.of_city(city, parameters_of(kind))
-    begin = episode.World.at_start(tables, **start_of(size, ignited))
-    world = world_of(size, kind, ignited)
+    begin = episode.World.at_start(tables, **vars(placement_of(size, ignited)))
+    world = world_of(size, ignited, N_STEPS, parameters=parameters_of(kind))
     ours = Contender("compiled", partial(run_compiled, policy=POLICY), again(world))
 
     def in_numpy(fresh: episode.World) -> int:
