@@ -82,8 +82,8 @@ fuzz: install  ## Try odd and altered files on all readers for FUZZ_SECONDS (60)
 	then $(BIN)/python -m tests.fuzz.with_atheris --seconds $(FUZZ_SECONDS); \
 	else echo "atheris does not install here: done without it"; fi
 
-bench: install  ## Measure speed; prints ratios taken within the run.
-	$(BIN)/python -m benchmarks.bench
+bench: install  ## Measure speed against baselines; with AGAINST=COMMIT, this tree against that commit.
+	$(BIN)/python -m benchmarks.$(if $(AGAINST),against $(AGAINST),bench)
 
 check-teams: install  ## Train the teams that come with fireworld again; they must be the same.
 	$(BIN)/python -m benchmarks.shipped

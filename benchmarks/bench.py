@@ -44,14 +44,14 @@ def rows(sections: tuple[str, ...], *, quick: bool) -> Iterator[Row]:
         yield from importlib.import_module(f"benchmarks.{SECTIONS[section]}").rows(quick=quick)
 
 
-def print_table(found: list[Row], machine: dict[str, str]) -> None:
+def print_table(found: list[Row], machine: dict[str, str], *, caption: str = CAPTION) -> None:
     """Print a table for people."""
     from rich.console import Console
     from rich.table import Table
 
     console = Console(width=None if sys.stdout.isatty() else WIDTH)
     console.print(", ".join(f"{name} {value}" for name, value in machine.items()), highlight=False)
-    table = Table(caption=CAPTION)
+    table = Table(caption=caption)
     for name in ("", "what", "size"):
         table.add_column(name)
     for name in ("ours", "baseline", "ratio"):

@@ -19,20 +19,18 @@ import numpy as np
 from fireworld_recorder.reader import open_log
 from fireworld_recorder.writer import LogWriter
 
-from benchmarks.fires import city_of, tables_of
+from benchmarks.fires import city_of
 from benchmarks.runs import (
-    SEED,
     from_the_corner,
     header,
     new_world,
     record_of,
     records,
     run_silently,
-    start_of,
+    world_of,
     write_log,
 )
 from benchmarks.timing import Contender, Row, compare, duration, measure
-from fireworld.parameters import PAPER
 from fireworld.policy.kernel import each_another
 from fireworld.records import STEP_TOPICS, StepRecord
 from fireworld.simulation.world import World
@@ -129,9 +127,7 @@ def read_rows(size: int, n_steps: int, folder: Path, *, seconds: float) -> Itera
 
 def other_world(size: int, n_steps: int) -> World:
     """Set up the same world as `new_world`, in which one building less burns at first."""
-    city = city_of(size)
-    start = start_of(size, from_the_corner(city)[1:])
-    return World(city, PAPER, **start, seed=SEED, n_steps_max=n_steps, arrays=tables_of(size))
+    return world_of(size, from_the_corner(city_of(size))[1:], n_steps)
 
 
 def diff_rows(size: int, n_steps: int, folder: Path, *, seconds: float) -> Iterator[Row]:

@@ -82,7 +82,7 @@ def play(built: BuiltScenario, options: str, seeds: Iterable[int]) -> Result:
         while not (world.terminated or world.truncated):
             world.step(policy)
         seconds.append(time.process_time() - started)
-        scores.append(float(world.state.outcome.score[0] / world.state.outcome.score[1]))
+        scores.append(world.outcome.score_share)
     return Result(fmean(scores), fmean(seconds))
 
 

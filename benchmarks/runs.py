@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from fireworld_recorder.writer import LogWriter
@@ -12,10 +12,12 @@ from fireworld_recorder.writer import LogWriter
 from benchmarks.fires import city_of, tables_of
 from fireworld.city.city import Array, City
 from fireworld.city.record import city_record
-from fireworld.parameters import PAPER
+from fireworld.parameters import PAPER, Parameters
 from fireworld.policy.kernel import KernelPolicy, each_another
 from fireworld.records import CityRecord, RunHeader, StepRecord
 from fireworld.simulation.observer import Observer
+from fireworld.simulation.placement import Placement
+from fireworld.simulation.start import prepare_start
 from fireworld.simulation.world import World
 
 N_BRIGADES: Final = 4
@@ -24,18 +26,24 @@ N_CORNER: Final = 40
 SEED: Final = 1
 
 
-def start_of(size: int, ignited: Array) -> dict[str, Any]:
+def placement_of(size: int, ignited: Array) -> Placement:
     """Place ten civilians all over a city, and four brigades at its refuges in turn; (k,) buildings burn."""
     city = city_of(size)
     inflammable = np.flatnonzero(city.footprints.inflammable)
     civilians = inflammable[:: len(inflammable) // N_CIVILIANS][:N_CIVILIANS]
     refuges = np.flatnonzero(city.footprints.refuge)
-    return {
-        "ignited": ignited,
-        "civilian_building": civilians,
-        "civilian_mm": city.footprints.centroid_mm[civilians],
-        "brigade_refuge": refuges[np.arange(N_BRIGADES) % len(refuges)],
-    }
+    return Placement(
+        ignited=ignited,
+        civilian_building=civilians,
+        civilian_mm=city.footprints.centroid_mm[civilians],
+        brigade_refuge=refuges[np.arange(N_BRIGADES) % len(refuges)],
+    )
+
+
+def world_of(size: int, ignited: Array, n_steps: int, *, parameters: Parameters = PAPER) -> World:
+    """Set up a world with a team in a city, in which these buildings burn."""
+    start = prepare_start(city_of(size), parameters, placement_of(size, ignited), arrays=tables_of(size))
+    return World(start, seed=SEED, n_steps_max=n_steps)
 
 
 def from_the_corner(city: City) -> Array:
@@ -47,15 +55,7 @@ def from_the_corner(city: City) -> Array:
 
 def new_world(size: int, n_steps: int) -> World:
     """Set up a world with a team and a fire that spreads from a corner."""
-    city = city_of(size)
-    return World(
-        city,
-        PAPER,
-        **start_of(size, from_the_corner(city)),
-        seed=SEED,
-        n_steps_max=n_steps,
-        arrays=tables_of(size),
-    )
+    return world_of(size, from_the_corner(city_of(size)), n_steps)
 
 
 def run_silently(world: World, policy: KernelPolicy) -> None:
@@ -96,7 +96,7 @@ def record_of(world: World) -> CityRecord:
         civilian_building=people.building,
         civilian_hp=people.hp,
         n_brigades=world.n_brigades,
-        brigades=world.parameters.brigades,
+        brigades=PAPER.brigades,
     )
 
 

@@ -9,10 +9,9 @@ from functools import cache, partial
 
 import numpy as np
 
-from benchmarks.fires import KINDS, LOTS, Kind, city_of, every_eighth, from_the_middle, tables_of
-from benchmarks.runs import SEED, new_world, run_silently, start_of
+from benchmarks.fires import KINDS, LOTS, Kind, city_of, every_eighth, from_the_middle
+from benchmarks.runs import SEED, new_world, placement_of, run_silently, world_of
 from benchmarks.timing import Contender, Row, compare
-from fireworld.city.city import Array
 from fireworld.parameters import PAPER, Parameters
 from fireworld.policy.kernel import KernelPolicy, always
 from fireworld.records import ACTIONS
@@ -41,18 +40,6 @@ def parameters_of(kind: Kind) -> Parameters:
     )
 
 
-def world_of(size: int, kind: Kind, ignited: Array) -> World:
-    """Set up a compiled world of the episode rows."""
-    return World(
-        city_of(size),
-        parameters_of(kind),
-        **start_of(size, ignited),
-        seed=SEED,
-        n_steps_max=N_STEPS,
-        arrays=tables_of(size),
-    )
-
-
 @cache
 def smallest_fire(size: int) -> int:
     """Return the building whose fire stays smallest while it outlasts the episode.
@@ -61,12 +48,12 @@ def smallest_fire(size: int) -> int:
     """
     best, fewest = -1, math.inf
     for building, _ in zip(from_the_middle(city_of(size)), range(N_CANDIDATES), strict=False):
-        world, total = world_of(size, "small", np.array([building])), 0
+        world, total = world_of(size, np.array([building]), N_STEPS, parameters=parameters_of("small")), 0
         ready = POLICY.for_brigades(world.n_brigades)
         for last in range(10, N_STEPS + 1, 10):
             world.n_steps_max = last
             world.run(ready)
-            total += int(world.state.outcome.counts[0])
+            total += world.outcome.n_burning
         if not world.terminated and total < fewest:
             best, fewest = building, total
     assert best >= 0, "some fire outlasts the episode"
@@ -78,8 +65,8 @@ def episode_row(size: int, kind: Kind, *, seconds: float) -> Row:
     city = city_of(size)
     ignited = every_eighth(city) if kind == "hot" else np.array([smallest_fire(size)])
     tables = episode.Tables.of_city(city, parameters_of(kind))
-    begin = episode.World.at_start(tables, **start_of(size, ignited))
-    world = world_of(size, kind, ignited)
+    begin = episode.World.at_start(tables, **vars(placement_of(size, ignited)))
+    world = world_of(size, ignited, N_STEPS, parameters=parameters_of(kind))
     ours = Contender("compiled", partial(run_compiled, policy=POLICY), again(world))
 
     def in_numpy(fresh: episode.World) -> int:
@@ -113,13 +100,13 @@ def run_compiled(world: World, *, policy: KernelPolicy) -> int:
 
 def assert_same_end(plain: episode.World, compiled: World) -> None:
     """Make sure that both engines have come to the same end."""
-    arrays, outcome = compiled.arrays, plain.outcome
+    arrays, outcome = compiled.state, plain.outcome
     np.testing.assert_array_equal(arrays.fire.fieryness, plain.fire.fieryness)
     np.testing.assert_array_equal(arrays.fire.water, plain.fire.water)
     np.testing.assert_allclose(arrays.fire.energy, plain.fire.energy, rtol=1e-9, atol=1e-6)
     assert arrays.brigades.tank.tolist() == [brigade.tank_litres for brigade in plain.team]
-    assert arrays.outcome.counts[3] == outcome.n_civilians_alive
-    assert arrays.outcome.water[0] == outcome.water_litres
+    assert compiled.outcome.n_civilians_alive == outcome.n_civilians_alive
+    assert compiled.outcome.water_used_litres == outcome.water_litres
 
 
 def stepping_row(size: int, n_steps: int, *, seconds: float) -> Row:

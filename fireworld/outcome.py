@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from fireworld.records import CityRecord, StepRecord
+    from fireworld.records import CityRecord, Rewards, Score, StepRecord
 
 Values = TypeVar("Values", float, "NDArray[Any]")
 
@@ -54,6 +54,27 @@ class Outcome:
         return self.steps if self.completed else None
 
 
+def outcome_at(
+    score: Score, rewards: Rewards, *, steps: int, completed: bool, n_buildings: int, n_civilians: int
+) -> Outcome:
+    """Return how a run stands, from what is recorded of a step."""
+    return Outcome(
+        steps=steps,
+        completed=completed,
+        score=score.score,
+        score_max=score.score_max,
+        score_now=score.score_now,
+        n_buildings=n_buildings,
+        n_burning=score.n_burning,
+        n_water_damaged=score.n_water_damaged,
+        n_burnt_out=score.n_burnt_out,
+        n_civilians=n_civilians,
+        n_civilians_alive=score.n_civilians_alive,
+        total_reward=rewards.sum_so_far,
+        water_used_litres=score.water_used_litres,
+    )
+
+
 def outcome_of(record: StepRecord, city: CityRecord) -> Outcome:
     """Return how a run stands after a recorded step.
 
@@ -61,21 +82,13 @@ def outcome_of(record: StepRecord, city: CityRecord) -> Outcome:
         record: the step.
         city: where it was.
     """
-    score = record.score
-    return Outcome(
+    return outcome_at(
+        record.score,
+        record.rewards,
         steps=record.step,
         completed=record.terminated,
-        score=score.score,
-        score_max=score.score_max,
-        score_now=score.score_now,
         n_buildings=len(city.building_id),
-        n_burning=score.n_burning,
-        n_water_damaged=score.n_water_damaged,
-        n_burnt_out=score.n_burnt_out,
         n_civilians=len(city.civilian_hp),
-        n_civilians_alive=score.n_civilians_alive,
-        total_reward=record.rewards.sum_so_far,
-        water_used_litres=score.water_used_litres,
     )
 
 

@@ -294,10 +294,10 @@ class Rewards:
     """The team's reward of the step, term by term; `total` is their sum."""
 
     topic: ClassVar[str] = "/rewards"
-    water_damaged: float = value(1, "double", "-1 for each water-damaged or extinguished building")
-    burning: float = value(2, "double", "-2 for each burning building")
-    burnt_out: float = value(3, "double", "-3 for each burnt-out building")
-    civilians: float = value(4, "double", "HP - full HP of each civilian")
+    water_damaged: float = value(1, "double", "weight (of the paper: -1) x water-damaged and extinguished buildings")
+    burning: float = value(2, "double", "weight (of the paper: -2) x burning buildings")
+    burnt_out: float = value(3, "double", "weight (of the paper: -3) x burnt-out buildings")
+    civilians: float = value(4, "double", "weight (of the paper: 1) x HP - full HP of all civilians")
     total: float = value(5, "double", "reward of the step")
     sum_so_far: float = value(6, "double", "undiscounted return up to this step")
 

@@ -32,7 +32,7 @@ KEYS: Final[dict[str, type]] = {
 N_FIRST: Final = 14
 """Columns of the first version, none of which may be empty; a later one is, in a row that is older."""
 _SIMULATOR: Final = (
-    "city", "draws.py", "kernels", "parameters.py", "planning", "policy", "scenario", "simulation"
+    "city", "draws.py", "kernels", "parameters.py", "planning", "policy", "rewards.py", "scenario", "simulation"
 )  # fmt: skip
 
 

@@ -18,7 +18,6 @@ from fireworld.policy.asking import begin
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.protocol import Policy
 from fireworld.simulation.built import BuiltScenario
-from fireworld.simulation.world import World
 
 Row = tuple[Any, ...]
 """How one run came out: COLUMNS in their order."""
@@ -74,7 +73,7 @@ def run_compiled(built: BuiltScenario, policy: KernelPolicy, *, seed: int) -> Ou
     """Run a policy that the kernels can follow as one compiled episode."""
     world = built.world(seed=seed)
     world.run(policy.for_brigades(world.n_brigades))
-    return _outcome(world)
+    return world.outcome
 
 
 def run_step_by_step(built: BuiltScenario, policy: Policy, *, seed: int) -> Outcome:
@@ -87,7 +86,7 @@ def run_step_by_step(built: BuiltScenario, policy: Policy, *, seed: int) -> Outc
     begin(policy, world.city_arrays, n_brigades=world.n_brigades, seed=seed)
     while not (world.terminated or world.truncated):
         world.step(policy)
-    return _outcome(world)
+    return world.outcome
 
 
 def row_of(outcome: Outcome) -> Row:
@@ -98,24 +97,3 @@ def row_of(outcome: Outcome) -> Row:
 def outcomes(seeds: Sequence[int], rows: Sequence[Row]) -> Outcomes:
     """Put runs together, one for each seed."""
     return Outcomes(np.array(seeds, dtype=np.int64), rows)
-
-
-def _outcome(world: World) -> Outcome:
-    state = world.state
-    n_burning, n_water_damaged, n_burnt_out, n_civilians_alive = state.outcome.counts.tolist()
-    score, score_max, score_now = state.outcome.score.tolist()
-    return Outcome(
-        steps=world.step_number,
-        completed=world.terminated,
-        score=score,
-        score_max=score_max,
-        score_now=score_now,
-        n_buildings=len(state.fire.fieryness),
-        n_burning=n_burning,
-        n_water_damaged=n_water_damaged,
-        n_burnt_out=n_burnt_out,
-        n_civilians=len(state.civilians.hp),
-        n_civilians_alive=n_civilians_alive,
-        total_reward=float(state.outcome.reward[5]),
-        water_used_litres=float(state.outcome.water[0]),
-    )

@@ -21,7 +21,7 @@ FOLDER = Path(__file__).parent
 def sources_digest() -> str:
     """Digest all kernel sources, their data, the constants compiled into them and numba's version."""
     digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]} {jit.OPEN}".encode())
-    for path in [*sorted(FOLDER.iterdir()), FOLDER.parent / "draws.py"]:
+    for path in [*sorted(FOLDER.iterdir()), FOLDER.parent / "draws.py", FOLDER.parent / "rewards.py"]:
         if path.suffix in {".py", ".npy"}:
             digest.update(path.name.encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]

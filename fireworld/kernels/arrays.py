@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 
 from numpy.typing import NDArray
 
+from fireworld.rewards import TERMS, Reward
+
 Array = NDArray[Any]
 
 
@@ -169,7 +171,7 @@ class Constants(NamedTuple):
     health: HealthConstants
     brigades: BrigadeConstants
     observation: ObservationConstants
-    reward_change: bool  # reward the step's change of the stock instead of the stock
+    reward: Reward
 
 
 class CivilianState(NamedTuple):
@@ -226,14 +228,20 @@ class SiteState(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What a step was worth, as one array each of float64."""
+    """What a step was worth, as one array each of float64; the names below are positions in them."""
 
-    reward: Array  # (6,) water_damaged, burning, burnt_out, civilians, total, sum so far
+    reward: Array  # (6,) the four terms, TOTAL, SUM_SO_FAR
     stock: Array  # (4,) the four terms as a stock
-    score: Array  # (3,) score, score_max, score_now
-    counts: Array  # (4,) int32: burning, water-damaged, burnt out, civilians alive
+    score: Array  # (3,) SCORE, SCORE_MAX, SCORE_NOW
+    counts: Array  # (4,) int32: BURNING, WATER_DAMAGED, BURNT_OUT, CIVILIANS_ALIVE
     water: Array  # (1,) litres sprayed so far
-    draws: Array  # (2,) sums of burn rates and of damage draws
+    draws: Array  # (2,) sums of the burn rates, BURN_RATES, and of the damage draws, DAMAGES
+
+
+TOTAL, SUM_SO_FAR = len(TERMS), len(TERMS) + 1
+SCORE, SCORE_MAX, SCORE_NOW = 0, 1, 2
+BURNING, WATER_DAMAGED, BURNT_OUT, CIVILIANS_ALIVE = 0, 1, 2, 3
+BURN_RATES, DAMAGES = 0, 1
 
 
 class WorldState(NamedTuple):

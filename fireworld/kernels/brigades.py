@@ -274,7 +274,7 @@ def fight(
     return 0
 
 
-@kernel
+@inner
 def act(
     brigades: BrigadeState,
     fire: FireState,
@@ -310,7 +310,7 @@ def act(
     return total
 
 
-@kernel
+@inner
 def shelter(brigades: BrigadeState) -> None:
     """Note the building each brigade is in: its refuge while it refills there, else none."""
     for brigade in range(len(brigades.tank)):

@@ -6,20 +6,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fireworld.kernels.arrays import Array, CityArrays, Constants, Learner, PolicyArrays, WorldState
-from fireworld.kernels.brigades import act, shelter
+from fireworld.kernels.arrays import (
+    BURNING,
+    TOTAL,
+    Array,
+    CityArrays,
+    Constants,
+    Learner,
+    PolicyArrays,
+    WorldState,
+)
 from fireworld.kernels.choice import RANK_ALL, RANK_NAMED, choose, keeps_choice, table_state
-from fireworld.kernels.fire import advance_fire, draw_burn_rates
-from fireworld.kernels.health import harm
 from fireworld.kernels.jit import inner, making_arrays
 from fireworld.kernels.learning import choose_and_learn, forget, go_on_and_learn, take_reward, update
 from fireworld.kernels.observation import can_choose, find_target, observe
-from fireworld.kernels.outcome import assess
 from fireworld.kernels.ranking import N_OF_BUILDING, rank
 from fireworld.kernels.sites import find_sites
-
-FIRST = np.int64(0)
-"""Entity number of the first civilian, for the draws; the brigades' follow."""
+from fireworld.kernels.step import finish_step
 
 
 class EpisodeScratch(NamedTuple):
@@ -34,7 +37,7 @@ class EpisodeScratch(NamedTuple):
 
 
 @inner
-def run_steps(  # noqa: C901, PLR0912, PLR0915 - handing all arrays to functions of its own costs more than the loop
+def run_steps(  # noqa: C901, PLR0912 - handing all arrays to functions of its own costs more than the loop
     city: CityArrays,
     world: WorldState,
     constants: Constants,
@@ -47,7 +50,7 @@ def run_steps(  # noqa: C901, PLR0912, PLR0915 - handing all arrays to functions
 ) -> int:
     """Run the steps of `run_episode`."""
     brigades, fire, people, sites, outcome = world.brigades, world.fire, world.civilians, world.sites, world.outcome
-    health, buildings, geometry, streets = constants.health, city.buildings, city.geometry, city.streets
+    buildings, geometry = city.buildings, city.geometry
     n_brigades = len(brigades.action)
     features, before, known_before = scratch.features, scratch.action_before, scratch.target_before
     values, described, described_at = scratch.values, scratch.described, scratch.described_at
@@ -65,11 +68,11 @@ def run_steps(  # noqa: C901, PLR0912, PLR0915 - handing all arrays to functions
         shown, known = (brigades.action, brigades.target) if in_turn else (before, known_before)
         for brigade in range(n_brigades):
             action, target = -1, -1
-            if can_choose(brigade, brigades, sites):
+            if can_choose(brigade, brigades.hp, brigades.refilling, sites.counts):
                 if keeps_choice(brigade, before[brigade], policy.commit[0], step):
                     action = before[brigade]
                     if learning and step > last_step:
-                        state = observe(brigade, shown, brigades, sites, constants.observation, features)
+                        state = observe(brigade, shown, brigades.site, sites, constants.observation, features)
                         row = table_state(state, policy.tables.shape[1])
                         go_on_and_learn(brigade, policy.table_of[brigade], row, action, learner)
                 elif policy.kind[brigade] >= RANK_NAMED:
@@ -93,7 +96,7 @@ def run_steps(  # noqa: C901, PLR0912, PLR0915 - handing all arrays to functions
                         values,
                     )
                 else:
-                    state = observe(brigade, shown, brigades, sites, constants.observation, features)
+                    state = observe(brigade, shown, brigades.site, sites, constants.observation, features)
                     action = choose(brigade, state, policy, seed, step)
                     if learning:
                         row = table_state(state, policy.tables.shape[1])
@@ -104,20 +107,10 @@ def run_steps(  # noqa: C901, PLR0912, PLR0915 - handing all arrays to functions
             brigades.target[brigade] = target
         if step > last_step:
             break
-        outcome.water[0] += act(brigades, fire, streets, geometry, constants.brigades)
-        outcome.draws[0] = draw_burn_rates(buildings, fire, constants.fire, seed, step)
-        advance_fire(buildings, city.cover, city.links, fire, constants.fire)
-        codes, everybody, protected = fire.fieryness, 1.0, health.brigade_share
-        outcome.draws[1] = harm(people.building, people.hp, people.damage, codes, health, everybody, seed, step, FIRST)
-        shelter(brigades)
-        first = len(people.hp)
-        outcome.draws[1] += harm(
-            brigades.inside, brigades.hp, brigades.damage, codes, health, protected, seed, step, first
-        )
-        assess(fire, people, geometry, constants.reward_change, outcome)
+        finish_step(city, fire, people, brigades, outcome, constants, seed, step)
         if learning:
-            take_reward(outcome.reward[4], learner)
-        if outcome.counts[0] == 0:
+            take_reward(outcome.reward[TOTAL], learner)
+        if outcome.counts[BURNING] == 0:
             if learning:
                 for brigade in range(n_brigades):
                     update(brigade, policy.table_of[brigade], 0.0, learner)

@@ -43,7 +43,7 @@ def fieryness_of(burning: bool, fuel: float, full: float, inflammable: int, wate
     return 4 + third if fuel > 0.0 else 8
 
 
-@kernel
+@inner
 def draw_burn_rates(
     buildings: BuildingArrays, fire: FireState, constants: FireConstants, seed: int, step: int
 ) -> float:

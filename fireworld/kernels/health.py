@@ -5,7 +5,7 @@ from __future__ import annotations
 from fireworld.draws import DAMAGE, DAMAGE_NOISE
 from fireworld.kernels.arrays import Array, HealthConstants
 from fireworld.kernels.draws import normal, uniform
-from fireworld.kernels.jit import inner, kernel
+from fireworld.kernels.jit import inner
 
 
 @inner
@@ -24,7 +24,7 @@ def worsen(damage: float, noise: float, constants: HealthConstants) -> float:
     return damage + constants.growth * damage * damage + constants.constant + noise if damage > 0.0 else 0.0
 
 
-@kernel
+@inner
 def harm(
     building: Array,
     hp: Array,

@@ -51,10 +51,10 @@ def state_index(features: Array) -> int:
 
 
 @kernel
-def site_place(brigade: int, brigades: BrigadeState, sites: SiteState) -> int:
-    """Return the position of a brigade's site in the site arrays, -1 if it has none."""
+def site_place(brigade: int, site_of: Array, sites: SiteState) -> int:
+    """Return the position of a brigade's site in the site arrays, -1 if it has none. site_of: (b,) numbers of sites."""
     for site in range(sites.counts[0]):
-        if sites.number[site] == brigades.site[brigade]:
+        if sites.number[site] == site_of[brigade]:
             return site
     return -1
 
@@ -63,7 +63,7 @@ def site_place(brigade: int, brigades: BrigadeState, sites: SiteState) -> int:
 def observe(
     brigade: int,
     actions: Array,
-    brigades: BrigadeState,
+    site_of: Array,
     sites: SiteState,
     constants: ObservationConstants,
     features: Array,
@@ -76,14 +76,14 @@ def observe(
     Args:
         brigade: who looks.
         actions: (b,) what the brigades do, -1 nothing; a target of one's own has no flag.
-        brigades: the team.
+        site_of: (b,) number of each brigade's fire site.
         sites: fire sites of the moment.
         constants: thresholds.
         features: (8,) int64, written.
     """
     for k in range(N_FEATURES):
         features[k] = 0
-    site = site_place(brigade, brigades, sites)
+    site = site_place(brigade, site_of, sites)
     if site < 0:
         return -1
     sides = sites.free_sides[site]
@@ -108,7 +108,7 @@ def find_target(
     sites: SiteState,
 ) -> int:
     """Return the burning building of the brigade's site that an action names (ties: lowest id), -1 without a site."""
-    site = site_place(brigade, brigades, sites)
+    site = site_place(brigade, brigades.site, sites)
     if site < 0:
         return -1
     best, best_measure = -1, 0.0
@@ -133,6 +133,13 @@ def find_target(
 
 
 @kernel
-def can_choose(brigade: int, brigades: BrigadeState, sites: SiteState) -> bool:
-    """Tell whether a brigade picks an action: alive, not refilling, something burns."""
-    return brigades.hp[brigade] > 0 and brigades.refilling[brigade] == 0 and sites.counts[0] > 0
+def can_choose(brigade: int, hp: Array, refilling: Array, site_counts: Array) -> bool:
+    """Return whether a brigade picks an action: alive, not refilling, something burns.
+
+    Args:
+        brigade: which one.
+        hp: (b,) health points of the team.
+        refilling: (b,) 1 from an empty tank until it is full.
+        site_counts: (3,) `SiteState.counts`.
+    """
+    return hp[brigade] > 0 and refilling[brigade] == 0 and site_counts[0] > 0

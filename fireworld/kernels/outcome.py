@@ -4,8 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from fireworld.kernels.arrays import CivilianState, FireState, GeometryArrays, Outcome
+from fireworld import rewards
+from fireworld.kernels.arrays import (
+    BURNING,
+    BURNT_OUT,
+    CIVILIANS_ALIVE,
+    SCORE,
+    SCORE_MAX,
+    SCORE_NOW,
+    SUM_SO_FAR,
+    TOTAL,
+    WATER_DAMAGED,
+    CivilianState,
+    FireState,
+    GeometryArrays,
+    Outcome,
+)
 from fireworld.kernels.jit import inner, kernel
+from fireworld.rewards import Reward, Tally
+
+amounts, rewarded = inner(rewards.amounts), inner(rewards.rewarded)
 
 SAVED = np.array([1.0, 0.66, 0.33, 0.0, 0.9, 0.75, 0.5, 0.25, 0.0])
 """Part of a building that counts as saved, by fieryness code."""
@@ -29,42 +47,43 @@ def exp_of_minus(x: float) -> float:
 
 @kernel
 def assess(
-    fire: FireState, civilians: CivilianState, geometry: GeometryArrays, reward_change: bool, outcome: Outcome
+    fire: FireState, civilians: CivilianState, geometry: GeometryArrays, reward: Reward, outcome: Outcome
 ) -> None:
-    """Write the reward and the scores of the moment; MODEL 6.
+    """Write the counts, the scores and the reward of the moment; MODEL 6.
 
-    reward: -1 a building with codes 4-7, -2 a burning one, -3 a burnt-out one, HP - full HP of every civilian.
-    score: (alive + HP / full HP) * sqrt(floor area saved / floor area).
+    score: (alive + HP / full HP) * sqrt(floor area saved / floor area). reward: see `fireworld.rewards`.
     """
-    counts = outcome.counts
-    for k in range(4):
-        counts[k] = 0
+    n_burning, n_water_damaged, n_burnt_out = 0, 0, 0
     saved, area = 0.0, 0.0
     for b in range(len(fire.fieryness)):
         code = fire.fieryness[b]
         if 1 <= code <= 3:
-            counts[0] += 1
+            n_burning += 1
         elif code == 8:
-            counts[2] += 1
+            n_burnt_out += 1
         elif code >= 4:
-            counts[1] += 1
+            n_water_damaged += 1
         saved += geometry.floor_area[b] * SAVED[code]
         area += geometry.floor_area[b]
-    hp, full = 0, 0
+    n_alive, hp, full_hp = 0, 0, 0
     for civilian in range(len(civilians.hp)):
         hp += civilians.hp[civilian]
-        full += civilians.full_hp[civilian]
+        full_hp += civilians.full_hp[civilian]
         if civilians.hp[civilian] > 0:
-            counts[3] += 1
-    healthy = hp / full if full > 0 else 1.0
-    outcome.score[0] = (counts[3] + healthy) * np.sqrt(saved / area)
-    outcome.score[1] = len(civilians.hp) + 1.0
-    outcome.score[2] = counts[3] * exp_of_minus(5.0 * (1.0 - healthy))
-    stock = (-1.0 * counts[1], -2.0 * counts[0], -3.0 * counts[2], float(hp - full))
+            n_alive += 1
+    counts, score = outcome.counts, outcome.score
+    counts[BURNING], counts[WATER_DAMAGED] = n_burning, n_water_damaged
+    counts[BURNT_OUT], counts[CIVILIANS_ALIVE] = n_burnt_out, n_alive
+    healthy = hp / full_hp if full_hp > 0 else 1.0
+    score[SCORE] = (n_alive + healthy) * np.sqrt(saved / area)
+    score[SCORE_MAX] = len(civilians.hp) + 1.0
+    score[SCORE_NOW] = n_alive * exp_of_minus(5.0 * (1.0 - healthy))
+    amount = amounts(Tally(n_burning, n_water_damaged, n_burnt_out, n_alive, hp, full_hp))
     total = 0.0
-    for term in range(4):
-        outcome.reward[term] = stock[term] - outcome.stock[term] if reward_change else stock[term]
-        outcome.stock[term] = stock[term]
+    for term in range(TOTAL):
+        stock = reward.weights[term] * amount[term]
+        outcome.reward[term] = rewarded(reward.kind, stock, outcome.stock[term])
+        outcome.stock[term] = stock
         total += outcome.reward[term]
-    outcome.reward[4] = total
-    outcome.reward[5] += total
+    outcome.reward[TOTAL] = total
+    outcome.reward[SUM_SO_FAR] += total

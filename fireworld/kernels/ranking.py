@@ -171,7 +171,7 @@ def rank(
             own, and of the one chosen.
     """
     best_action, best = np.int64(-1), np.int64(-1)
-    site = site_place(brigade, brigades, sites)
+    site = site_place(brigade, brigades.site, sites)
     if site < 0:
         return best_action, best
     power, range_square = brigade_constants.power, brigade_constants.range_square

@@ -7,7 +7,7 @@ from typing import Final
 from fireworld.kernels.arrays import WorldState
 from fireworld.policy.kernel import always
 from fireworld.policy.protocol import Observation
-from fireworld.simulation.state import NO_LEARNER, copy_into
+from fireworld.simulation.state import NO_LEARNER, copy_into, score_of
 
 Assignment = tuple[int, ...]
 """(b,) the action of each brigade."""
@@ -61,5 +61,5 @@ class Forecast:
         seed = FIRST_SEED + moment.step * self._rollouts + rollout
         last_step = moment.step + self._horizon - 1
         run_episode(moment.city, copy, moment.constants, self._policy, NO_LEARNER, seed, moment.step, last_step)
-        outcome = copy.outcome
-        return float(outcome.score[0] / outcome.score[1] - BURNING_COST * outcome.counts[0])
+        score = score_of(copy)
+        return score.score / score.score_max - BURNING_COST * score.n_burning

@@ -82,7 +82,7 @@ class Observation:
     def burning(self) -> NDArray[np.uint32]:
         """(k,) indices of the burning buildings of the brigade's fire site: what it may name as its own target."""
         sites = self.world.sites
-        place = int(site_place(self.brigade, self.world.brigades, sites))
+        place = int(site_place(self.brigade, self.world.brigades.site, sites))
         here: NDArray[np.uint32] = sites.member[sites.start[place] : sites.start[place + 1]]
         return here if place >= 0 else here[:0]
 

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
 import msgspec
 from msgspec import Meta, Struct
 
+from fireworld import rewards
 from fireworld.parameters import PRESETS, BrigadeParameters, FireParameters, HealthParameters, Parameters
 
 Preset = Literal["official-2011", "official-2013", "paper"]
-Reward = Literal["stock", "change"]
 Choices = Literal["in-turn", "simultaneous"]
 Direction = Literal["N", "E", "S", "W"]
 DIRECTIONS: Final[tuple[Direction, ...]] = ("N", "E", "S", "W")
@@ -108,6 +108,32 @@ class GeneratedCity(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     hydrant_share: Annotated[Fraction, Meta(description="Share of the crossings that have a hydrant.")] = 0.0
 
 
+Weight = Annotated[float, Meta(ge=-1e9, le=1e9)]
+KIND: Final = Meta(description="; ".join(f"`{kind}`: {text}" for kind, text in rewards.KINDS.items()) + ".")
+
+
+def _weight(term: rewards.Term) -> tuple[str, Any, float]:
+    """Return the key of a term's weight, its type and its default."""
+    text = f"Weight of {term.meaning}; the paper's: {term.paper_weight:g}."
+    return term.name, Annotated[Weight, Meta(description=text)], 0.0
+
+
+if TYPE_CHECKING:
+
+    class RewardWeights(Struct):
+        """Weights of the terms of a reward."""
+
+        of: rewards.Kind
+else:
+    RewardWeights = msgspec.defstruct(
+        "RewardWeights",
+        [*map(_weight, rewards.TERMS), ("of", Annotated[rewards.Kind, KIND], "stock")],
+        frozen=True,
+        kw_only=True,
+        forbid_unknown_fields=True,
+    )
+
+
 class CitySource(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Where the city comes from: exactly one of `generated` and `file`."""
 
@@ -187,7 +213,8 @@ class Document(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     brigades: Annotated[BrigadeTeam, Meta(description="The team.")] = BrigadeTeam()
     steps: Annotated[int, Meta(ge=1, le=100_000, description="Steps (minutes) after which the run ends.")] = 500
     reward: Annotated[
-        Reward, Meta(description="`stock`, the paper's: the state's cost at every step; `change`: how it changed.")
+        rewards.Kind | RewardWeights,
+        Meta(description="What a step is worth. `stock` or `change`: with the paper's weights."),
     ] = "stock"
     choices: Annotated[
         Choices,
@@ -199,6 +226,7 @@ class Document(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ] = None
 
 
+DocumentT = TypeVar("DocumentT", bound=Document)
 Section = TypeVar("Section", FireParameters, HealthParameters, BrigadeParameters)
 
 
@@ -210,6 +238,22 @@ def resolve_parameters(document: Document) -> Parameters:
         health=_override(preset.health, overrides.health),
         brigades=_override(preset.brigades, overrides.brigades),
     )
+
+
+def resolve_reward(document: Document) -> rewards.Reward:
+    """Return the document's reward as kernels take it."""
+    given = document.reward
+    if isinstance(given, str):
+        return rewards.reward_of(given)
+    weights = msgspec.structs.asdict(given)
+    return rewards.reward_of(weights.pop("of"), weights)
+
+
+def with_kind(document: DocumentT, kind: rewards.Kind) -> DocumentT:
+    """Return a document whose reward is of another kind, with the same weights."""
+    given = document.reward
+    reward = kind if isinstance(given, str) else msgspec.structs.replace(given, of=kind)
+    return msgspec.structs.replace(document, reward=reward)
 
 
 def _override(preset: Section, overrides: Struct) -> Section:
@@ -242,6 +286,9 @@ def broken_rules(document: Document) -> Iterator[tuple[str, str, object]]:
         yield "civilians.to_m", f"at least from_m ({civilians.from_m})", civilians.to_m
     yield from _repeated("civilians.buildings", civilians.buildings or ())
     yield from _repeated("civilians.directions", civilians.directions)
+    if not any(resolve_reward(document).weights):
+        names = ", ".join(term.name for term in rewards.TERMS)
+        yield "reward", f"a weight other than 0 for one of {names}", "none of them"
     health = resolve_parameters(document).health
     probabilities = (health.slight_probability, health.serious_probability, health.critical_probability)
     if math.fsum(probabilities) > 1:

@@ -35,9 +35,12 @@ def find_faults(value: object, kind: inspect.Type, key: str = "") -> Iterator[Fa
     if isinstance(kind, inspect.UnionType):
         if value is None and any(isinstance(option, inspect.NoneType) for option in kind.types):
             return
-        (option,) = (option for option in kind.types if not isinstance(option, inspect.NoneType))
+        options = [option for option in kind.types if not isinstance(option, inspect.NoneType)]
+        fitting = [option for option in options if isinstance(option, inspect.StructType) == isinstance(value, Mapping)]
+        (option, *_) = fitting or options
+        named = isinstance(option, inspect.LiteralType) and isinstance(value, str)
         for fault in find_faults(value, option, key):
-            yield fault._replace(wanted=words(kind)) if fault.key == key and not fault.hint else fault
+            yield fault if fault.key != key or fault.hint or named else fault._replace(wanted=words(kind))
     elif isinstance(kind, inspect.StructType):
         yield from _struct_faults(value, kind, key)
     elif isinstance(kind, inspect.VarTupleType | inspect.TupleType):

@@ -39,13 +39,13 @@ def _key_rows(document: inspect.Type, prefix: str) -> Iterator[str]:
     """Yield a row for every key, each followed by the keys below it."""
     for item in _fields(document):
         key = f"{prefix}{item.encode_name}"
-        below, wanted, below_prefix = _without_null(item.type), words(item.type), f"{key}."
+        below, wanted, below_prefix = _with_keys(item.type), words(item.type), f"{key}."
         if isinstance(below, inspect.VarTupleType) and _fields(below.item_type):
             below, wanted, below_prefix = below.item_type, "a list, each entry with the keys below", f"{key}.0."
         elif key == "parameters":
             below, wanted = inspect.AnyType(), "the keys of the next table"
         elif _fields(below):
-            wanted = "the keys below"
+            wanted = words(_without_null(item.type)).replace(words(below), "the keys below")
         yield f"| `{key}` | {wanted} | {_default(item)} | {_meaning(item.type)} |"
         yield from _key_rows(below, below_prefix)
 
@@ -69,9 +69,17 @@ def _fields(kind: inspect.Type) -> Sequence[inspect.Field]:
 def _without_null(kind: inspect.Type) -> inspect.Type:
     """Return a type without the null it may also be."""
     kind = bare(kind)
-    if isinstance(kind, inspect.UnionType):
-        (kind,) = (option for option in kind.types if not isinstance(option, inspect.NoneType))
-    return kind
+    if not isinstance(kind, inspect.UnionType):
+        return kind
+    options = tuple(option for option in kind.types if not isinstance(option, inspect.NoneType))
+    return options[0] if len(options) == 1 else inspect.UnionType(options)
+
+
+def _with_keys(kind: inspect.Type) -> inspect.Type:
+    """Return the option of a type that has keys, if one has, or else the type without null."""
+    kind = _without_null(kind)
+    options = kind.types if isinstance(kind, inspect.UnionType) else ()
+    return next((option for option in options if _fields(option)), kind)
 
 
 def _meaning(kind: inspect.Type) -> str:

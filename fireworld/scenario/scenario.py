@@ -14,6 +14,7 @@ import msgspec.inspect
 
 from fireworld.errors import ScenarioError, expected
 from fireworld.parameters import Parameters
+from fireworld.rewards import paper_weights
 from fireworld.scenario.document import Document, broken_rules, resolve_parameters
 from fireworld.scenario.explain import find_faults
 from fireworld.scenario.yaml_text import read_yaml, write_yaml
@@ -124,6 +125,9 @@ class Scenario(Document, frozen=True, kw_only=True):
     def _with(self, values: Mapping[str, Any], *, words: list[str]) -> Scenario:
         document = self._document()
         for key, value in values.items():
+            kind = document.get("reward")
+            if key.startswith("reward.") and isinstance(kind, str):  # one weight is set, the others stay
+                document["reward"] = {**paper_weights(), "of": kind}
             _assign(document, key, value, source=f"--set {key}")
         source = f"{self.source} with " + " ".join(words)
         return scenario_of(document, source=source if values else self.source, folder=Path())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -12,8 +13,10 @@ from fireworld.city.record import city_record
 from fireworld.kernels.arrays import CityArrays
 from fireworld.records import CityRecord, RunHeader
 from fireworld.scenario import Scenario
+from fireworld.scenario.document import resolve_reward
 from fireworld.simulation.city_arrays import city_arrays
 from fireworld.simulation.placement import Placement, attachments, place, scenario_plan
+from fireworld.simulation.start import Start, prepare_start
 from fireworld.simulation.world import World
 from fireworld.version import __version__
 
@@ -32,6 +35,20 @@ class BuiltScenario:
         """Number of brigades."""
         return len(self.placement.brigade_refuge)
 
+    @cached_property
+    def start(self) -> Start:
+        """The start of every world."""
+        scenario = self.scenario
+        return prepare_start(
+            self.city,
+            scenario.resolved_parameters,
+            self.placement,
+            reward=resolve_reward(scenario),
+            choices=scenario.choices,
+            unit_volume_m3=scenario.unit_volume_m3,
+            arrays=self.city_arrays,
+        )
+
     def world(self, *, seed: int, n_steps_max: int | None = None) -> World:
         """Start a world.
 
@@ -39,20 +56,7 @@ class BuiltScenario:
             seed: of the run's random draws.
             n_steps_max: last step; None: the scenario's.
         """
-        return World(
-            self.city,
-            self.scenario.resolved_parameters,
-            ignited=self.placement.ignited,
-            civilian_building=self.placement.civilian_building,
-            civilian_mm=self.placement.civilian_mm,
-            brigade_refuge=self.placement.brigade_refuge,
-            seed=seed,
-            n_steps_max=self.scenario.steps if n_steps_max is None else n_steps_max,
-            reward_change=self.scenario.reward == "change",
-            unit_volume_m3=self.scenario.unit_volume_m3,
-            in_turn=self.scenario.choices == "in-turn",
-            arrays=self.city_arrays,
-        )
+        return World(self.start, seed=seed, n_steps_max=self.scenario.steps if n_steps_max is None else n_steps_max)
 
     def city_record(self) -> CityRecord:
         """Return the city as it is recorded."""

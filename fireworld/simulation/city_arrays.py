@@ -24,6 +24,8 @@ from fireworld.kernels.arrays import (
 )
 from fireworld.kernels.fire import STEFAN_BOLTZMANN
 from fireworld.parameters import BrigadeParameters, FireParameters, HealthParameters, Parameters
+from fireworld.rewards import Reward
+from fireworld.scenario.document import Choices
 
 CIVILIAN_LOW_M = 30.0
 CIVILIAN_MEDIUM_M = 80.0
@@ -207,17 +209,17 @@ def world_constants(
     city: City,
     parameters: Parameters,
     *,
-    reward_change: bool = False,
-    unit_volume_m3: float | None = None,
-    in_turn: bool = True,
+    reward: Reward,
+    choices: Choices,
+    unit_volume_m3: float | None,
 ) -> Constants:
     """Collect all scalars of a world."""
     return Constants(
         fire=fire_constants(parameters.fire),
         health=health_constants(parameters.health),
         brigades=brigade_constants(parameters.brigades),
-        observation=observation_constants(city, unit_volume_m3, in_turn=in_turn),
-        reward_change=reward_change,
+        observation=observation_constants(city, unit_volume_m3, in_turn=choices == "in-turn"),
+        reward=reward,
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fireworld.draws import STEP, hash_key
-from fireworld.kernels.arrays import Array
+from fireworld.kernels.arrays import BURN_RATES, DAMAGES, Array
 from fireworld.kernels.brigades import REFILLING
 from fireworld.records import (
     EVENT_KINDS,
@@ -20,12 +20,10 @@ from fireworld.records import (
     Draws,
     Events,
     Observations,
-    Rewards,
-    Score,
     Snapshot,
     StepRecord,
 )
-from fireworld.simulation.state import take_snapshot
+from fireworld.simulation.state import rewards_of, score_of, take_snapshot
 from fireworld.simulation.world import Choices, World
 
 KIND = {name: index for index, name in enumerate(EVENT_KINDS)}
@@ -58,23 +56,23 @@ class Observer:
             choices: what `World.step` returned; None before the first step.
         """
         world = self.world
-        outcome = world.state.outcome
+        draws = world.state.outcome.draws.tolist()
         events = self._events() if choices is not None else _events([])
         snapshot_due = world.step_number % SNAPSHOT_EVERY_STEPS == 0
         record = StepRecord(
             step=world.step_number,
             draws=Draws(
                 key=hash_key(world.seed, STEP, 0, world.step_number),
-                burn_rate_sum=float(outcome.draws[0]),
-                health_sum=float(outcome.draws[1]),
+                burn_rate_sum=draws[BURN_RATES],
+                health_sum=draws[DAMAGES],
             ),
             observations=self._observations(choices),
             decisions=self._decisions(choices),
             brigades=self._brigades(),
             buildings=self._buildings(),
             civilians=Civilians(hp=world.state.civilians.hp.copy(), damage=world.state.civilians.damage.copy()),
-            rewards=Rewards(*outcome.reward.tolist()),
-            score=Score(*outcome.score.tolist(), *outcome.counts.tolist(), *outcome.water.tolist()),
+            rewards=rewards_of(world.state),
+            score=score_of(world.state),
             events=events,
             terminated=world.terminated,
             truncated=world.truncated,

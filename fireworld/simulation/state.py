@@ -10,6 +10,15 @@ import numpy as np
 from fireworld.city.city import City
 from fireworld.errors import LogError
 from fireworld.kernels.arrays import (
+    BURNING,
+    BURNT_OUT,
+    CIVILIANS_ALIVE,
+    SCORE,
+    SCORE_MAX,
+    SCORE_NOW,
+    SUM_SO_FAR,
+    TOTAL,
+    WATER_DAMAGED,
     Array,
     BrigadeState,
     CityArrays,
@@ -21,7 +30,10 @@ from fireworld.kernels.arrays import (
     WorldState,
 )
 from fireworld.parameters import Parameters
+from fireworld.records import Rewards, Score
+from fireworld.rewards import TERMS
 from fireworld.simulation.city_arrays import air_shape
+from fireworld.simulation.placement import Placement
 
 SCRATCH = {"fire.span", "fire.rate", "fire.emitted", "fire.scratch"} | {
     f"sites.{name}" for name in SiteState._fields if name not in {"counts", "label"}
@@ -122,8 +134,8 @@ def fresh_sites(n: int) -> SiteState:
 def fresh_outcome() -> Outcome:
     """Return an outcome of which nothing is known yet."""
     return Outcome(
-        reward=np.zeros(6),
-        stock=np.zeros(4),
+        reward=np.zeros(SUM_SO_FAR + 1),
+        stock=np.zeros(len(TERMS)),
         score=np.zeros(3),
         counts=np.zeros(4, dtype=np.int32),
         water=np.zeros(1),
@@ -155,17 +167,38 @@ NO_LEARNER: Final = fresh_learner(np.zeros((1, 1, 4)), 0)._replace(learning=np.z
 """Of a team that learns nothing."""
 
 
-def fresh_world(
-    city: City, parameters: Parameters, *, civilian_building: Array, civilian_mm: Array, brigade_refuge: Array
-) -> WorldState:
+def fresh_world(city: City, parameters: Parameters, placement: Placement) -> WorldState:
     """Return the state before anything burns."""
     hp = parameters.health.initial_hp
     return WorldState(
         fire=fresh_fire(city),
-        civilians=fresh_civilians(civilian_building, civilian_mm, hp),
-        brigades=fresh_brigades(city, brigade_refuge, parameters.brigades.tank_litres, hp),
+        civilians=fresh_civilians(placement.civilian_building, placement.civilian_mm, hp),
+        brigades=fresh_brigades(city, placement.brigade_refuge, parameters.brigades.tank_litres, hp),
         sites=fresh_sites(city.n_buildings),
         outcome=fresh_outcome(),
+    )
+
+
+def rewards_of(world: WorldState) -> Rewards:
+    """Return what the last step was worth, as it is recorded."""
+    reward = world.outcome.reward.tolist()
+    terms = {term.name: reward[place] for place, term in enumerate(TERMS)}
+    return Rewards(**terms, total=reward[TOTAL], sum_so_far=reward[SUM_SO_FAR])
+
+
+def score_of(world: WorldState) -> Score:
+    """Return how the world stands, as it is recorded."""
+    outcome = world.outcome
+    score, counts = outcome.score.tolist(), outcome.counts.tolist()
+    return Score(
+        score=score[SCORE],
+        score_max=score[SCORE_MAX],
+        score_now=score[SCORE_NOW],
+        n_burning=counts[BURNING],
+        n_water_damaged=counts[WATER_DAMAGED],
+        n_burnt_out=counts[BURNT_OUT],
+        n_civilians_alive=counts[CIVILIANS_ALIVE],
+        water_used_litres=outcome.water.item(),
     )
 
 

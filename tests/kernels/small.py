@@ -9,7 +9,12 @@ import numpy as np
 
 from fireworld.city.build import build_city, with_links
 from fireworld.city.city import City, Plan
+from fireworld.kernels.brigades import act as act_kernel
+from fireworld.kernels.outcome import assess as assess_kernel
 from fireworld.parameters import PAPER, Parameters
+from fireworld.rewards import Reward
+from fireworld.simulation.placement import Placement
+from fireworld.simulation.start import prepare_start
 from fireworld.simulation.world import World
 from tests.city.plans import footprints, rectangle, street_map
 
@@ -20,6 +25,9 @@ def square(x_m: float, y_m: float, side_m: float = 10.0) -> list[tuple[int, int]
     """A square building by its centre."""
     half = round(side_m * METRE / 2)
     return rectangle(round(x_m * METRE) - half, round(y_m * METRE) - half, 2 * half, 2 * half)
+
+
+SIDE_BY_SIDE = [square(100.0 * k, 0.0) for k in range(9)]
 
 
 def make_city(
@@ -59,24 +67,48 @@ def make_world(
     civilians: Sequence[tuple[int, float, float]] = (),
     brigades: Sequence[int] = (),
     parameters: Parameters = PAPER,
-    reward_change: bool = False,
+    reward: Reward | None = None,
     unit_volume_m3: float | None = None,
     seed: int = 1,
     n_steps_max: int = 100,
 ) -> World:
     """A world in it; civilians as (building, x_m, y_m), brigades by the building they start from."""
-    return World(
-        city,
-        parameters,
+    placement = Placement(
         ignited=np.array(ignited, dtype=np.int32),
         civilian_building=np.array([b for b, _, _ in civilians], dtype=np.int32),
         civilian_mm=np.array([(x * METRE, y * METRE) for _, x, y in civilians]).reshape(-1, 2),
         brigade_refuge=np.array(brigades, dtype=np.int32),
-        seed=seed,
-        n_steps_max=n_steps_max,
-        reward_change=reward_change,
-        unit_volume_m3=unit_volume_m3,
     )
+    start = prepare_start(city, parameters, placement, reward=reward, unit_volume_m3=unit_volume_m3)
+    return World(start, seed=seed, n_steps_max=n_steps_max)
+
+
+def assess(world: World) -> None:
+    """Compute what the moment is worth."""
+    state = world.state
+    assess_kernel(state.fire, state.civilians, world.city_arrays.geometry, world.constants.reward, state.outcome)
+
+
+def act(world: World) -> None:
+    """Let the brigades do what they have chosen."""
+    state, city = world.state, world.city_arrays
+    water = act_kernel(state.brigades, state.fire, city.streets, city.geometry, world.constants.brigades)
+    state.outcome.water[0] += water
+
+
+def put(world: World, codes: Sequence[int], hp: Sequence[int] | int | None = None) -> list[float]:
+    """Set the codes and the civilians' health; return what that is worth: the terms, their total, the sum so far."""
+    world.state.fire.fieryness[:] = codes
+    if hp is not None:
+        world.state.civilians.hp[:] = hp
+    assess(world)
+    reward: list[float] = world.state.outcome.reward.tolist()
+    return reward
+
+
+def people(n: int) -> list[tuple[int, float, float]]:
+    """People in the ninth building."""
+    return [(8, 0.0, 0.0)] * n
 
 
 def burn(world: World, *buildings: int, code: int = 1) -> None:

@@ -12,7 +12,7 @@ from fireworld.kernels.brigades import DEAD, DRIVING, IDLE, REFILLING, SPRAYING,
 from fireworld.parameters import OFFICIAL_2013, PAPER, Parameters
 from fireworld.policy.kernel import always
 from fireworld.simulation.city_arrays import brigade_constants
-from tests.kernels.small import METRE, burn, make_city, make_world, square
+from tests.kernels.small import METRE, act, burn, make_city, make_world, square
 
 PAPER_BRIGADES = brigade_constants(PAPER.brigades)
 RANGE_MM = 50_000
@@ -118,7 +118,7 @@ def test_a_brigade_drives_sprays_runs_dry_refills_and_comes_back():
 def test_sprayed_litres_lie_on_the_target():
     world = fire_and_refuge(small_tank(), refuge_m=30.0)
     world.state.brigades.target[0] = 0
-    world._act()
+    act(world)
     assert world.state.outcome.water[0] == 2000.0
     assert world.state.fire.water.tolist() == [2000, 0]
     assert world.state.fire.watered.tolist() == [1, 0]
@@ -137,7 +137,7 @@ def test_what_else_a_brigade_does(change, expected):
     brigades.tank[0] = 2500
     for name, value in change.items():
         getattr(brigades, name)[0] = value
-    world._act()
+    act(world)
     assert brigades.activity[0] == expected
     assert (brigades.sprayed[0] > 0) == (expected == SPRAYING)
 
@@ -156,9 +156,9 @@ def test_a_dry_brigade_goes_to_the_refuge_with_the_shortest_way():
     brigades = world.state.brigades
     brigades.tank[0], brigades.refilling[0] = 0, 1
     for _ in range(2):
-        world._act()
+        act(world)
     assert brigades.x[0] == 150 * METRE
-    world._act()
+    act(world)
     assert brigades.refuge[0] == 2
     assert brigades.tank[0] == 1500
 
@@ -174,7 +174,7 @@ def test_a_dry_brigade_without_a_way_to_a_refuge_stays():
     world = make_world(city, brigades=[0])
     world.state.brigades.tank[0] = 0
     world.state.brigades.refilling[0] = 1
-    world._act()
+    act(world)
     assert world.state.brigades.activity[0] == IDLE
     assert world.state.brigades.x[0] == 0.0
 
@@ -207,5 +207,5 @@ def test_a_hydrant_fills_in_passing_but_the_refuge_is_where_a_dry_brigade_goes()
     brigades.street[0], brigades.offset[0], brigades.x[0] = 0, 60_000, 40_000.0
     brigades.tank[0], brigades.refilling[0] = 0, 1
     burn(world, 0)
-    world._act()
+    act(world)
     assert (brigades.tank[0], brigades.activity[0], brigades.driven[0]) == (400, TO_REFUGE, 80_000)

@@ -9,6 +9,7 @@ import pytest
 
 from fireworld.draws import DAMAGE, uniform
 from fireworld.kernels.health import expose, harm, worsen
+from fireworld.kernels.step import hurt
 from fireworld.parameters import HealthParameters
 from fireworld.simulation.city_arrays import health_constants
 from tests.kernels.small import burn, make_city, make_world, square
@@ -119,9 +120,9 @@ def test_who_is_where_meets_the_fire_of_the_step():
     city = make_city(square(0, 0), square(15, 0), square(60, 0), refuges=[2])
     world = make_world(city, civilians=[(0, 0, 0), (1, 15, 0), (-1, 5, 5)], brigades=[2])
     burn(world, 0)
+    state = world.state
     for step in range(1, 40):
-        world.step_number = step
-        world._hurt()
+        hurt(state.fire, state.civilians, state.brigades, world.constants.health, world.seed, step)
     hp = world.state.civilians.hp
     assert hp[0] == 0
     assert hp[1:].tolist() == [1000, 1000]

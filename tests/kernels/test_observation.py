@@ -22,12 +22,17 @@ def see(world, brigade=0):
     state = observe(
         brigade,
         world.state.brigades.action,
-        world.state.brigades,
+        world.state.brigades.site,
         world.state.sites,
         world.constants.observation,
         features,
     )
     return features.tolist(), state
+
+
+def chooses(world, brigade=0):
+    brigades = world.state.brigades
+    return can_choose(brigade, brigades.hp, brigades.refilling, world.state.sites.counts)
 
 
 def target(world, action, brigade=0):
@@ -105,7 +110,7 @@ def test_a_brigade_without_a_fire_sees_nothing():
     world = make_world(make_city(*LINE), brigades=[0])
     burn(world)
     assert see(world) == ([0] * 8, -1)
-    assert not can_choose(0, world.state.brigades, world.state.sites)
+    assert not chooses(world)
     assert target(world, 0) == -1
 
 
@@ -114,7 +119,7 @@ def test_the_dead_and_the_refilling_do_not_choose(hp, refilling, expected):
     world = make_world(make_city(*LINE), brigades=[0])
     burn(world, 0)
     world.state.brigades.hp[0], world.state.brigades.refilling[0] = hp, refilling
-    assert can_choose(0, world.state.brigades, world.state.sites) == expected
+    assert chooses(world) == expected
 
 
 class Scripted:

@@ -15,6 +15,8 @@ from fireworld.policy.kernel import KernelPolicy
 from tests.reference import fire, luck, outcome, people, ranking, sites, team
 from tests.reference.learning import Learner
 
+PAPERS = outcome.Reward()
+
 
 @dataclass(frozen=True)
 class Tables:
@@ -25,7 +27,7 @@ class Tables:
     sites: sites.SiteTables
     streets: team.StreetArrays
     floor_area: Float64Array  # (n,) m2
-    reward_change: bool
+    reward: outcome.Reward
     in_turn: bool  # brigades see what those before them have chosen in this step
 
     @classmethod
@@ -35,7 +37,7 @@ class Tables:
         parameters: Parameters,
         *,
         unit_volume_m3: float | None = None,
-        reward_change: bool = False,
+        reward: outcome.Reward = PAPERS,
         in_turn: bool = True,
     ) -> Self:
         """Prepare a city."""
@@ -45,7 +47,7 @@ class Tables:
             sites=sites.SiteTables.of_city(city, unit_volume_m3=unit_volume_m3),
             streets=team.StreetArrays.of_city(city),
             floor_area=city.footprints.ground_area_m2.astype(np.float64) * city.footprints.floors,
-            reward_change=reward_change,
+            reward=reward,
             in_turn=in_turn,
         )
 
@@ -94,7 +96,7 @@ class World:
     def at_start(
         cls, tables: Tables, *, ignited: Array, civilian_building: Array, civilian_mm: Array, brigade_refuge: Array
     ) -> Self:
-        """Set up the start; arguments as of `fireworld.simulation.world.World`."""
+        """Set up the start; arguments as of `fireworld.simulation.placement.Placement`."""
         state = fire.FireState.cold(tables.fire)
         fire.ignite(tables.fire, state, np.asarray(ignited, dtype=np.int64))
         streets, parameters = tables.streets, tables.parameters
@@ -259,5 +261,5 @@ def assess(tables: Tables, world: World) -> None:
         floor_area=tables.floor_area,
         hp=world.people.hp[: world.people.n_civilians],
         full_hp=tables.parameters.health.initial_hp,
-        reward_change=tables.reward_change,
+        reward=tables.reward,
     )

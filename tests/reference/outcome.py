@@ -14,6 +14,17 @@ SAVED: Final = np.array([1.0, 0.66, 0.33, 0.0, 0.9, 0.75, 0.5, 0.25, 0.0])
 """Part of a building that counts as saved, by fieryness code."""
 
 
+@dataclass(frozen=True)
+class Reward:
+    """Weights of the terms; the reward is their weighted sum, or how that changed."""
+
+    water_damaged: float = -1.0
+    burning: float = -2.0
+    burnt_out: float = -3.0
+    civilians: float = 1.0
+    change: bool = False
+
+
 @dataclass
 class Outcome:
     """The outcome as it stands after a step."""
@@ -31,7 +42,7 @@ class Outcome:
 
 
 def assess(
-    outcome: Outcome, *, fieryness: Array, floor_area: Float64Array, hp: Array, full_hp: int, reward_change: bool
+    outcome: Outcome, *, fieryness: Array, floor_area: Float64Array, hp: Array, full_hp: int, reward: Reward
 ) -> None:
     """Write the counts, the reward and both scores of the moment.
 
@@ -41,7 +52,7 @@ def assess(
         floor_area: (n,) ground area times floors, m2.
         hp: (c,) health points of the civilians.
         full_hp: health points of a healthy one.
-        reward_change: reward the step's change of the stock instead of the stock.
+        reward: what the step is worth.
     """
     of_code = np.bincount(fieryness, minlength=9).tolist()
     outcome.n_burning, outcome.n_water_damaged, outcome.n_burnt_out = sum(of_code[1:4]), sum(of_code[4:8]), of_code[8]
@@ -49,13 +60,13 @@ def assess(
     outcome.n_civilians_alive = sum(one > 0 for one in points)
     full = full_hp * len(points)
     stock = (
-        -1.0 * outcome.n_water_damaged,
-        -2.0 * outcome.n_burning,
-        -3.0 * outcome.n_burnt_out,
-        float(sum(points) - full),
+        reward.water_damaged * outcome.n_water_damaged,
+        reward.burning * outcome.n_burning,
+        reward.burnt_out * outcome.n_burnt_out,
+        reward.civilians * (sum(points) - full),
     )
     change = tuple(new - old for new, old in zip(stock, outcome.stock, strict=True))
-    outcome.reward, outcome.stock = change if reward_change else stock, stock
+    outcome.reward, outcome.stock = change if reward.change else stock, stock
     outcome.reward_so_far += sum(outcome.reward)
     healthy = sum(points) / full if full else 1.0
     saved = float(SAVED[fieryness] @ floor_area)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -20,10 +20,14 @@ from fireworld.kernels.observation import observe
 from fireworld.parameters import PAPER
 from fireworld.policy.kernel import always, at_random, each_another, from_rankings, from_tables
 from fireworld.records import ACTIVITIES
+from fireworld.rewards import reward_of
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import build_scenario
+from fireworld.simulation.placement import Placement
+from fireworld.simulation.start import prepare_start
 from fireworld.simulation.world import World
-from tests.reference import episode, luck, sites, team
+from tests.kernels.small import assess
+from tests.reference import episode, luck, outcome, sites, team
 
 pytestmark = pytest.mark.slow
 
@@ -94,16 +98,16 @@ class Play:
     def worlds(self, *, seed: int, n_steps: int) -> tuple[World, episode.World]:
         """Set up both worlds."""
         tables = self.tables
-        compiled = World(
+        weights = asdict(tables.reward)
+        start = prepare_start(
             self.city,
             tables.parameters,
-            **self.start,
-            seed=seed,
-            n_steps_max=n_steps,
-            reward_change=tables.reward_change,
-            in_turn=tables.in_turn,
+            Placement(**self.start),
+            reward=reward_of("change" if weights.pop("change") else "stock", weights),
+            choices="in-turn" if tables.in_turn else "simultaneous",
             unit_volume_m3=tables.sites.volume_bounds[0],
         )
+        compiled = World(start, seed=seed, n_steps_max=n_steps)
         return compiled, episode.World.at_start(tables, **self.start)
 
     def run(self, policy: str, *, seed: int, n_steps: int) -> tuple[episode.World, set[int]]:
@@ -160,6 +164,14 @@ def test_simultaneous_choices(policy):
     assert plain.outcome.reward_so_far != other.outcome.reward_so_far, "what brigades hear of each other matters"
 
 
+REWARDS = {
+    1: outcome.Reward(change=True),
+    2: outcome.Reward(water_damaged=0.5, burning=-1.25, burnt_out=0.0, civilians=0.01),
+    3: outcome.Reward(water_damaged=0.0, burning=-1.0, burnt_out=-7.0, civilians=0.3, change=True),
+}
+"""By the town."""
+
+
 @cache
 def rough(seed: int) -> Play:
     """Make a town of many fires, hydrants, small tanks, refuges that burn and somebody outdoors."""
@@ -183,7 +195,7 @@ def rough(seed: int) -> Play:
         "civilian_mm": city.footprints.centroid_mm[places],
         "brigade_refuge": np.flatnonzero(city.footprints.refuge)[np.arange(7) % 3],
     }
-    tables = episode.Tables.of_city(city, parameters, unit_volume_m3=700.0, reward_change=True)
+    tables = episode.Tables.of_city(city, parameters, unit_volume_m3=700.0, reward=REWARDS[seed])
     return Play(city, tables, start)
 
 
@@ -271,7 +283,7 @@ def test_sites_of_fires_that_jump_about(seed):
         assert found.counts[1] == plain.memory.last_number
         assert compiled.state.brigades.site.tolist() == [brigade.site for brigade in plain.team]
         assert_same_sites(compiled, plain, seen)
-        compiled._assess()
+        assess(compiled)
         episode.assess(play.tables, plain)
         assert_same_outcome(compiled, plain)
 
@@ -294,7 +306,7 @@ def assert_same_sites(compiled: World, plain: episode.World, seen: sites.Sites |
         state = observe(
             who,
             compiled.state.brigades.action,
-            compiled.state.brigades,
+            compiled.state.brigades.site,
             found,
             compiled.constants.observation,
             features,

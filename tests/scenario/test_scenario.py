@@ -1,6 +1,7 @@
 """Scenarios: what is read, what is refused and how it is told, digests, settings, the shipped ones."""
 
 import json
+import math
 from pathlib import Path
 
 import msgspec
@@ -12,8 +13,8 @@ from msgspec import inspect
 
 from fireworld.errors import ScenarioError
 from fireworld.parameters import OFFICIAL_2011, PAPER
-from fireworld.scenario import load_scenario, parse_scenario, scenario_names, split_settings
-from fireworld.scenario.document import BOUNDS, Document
+from fireworld.scenario import Scenario, load_scenario, parse_scenario, scenario_names, split_settings
+from fireworld.scenario.document import BOUNDS, Document, resolve_reward, with_kind
 from fireworld.scenario.explain import find_faults
 from fireworld.scenario.reference import PAGE, renew
 
@@ -65,6 +66,29 @@ def test_overrides_replace_the_presets_values():
         ({"description": 7}, "description: expected text, got 7"),
         ({"preset": "official-2014"}, "got 'official-2014'; try official-2013"),
         ({"reward": "flow"}, "reward: expected one of change, stock, got 'flow'"),
+        ({"reward": "stok"}, "reward: expected one of change, stock, got 'stok'; try stock"),
+        ({"reward": 7}, "reward: expected one of change, stock, or keys and values, got 7"),
+        ({"reward": None}, "reward: expected one of change, stock, or keys and values, got no value"),
+        (
+            {"reward": {"burnt": 1}},
+            "reward.burnt: expected one of the keys water_damaged, burning, burnt_out, civilians, ",
+        ),
+        ({"reward": {"burnt": 1}}, "got 'burnt'; try burnt_out"),
+        (
+            {"reward": {"burning": math.inf}},
+            "reward.burning: expected a number from -1000000000 to 1000000000, got '.inf'",
+        ),
+        (
+            {"reward": {"burning": math.nan}},
+            "reward.burning: expected a number from -1000000000 to 1000000000, got '.nan'",
+        ),
+        ({"reward": {"burning": True}}, "reward.burning: expected a number from -1000000000 to 1000000000, got True"),
+        ({"reward": {"burning": 1, "of": "changes"}}, "reward.of: expected one of change, stock, got 'changes'; try"),
+        (
+            {"reward": {}},
+            "reward: expected a weight other than 0 for one of water_damaged, burning, burnt_out, civilians",
+        ),
+        ({"reward": {"burning": 0, "of": "change"}}, "reward: expected a weight other than 0 for one of water_damaged"),
         ({"brigade": {"n": 3}}, "brigade: expected a known key, got 'brigade'; try brigades"),
         ({"brigades": {"count": 3}}, "brigades.count: expected one of the keys n, got 'count'"),
         ({"brigades": 3}, "brigades: expected keys and values, got 3"),
@@ -114,7 +138,17 @@ def test_missing_keys_are_named():
 
 
 @given(
-    path=st.sampled_from([("steps",), ("city", "generated", "columns"), ("fires", 0, "at"), ("civilians", "to_m"), ()]),
+    path=st.sampled_from(
+        [
+            ("steps",),
+            ("reward",),
+            ("reward", "burning"),
+            ("city", "generated", "columns"),
+            ("fires", 0, "at"),
+            ("civilians", "to_m"),
+            (),
+        ]
+    ),
     value=st.none()
     | st.booleans()
     | st.integers()
@@ -125,6 +159,8 @@ def test_missing_keys_are_named():
 )
 def test_every_document_that_msgspec_refuses_is_explained(path, value):
     document = yaml.safe_load(TEXT)
+    if path[:1] == ("reward",):
+        document["reward"] = {}
     if path:
         at = document
         for key in path[:-1]:
@@ -204,6 +240,46 @@ def test_settings():
 )
 def test_wrong_settings(key, value, message):
     assert error_of(lambda: parse().with_settings({key: value})).startswith(message)
+
+
+def test_rewards():
+    """Terms left out count 0; the paper's weights are -1, -2, -3 and 1."""
+    rewards = [
+        ("stock", (0, (-1.0, -2.0, -3.0, 1.0))),
+        ("change", (1, (-1.0, -2.0, -3.0, 1.0))),
+        ({"burning": -1, "civilians": 0.01}, (0, (0.0, -1.0, 0.0, 0.01))),
+        ({"burnt_out": -5, "of": "change"}, (1, (0.0, 0.0, -5.0, 0.0))),
+    ]
+    for reward, expected in rewards:
+        scenario = parse(reward=reward)
+        assert resolve_reward(scenario) == expected
+        again = parse_scenario(scenario.to_yaml(), source="again")
+        assert (again.reward, again.digest) == (scenario.reward, scenario.digest)
+    assert len({parse(reward=reward).digest for reward, _ in rewards}) == len(rewards)
+
+
+@pytest.mark.parametrize("weight", [math.inf, -math.inf, math.nan, 2e9])
+def test_weights_are_finite(weight):
+    values = yaml.safe_load(TEXT) | {"reward": {"burning": weight}}
+    assert "reward.burning: expected a number from" in error_of(lambda: Scenario.from_dict(values))
+
+
+def test_a_reward_of_another_kind_keeps_its_weights():
+    assert resolve_reward(with_kind(parse(), "change")) == resolve_reward(parse(reward="change"))
+    weighted = with_kind(parse(reward={"burning": -4, "of": "change"}), "stock")
+    assert resolve_reward(weighted) == (0, (0.0, -4.0, 0.0, 0.0))
+
+
+def test_setting_one_weight_leaves_the_others():
+    def reward(scenario, key, text):
+        return resolve_reward(scenario.with_settings({key: text}))
+
+    assert reward(parse(), "reward", "change") == resolve_reward(parse(reward="change"))
+    assert reward(parse(), "reward.burning", "-1") == (0, (-1.0, -1.0, -3.0, 1.0))
+    assert reward(parse(reward="change"), "reward.burning", "-1") == (1, (-1.0, -1.0, -3.0, 1.0))
+    assert reward(parse(reward={"burnt_out": -1}), "reward.burning", "-2.5") == (0, (0.0, -2.5, -1.0, 0.0))
+    assert reward(parse(), "reward", "{burning: -1}") == (0, (0.0, -1.0, 0.0, 0.0))
+    assert resolve_reward(parse().with_values({"reward.of": "change"})) == (1, (-1.0, -2.0, -3.0, 1.0))
 
 
 def test_split_settings():

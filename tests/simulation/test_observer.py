@@ -13,7 +13,7 @@ from fireworld.policy.kernel import always
 from fireworld.records import ACTIVITIES, EVENT_KINDS, SNAPSHOT_EVERY_STEPS, STEP_TOPICS
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.world import Choices
-from tests.kernels.small import burn, make_city, make_world, square
+from tests.kernels.small import assess, burn, make_city, make_world, square
 from tests.simulation.town import begin, policy_named, town_world
 
 NO_CHOICES = Choices(np.zeros((0, 8), dtype=np.int64), np.zeros(0, dtype=np.int64), ())
@@ -40,7 +40,7 @@ def cold_world(**others):
     world = make_world(make_city(*FAR_APART, refuges=[4]), civilians=[(-1, 0, 500)] * 2, brigades=[4], **others)
     burn(world, 0, 1, 2, 3)
     world.state.fire.energy[:4] = 1e7
-    world._assess()
+    assess(world)
     return world
 
 

@@ -13,7 +13,10 @@ from fireworld.city.generator import generate_plan
 from fireworld.kernels.arrays import CityArrays
 from fireworld.parameters import PAPER, Parameters
 from fireworld.policy.kernel import KernelPolicy, always, at_random, each_another, from_rankings, from_tables
+from fireworld.rewards import Reward
 from fireworld.simulation.city_arrays import city_arrays
+from fireworld.simulation.placement import Placement
+from fireworld.simulation.start import prepare_start
 from fireworld.simulation.world import World
 
 POLICIES = ("fixed", "each-another", "random", "table", "table-of-270", "ranking-of-named", "ranking-of-all")
@@ -51,7 +54,14 @@ def policy_named(name: str) -> KernelPolicy:
 
 
 def town_world(
-    *, seed: int, n_fires: int = 3, n_people: int = 5, n_brigades: int = 3, flush: bool = True, n_steps_max: int = 60
+    *,
+    seed: int,
+    n_fires: int = 3,
+    n_people: int = 5,
+    n_brigades: int = 3,
+    flush: bool = True,
+    reward: Reward | None = None,
+    n_steps_max: int = 60,
 ) -> World:
     """A world whose fires and people lie where the seed says."""
     city = town()
@@ -60,17 +70,14 @@ def town_world(
     chosen = random.permutation(inflammable)
     people = random.choice(inflammable, n_people)
     refuges = np.flatnonzero(city.footprints.refuge)
-    return World(
-        city,
-        small_tanks(flush=flush),
+    placement = Placement(
         ignited=np.sort(chosen[:n_fires]),
         civilian_building=people,
         civilian_mm=city.footprints.centroid_mm[people],
         brigade_refuge=refuges[np.arange(n_brigades) % len(refuges)],
-        seed=seed,
-        n_steps_max=n_steps_max,
-        arrays=town_tables(),
     )
+    start = prepare_start(city, small_tanks(flush=flush), placement, reward=reward, arrays=town_tables())
+    return World(start, seed=seed, n_steps_max=n_steps_max)
 
 
 def begin(policy: KernelPolicy, world: World) -> KernelPolicy:

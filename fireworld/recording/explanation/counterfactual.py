@@ -71,7 +71,7 @@ class CounterfactualRun:
             _run_compiled(world, policy, spans)
         else:
             self._run_stepwise(world, policy, spans)
-        return float(world.state.outcome.score[0])
+        return world.outcome.score
 
     def _world_before(self, step: int) -> World:
         """Return the world at the last saved state before a step, at the latest."""

@@ -20,7 +20,7 @@ def scenario_kind(scenario: Scenario) -> str:
             _where_fire_is(scenario),
             _where_people_are(scenario),
             f"choices {scenario.choices}",
-            f"reward {scenario.reward}",
+            f"reward {scenario.reward if isinstance(scenario.reward, str) else f'{scenario.reward.of} with weights'}",
             f"parameters {scenario.preset}" + (" with changes" if changed else ""),
         )
     )

@@ -19,7 +19,9 @@ from fireworld.policy.teams.table_team import COMMIT_MAX, TableTeam
 from fireworld.policy.teams.team import Team
 from fireworld.policy.words import N_FLAG_VALUES, N_STATES, N_STATES_ALONE
 from fireworld.records import ACTIONS
+from fireworld.rewards import Kind
 from fireworld.scenario import Scenario
+from fireworld.scenario.document import with_kind
 from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.simulation.state import fresh_learner
 from fireworld.training.curriculum import Curriculum, CurriculumStage
@@ -55,8 +57,8 @@ class Sarsa(Method):
     """All brigades learn into one table."""
     fixed_noise: bool = False
     """Every episode of a scenario has the same random draws."""
-    reward: Literal["stock", "change"] = "stock"
-    """The state's cost at every step, as in the paper; or how it changed."""
+    reward: Kind = "stock"
+    """The weighted terms at every step, as in the paper; or how their sum changed. The weights are the scenario's."""
     choices: Literal["in-turn", "simultaneous"] = "in-turn"
     """Whether brigades see what those before them chose in this step."""
     commit: Commit = 1
@@ -233,8 +235,8 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         return Progress(tables=np.zeros(shape), visits=np.zeros(shape, dtype=np.int64))
 
     def _build(self, scenario: Scenario) -> BuiltScenario:
-        varied = msgspec.structs.replace(scenario, reward=self.method.reward, choices=self.method.choices)
-        return self._cities.build(varied)
+        varied = msgspec.structs.replace(scenario, choices=self.method.choices)
+        return self._cities.build(with_kind(varied, self.method.reward))
 
     def _run_episode(self, stage: CurriculumStage, built: BuiltScenario) -> EpisodeReport:
         method, progress = self.method, self.progress
@@ -261,7 +263,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         ended = converged or progress.episode >= method.n_episodes_max
         if ended:
             self._next_scenario()
-        outcome = world.state.outcome
+        outcome = world.outcome
         return EpisodeReport(
             milestone=ended,
             stage=stage.name,
@@ -270,10 +272,10 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
             episode=episode,
             epsilon=epsilon,
             n_steps=n_steps,
-            score=float(outcome.score[0]),
-            score_max=float(outcome.score[1]),
-            total_reward=float(outcome.reward[5]),
-            n_burnt_out=int(outcome.counts[2]),
+            score=outcome.score,
+            score_max=outcome.score_max,
+            total_reward=outcome.total_reward,
+            n_burnt_out=outcome.n_burnt_out,
             n_changed=n_changed,
             n_unchanged=n_unchanged,
             converged=converged,

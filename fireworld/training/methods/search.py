@@ -283,7 +283,7 @@ class SearchTrainer(Trainer[Search, Generation]):
         key = hash_key(self.seed, EPISODE, fire, self.progress.generation)
         world = self._fires[fire].world(seed=key >> (64 - SEED_BITS))
         world.run(self.policy_of(weights).for_brigades(world.n_brigades))
-        return float(world.state.outcome.score[0] / world.state.outcome.score[1])
+        return world.outcome.score_share
 
 
 def _moved(progress: Progress, best: Array, method: Search, free: Array) -> Progress:

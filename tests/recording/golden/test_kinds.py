@@ -29,6 +29,8 @@ def test_a_kind_is_said_in_words():
         ("civilians", "{n: 0}", "no civilians"),
         ("choices", "simultaneous", "choices simultaneous"),
         ("reward", "change", "reward change"),
+        ("reward", "{burning: -1}", "reward stock with weights"),
+        ("reward.of", "change", "reward change with weights"),
         ("preset", "official-2011", "parameters official-2011"),
         ("parameters.brigades.range_m", "10", "parameters paper with changes"),
     ],
