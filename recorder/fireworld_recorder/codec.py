@@ -181,6 +181,11 @@ def walk(data: Buffer) -> Iterator[tuple[int, int, Any]]:
         position += length
 
 
+def parts(data: Buffer, number: int) -> Iterator[Any]:
+    """Yield the values of one field, as `walk` yields them."""
+    return (value for found, _, value in walk(data) if found == number)
+
+
 def long_fields(data: Buffer, n_bytes: int) -> list[tuple[int, int]]:
     """List where the fields of at least that many bytes begin and end, up to the first that is no protobuf field."""
     found: list[tuple[int, int]] = []

@@ -14,11 +14,11 @@ from fireworld.errors import OutputError, expected
 from fireworld.files import check_output
 from fireworld.records import FORMAT, STEP_SECONDS, CityRecord, RunHeader, Snapshot, StepRecord
 from fireworld_recorder.chain import Chain, step_messages
-from fireworld_recorder.codec import encode, encode_snapshot
+from fireworld_recorder.codec import encode, encode_snapshot, long_fields
 from fireworld_recorder.container import CHUNK_BYTES_MAX
 from fireworld_recorder.container_writer import ContainerWriter
 from fireworld_recorder.header import METADATA_NAME, PROFILE, to_metadata
-from fireworld_recorder.schema import PACKAGE, Commit, descriptors
+from fireworld_recorder.schema import DESCRIPTORS, PACKAGE, TOPICS, Commit, message_of
 
 PARTIAL_SUFFIX: Final = ".partial"
 _STEP_NANOSECONDS: Final = STEP_SECONDS * 1_000_000_000
@@ -50,7 +50,10 @@ class Scene(Protocol):
 
 def own_channels() -> list[Channel]:
     """List the channels of a new log, in their fixed order."""
-    return [Channel(message.topic, f"{PACKAGE}.{message.name}", data) for message, data in descriptors()]
+    # The file holds a set of one descriptor for each topic, one after another: a log carries each for its topic only.
+    data = DESCRIPTORS.read_bytes()
+    sets = zip(TOPICS, long_fields(data, 0), strict=True)
+    return [Channel(topic.topic, f"{PACKAGE}.{message_of(topic).name}", data[a:b]) for topic, (a, b) in sets]
 
 
 class StepFile:
