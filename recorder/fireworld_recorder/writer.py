@@ -89,8 +89,11 @@ class StepFile:
         self._open = False
         replace_partial = force or not self._keep_partial
         check_output(path, force=force)
-        if not replace_partial:
-            _check_leftover(self.partial)
+        if not replace_partial and self.partial.exists():
+            raise OutputError(
+                f"{self.partial}: a run that did not end left this, or one is under way;"
+                " try `fireworld recover` to keep its steps, or --force to replace it"
+            )
         with self._guard():
             self._file = self.partial.open("wb" if replace_partial else "xb")
             self._open = True
@@ -183,7 +186,7 @@ class StepFile:
             raise
 
 
-class LogWriter:
+class LogWriter(StepFile):
     """Records a run. Use it as a context manager: an exception inside leaves the committed steps as NAME.partial.
 
     Args:
@@ -210,7 +213,7 @@ class LogWriter:
         self._chain = Chain(encoded_city)
         self._scene = scene
         self._last_step = -1
-        self._file = StepFile(
+        super().__init__(
             Path(path),
             metadata=to_metadata(header),
             attachments=header.attachments,
@@ -225,11 +228,7 @@ class LogWriter:
         return self._chain.hash.hex()
 
     def write(self, record: StepRecord) -> None:
-        """Write one step; when this returns a kill cannot lose it.
-
-        Raises:
-            OutputError: the disk is full, or another fault of the output.
-        """
+        """Write one step; when this returns a kill cannot lose it. Errors are those of `commit`."""
         if record.step <= self._last_step:
             raise ValueError(f"steps are written in rising order, got {record.step} after {self._last_step}")
         messages = step_messages(record)
@@ -241,29 +240,5 @@ class LogWriter:
             messages.extend(self._scene.messages(record))
         commit = self._chain.commit(step=record.step, terminated=record.terminated, truncated=record.truncated)
         messages.append((Commit.topic, encode(commit)))
-        self._file.commit(record.step, messages)
+        self.commit(record.step, messages)
         self._last_step = record.step
-
-    def close(self) -> None:
-        """Write the index and give the log its name.
-
-        Raises:
-            OutputError: the disk is full, or another log has taken the name meanwhile.
-        """
-        self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._file.__exit__(kind, error, traceback)
-
-
-def _check_leftover(partial: Path) -> None:
-    if partial.exists():
-        raise OutputError(
-            f"{partial}: a run that did not end left this, or one is under way;"
-            " try `fireworld recover` to keep its steps, or --force to replace it"
-        )
