@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from fireworld.city.city import AirCells, Footprints, Int64Array
-from fireworld.city.walls import bounding_boxes, walls_of
+from fireworld.city.outlines import bounding_boxes, walls_of
 from fireworld.errors import CityError, expected
 
 SAMPLES: Final = 10

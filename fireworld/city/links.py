@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from fireworld.city.city import Array, Footprints, Int32Array, Int64Array, Links
-from fireworld.city.walls import walls_of
-from fireworld.kernels.rays import WallGrid, WallTable, count_hits, first_hits
+from fireworld.city.city import Footprints, Int32Array, Int64Array, Links
+from fireworld.city.outlines import walls_of
+from fireworld.kernels.rays import WallGrid, WallTable, count_hits
 from fireworld.parameters import FireParameters
 
 MARGIN_MM: Final = 1
@@ -36,29 +36,6 @@ def radiation_links(footprints: Footprints, order: Int32Array, fire: FireParamet
         building=building[rising].astype(np.int32),
         share=(n_hits[rising] / n_rays[emitter]).astype(np.float32),
     )
-
-
-def walls_hit(
-    footprints: Footprints,
-    order: Int32Array,
-    *,
-    source: Array,
-    start_mm: Array,
-    end_mm: Array,
-) -> Int64Array:
-    """Find the first wall that each given ray meets, -1 where there is none: for checking against traces.
-
-    Args:
-        footprints: the buildings.
-        order: (n,) in which the official program visits the buildings.
-        source: (r,) wall that each ray leaves from, an index into `walls_of(footprints)`.
-        start_mm: (r, 2) start of each ray.
-        end_mm: (r, 2) end of each ray.
-    """
-    walls = wall_table(footprints, order, FireParameters())
-    rays = (source.astype(np.int64), start_mm.astype(np.int64), end_mm.astype(np.int64))
-    hits: Int64Array = first_hits(walls, wall_grid(walls), *rays)
-    return hits
 
 
 def wall_table(footprints: Footprints, order: Int32Array, fire: FireParameters) -> WallTable:

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from fireworld.city.city import Array, Footprints, Int64Array, Links
-from fireworld.city.walls import Walls, bounding_boxes, walls_of
+from fireworld.city.outlines import Walls, bounding_boxes, walls_of
 
 SITE_GAP_MM: Final = 30_000
 """Outlines closer than this, strictly, make one fire site."""
