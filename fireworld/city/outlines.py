@@ -98,3 +98,11 @@ def bounding_boxes(footprints: Footprints) -> tuple[Int64Array, Int64Array]:
     low = np.minimum.reduceat(footprints.outline_mm, starts, axis=0).astype(np.int64)
     high = np.maximum.reduceat(footprints.outline_mm, starts, axis=0).astype(np.int64)
     return low, high
+
+
+def numbered(first: Int64Array, last: Int64Array) -> tuple[Int64Array, Int64Array]:
+    """List the pairs (k, number) for every number from first[k] to last[k], both included."""
+    length = last - first + 1
+    k = np.repeat(np.arange(len(length)), length)
+    number = np.arange(len(k)) - np.repeat(np.cumsum(length) - length, length) + first[k]
+    return k, number
