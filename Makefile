@@ -59,9 +59,10 @@ format: install  ## Format the code and fix what the linter can fix.
 	$(BIN)/ruff check --fix .
 
 docs: install  ## Renew what is made from the code in docs/, and the transcripts in the README.
-	$(BIN)/python -m fireworld_recorder.schema --write
-	$(BIN)/python -m fireworld.scenario.reference
-	$(BIN)/python -m fireworld.cli.reference
+	$(BIN)/python -m tests.docs.log_format
+	$(BIN)/python -m tests.docs.foxglove_schema
+	$(BIN)/python -m tests.docs.scenario_reference
+	$(BIN)/python -m tests.docs.cli_reference
 	$(BIN)/python -m tests.docs.transcripts
 
 pictures: install  ## Draw the pictures of the docs again, from runs made again.

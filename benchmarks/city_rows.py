@@ -11,12 +11,13 @@ from benchmarks.plain_rays import random_rays, walls_hit
 from benchmarks.timing import Contender, Row, compare, measure
 from fireworld.city import links
 from fireworld.city.build import build_city
-from fireworld.city.walls import walls_of
+from fireworld.city.outlines import walls_of
 from fireworld.parameters import PAPER
 from fireworld.policy.kernel import each_another
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import build_scenario
 from fireworld.simulation.world import World
+from tests.city.plans import walls_hit as grid_walls_hit
 
 RAYS_COMPARED = 20_000
 
@@ -33,7 +34,7 @@ def ray_row(size: int, *, seconds: float) -> Row:
     rank = visited[walls.building] * len(walls.building) + np.arange(len(walls.building))
 
     def compiled(_: None) -> object:
-        return links.walls_hit(city.footprints, city.order, **rays)
+        return grid_walls_hit(city.footprints, city.order, **rays)
 
     def in_numpy(_: None) -> object:
         return walls_hit(walls, rank, **rays)

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from fireworld.city.city import Array, Float64Array, Int64Array
-from fireworld.city.walls import Walls
+from fireworld.city.outlines import Walls
 
 BUNDLE: Final = 256
 MISS: Final = -1

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from fireworld.city.city import AirCells, Footprints, Int64Array
-from fireworld.city.walls import bounding_boxes, walls_of
+from fireworld.city.outlines import bounding_boxes, numbered, walls_of
 from fireworld.errors import CityError, expected
 
 SAMPLES: Final = 10
@@ -52,9 +52,7 @@ def cover_cells(footprints: Footprints, cell_mm: int, *, where: str = "city") ->
         raise CityError(expected(where, key, wanted, got, "try larger air cells or smaller buildings"))
     counts = _count_samples(footprints, origin + first * cell_mm, blocks, cell_mm)
 
-    n_cells = blocks[:, 0] * blocks[:, 1]
-    building = np.repeat(np.arange(len(blocks)), n_cells)
-    within = np.arange(len(building)) - np.repeat(np.cumsum(n_cells) - n_cells, n_cells)
+    building, within = numbered(np.zeros(len(blocks), dtype=np.int64), blocks[:, 0] * blocks[:, 1] - 1)
     x = first[building, 0] + within // blocks[building, 1]
     y = first[building, 1] + within % blocks[building, 1]
     covered = counts > 0
@@ -95,9 +93,7 @@ def _count_samples(footprints: Footprints, corner_mm: Int64Array, blocks: Int64A
     end = SAMPLES * (walls.end_mm - corner_mm[walls.building])
     row_low = _ceil_divide(np.minimum(start[:, 1], end[:, 1]), cell_mm)
     row_high = _ceil_divide(np.maximum(start[:, 1], end[:, 1]), cell_mm)
-    n_crossings = row_high - row_low
-    wall = np.repeat(np.arange(len(start)), n_crossings)
-    row = np.arange(len(wall)) - np.repeat(np.cumsum(n_crossings) - n_crossings, n_crossings) + row_low[wall]
+    wall, row = numbered(row_low, row_high - 1)
 
     rise, run = (end[:, 1] - start[:, 1])[wall], (end[:, 0] - start[:, 0])[wall]
     sign = np.sign(rise)

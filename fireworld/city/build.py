@@ -7,13 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from fireworld.city.air import cover_cells
-from fireworld.city.city import Array, City, Links, Plan
-from fireworld.city.freeze import freeze
+from fireworld.city.city import Array, City, Int32Array, Int64Array, Links, Plan, freeze
 from fireworld.city.links import radiation_links
 from fireworld.city.near import near_relation
 from fireworld.city.physics import physics_of
 from fireworld.city.streets import streets_of
-from fireworld.city.visiting_order import visiting_order
 from fireworld.parameters import FireParameters
 
 
@@ -30,17 +28,12 @@ def build_city(plan: Plan, fire: FireParameters, *, seed: int) -> City:
     """
     footprints = plan.footprints
     air = cover_cells(footprints, fire.air_cell_mm, where=plan.name)
-    physics = physics_of(footprints, fire)
     order = visiting_order(footprints.building_id)
     links = radiation_links(footprints, order, fire, seed=seed)
     city = City(
         name=plan.name,
         footprints=footprints,
-        volume_m3=physics.volume_m3,
-        heat_capacity=physics.heat_capacity,
-        initial_fuel=physics.initial_fuel,
-        ignition_point=physics.ignition_point,
-        wall_area_m2=physics.wall_area_m2,
+        **physics_of(footprints, fire),
         order=order,
         air=air,
         links=links,
@@ -70,3 +63,22 @@ def with_links(city: City, *, ptr: Array, building: Array, share: Array) -> City
 def with_order(city: City, order: Array) -> City:
     """Return the city with buildings visited in another order, (n,) indices, such as that of a trace."""
     return freeze(replace(city, order=order.astype(np.int32)))
+
+
+def visiting_order(building_id: Int64Array) -> Int32Array:
+    """Order the buildings as the official program does, which walks a hash table of their identifiers.
+
+    The air exchange depends on it. The key is (id ^ id >> 16) modulo the size of the table: the smallest power of two
+    from 16 on that is at most three quarters full. Ties stay in file order.
+
+    Args:
+        building_id: (n,) identifiers, not negative.
+
+    Returns:
+        (n,) indices of the buildings, first visited first.
+    """
+    capacity = 16
+    while len(building_id) > 0.75 * capacity:
+        capacity *= 2
+    key = (building_id ^ (building_id >> 16)) & (capacity - 1)
+    return np.argsort(key, kind="stable").astype(np.int32)

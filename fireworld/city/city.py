@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ Int64Array = NDArray[np.int64]
 Int32Array = NDArray[np.int32]
 UInt8Array = NDArray[np.uint8]
 Array = NDArray[Any]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -123,3 +124,13 @@ class City:
         low, high = self.footprints.outline_mm.min(axis=0), self.footprints.outline_mm.max(axis=0)
         width, height = int(high[0]) - int(low[0]), int(high[1]) - int(low[1])
         return float(np.sqrt(float(width * width + height * height))) / 2
+
+
+def freeze(value: T) -> T:
+    """Make every array in a dataclass, and in the dataclasses in it, read-only; return the same object."""
+    if isinstance(value, np.ndarray):
+        value.setflags(write=False)
+    elif is_dataclass(value):
+        for item in fields(value):
+            freeze(getattr(value, item.name))
+    return value

@@ -14,8 +14,7 @@ from typing import Final
 import numpy as np
 
 from fireworld import draws
-from fireworld.city.city import Plan, StreetMap
-from fireworld.city.freeze import freeze
+from fireworld.city.city import Plan, StreetMap, freeze
 from fireworld.city.outlines import Building, Corner, assemble, centroid_mm, doubled_area_mm2
 from fireworld.errors import CityError, expected
 

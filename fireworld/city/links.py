@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from fireworld.city.city import Array, Footprints, Int32Array, Int64Array, Links
-from fireworld.city.walls import walls_of
-from fireworld.kernels.rays import WallGrid, WallTable, count_hits, first_hits
+from fireworld.city.city import Footprints, Int32Array, Links
+from fireworld.city.outlines import numbered, walls_of
+from fireworld.kernels.rays import WallGrid, WallTable, count_hits
 from fireworld.parameters import FireParameters
 
 MARGIN_MM: Final = 1
@@ -36,29 +36,6 @@ def radiation_links(footprints: Footprints, order: Int32Array, fire: FireParamet
         building=building[rising].astype(np.int32),
         share=(n_hits[rising] / n_rays[emitter]).astype(np.float32),
     )
-
-
-def walls_hit(
-    footprints: Footprints,
-    order: Int32Array,
-    *,
-    source: Array,
-    start_mm: Array,
-    end_mm: Array,
-) -> Int64Array:
-    """Find the first wall that each given ray meets, -1 where there is none: for checking against traces.
-
-    Args:
-        footprints: the buildings.
-        order: (n,) in which the official program visits the buildings.
-        source: (r,) wall that each ray leaves from, an index into `walls_of(footprints)`.
-        start_mm: (r, 2) start of each ray.
-        end_mm: (r, 2) end of each ray.
-    """
-    walls = wall_table(footprints, order, FireParameters())
-    rays = (source.astype(np.int64), start_mm.astype(np.int64), end_mm.astype(np.int64))
-    hits: Int64Array = first_hits(walls, wall_grid(walls), *rays)
-    return hits
 
 
 def wall_table(footprints: Footprints, order: Int32Array, fire: FireParameters) -> WallTable:
@@ -93,7 +70,7 @@ def wall_grid(walls: WallTable) -> WallGrid:
     width, height = int(high_x.max()) + MARGIN_MM - x_mm, int(high_y.max()) + MARGIN_MM - y_mm
     side = max(CELL_SIDE_MIN_MM, math.isqrt(width * height // len(walls.x)))
 
-    wall, column = _ranges((low_x - MARGIN_MM - x_mm) // side, (high_x + MARGIN_MM - x_mm) // side)
+    wall, column = numbered((low_x - MARGIN_MM - x_mm) // side, (high_x + MARGIN_MM - x_mm) // side)
     left = np.maximum(low_x[wall], x_mm + column * side - MARGIN_MM)
     right = np.minimum(high_x[wall], x_mm + (column + 1) * side + MARGIN_MM)
     run = np.where(walls.dx[wall] == 0, 1, walls.dx[wall])
@@ -103,18 +80,10 @@ def wall_grid(walls: WallTable) -> WallGrid:
     upright = walls.dx[wall] == 0
     low = np.where(upright, low_y[wall], np.minimum(y_left, y_right))
     high = np.where(upright, high_y[wall], np.maximum(y_left, y_right) + 1)
-    piece, row = _ranges((low - MARGIN_MM - y_mm) // side, (high + MARGIN_MM - y_mm) // side)
+    piece, row = numbered((low - MARGIN_MM - y_mm) // side, (high + MARGIN_MM - y_mm) // side)
 
     nx, ny = width // side + 1, height // side + 1
     cell = column[piece] * ny + row
     ptr = np.zeros(nx * ny + 1, dtype=np.int64)
     np.cumsum(np.bincount(cell, minlength=nx * ny), out=ptr[1:])
     return WallGrid(x_mm, y_mm, side, nx, ny, ptr, wall[piece][np.argsort(cell, kind="stable")])
-
-
-def _ranges(first: Int64Array, last: Int64Array) -> tuple[Int64Array, Int64Array]:
-    """List the pairs (k, number) for every number from first[k] to last[k], both included."""
-    length = last - first + 1
-    k = np.repeat(np.arange(len(length)), length)
-    number = np.arange(len(k)) - np.repeat(np.cumsum(length) - length, length) + first[k]
-    return k, number

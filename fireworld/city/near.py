@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from fireworld.city.city import Array, Footprints, Int64Array, Links
-from fireworld.city.walls import Walls, bounding_boxes, walls_of
+from fireworld.city.outlines import Walls, bounding_boxes, numbered, walls_of
 
 SITE_GAP_MM: Final = 30_000
 """Outlines closer than this, strictly, make one fire site."""
@@ -46,10 +46,7 @@ def _boxes_closer(footprints: Footprints, gap_mm: int) -> tuple[Int64Array, Int6
     axis = int(np.argmax(high.max(axis=0) - low.min(axis=0)))
     sweep = np.argsort(low[:, axis], kind="stable")
     begins, ends = low[sweep, axis], high[sweep, axis]
-    position = np.arange(len(sweep))
-    n_after = np.searchsorted(begins, ends + gap_mm, side="left") - position - 1
-    here = np.repeat(position, n_after)
-    there = here + 1 + np.arange(len(here)) - np.repeat(np.cumsum(n_after) - n_after, n_after)
+    here, there = numbered(np.arange(1, len(sweep) + 1), np.searchsorted(begins, ends + gap_mm, side="left") - 1)
     one, other = sweep[here], sweep[there]
     apart = np.maximum(np.maximum(low[one] - high[other], low[other] - high[one]), 0)
     close = (apart < gap_mm).all(axis=1)  # first each axis alone, so that the squares below stay small
@@ -59,7 +56,7 @@ def _boxes_closer(footprints: Footprints, gap_mm: int) -> tuple[Int64Array, Int6
 
 
 def _outlines_closer(walls: Walls, footprints: Footprints, first: Int64Array, second: Int64Array, gap_mm: int) -> Array:
-    """Tell which pairs of buildings have walls closer than a gap, (p,) bool."""
+    """Return which pairs of buildings have walls closer than a gap, (p,) bool."""
     starts = footprints.outline_ptr.astype(np.int64)
     n_walls = np.diff(starts)
     n_pairs = n_walls[first] * n_walls[second]
@@ -70,8 +67,8 @@ def _outlines_closer(walls: Walls, footprints: Footprints, first: Int64Array, se
         done = int(total[begin] - n_pairs[begin])
         end = max(begin + 1, int(np.searchsorted(total, done + PAIRS_AT_ONCE, side="right")))
         part = slice(begin, end)
-        pair = np.repeat(np.arange(begin, end), n_pairs[part])
-        within = np.arange(len(pair)) - np.repeat(np.cumsum(n_pairs[part]) - n_pairs[part], n_pairs[part])
+        pair, within = numbered(np.zeros(end - begin, dtype=np.int64), n_pairs[part] - 1)
+        pair += begin
         one = starts[first[pair]] + within // n_walls[second[pair]]
         other = starts[second[pair]] + within % n_walls[second[pair]]
         close[pair[_walls_closer(walls, one, other, gap_mm)]] = True
@@ -80,7 +77,7 @@ def _outlines_closer(walls: Walls, footprints: Footprints, first: Int64Array, se
 
 
 def _walls_closer(walls: Walls, one: Int64Array, other: Int64Array, gap_mm: int) -> Array:
-    """Tell which pairs of walls are closer than a gap: an end of one near the other, or the two cross."""
+    """Return which pairs of walls are closer than a gap: an end of one near the other, or the two cross."""
     a, b = walls.start_mm[one], walls.end_mm[one]
     c, d = walls.start_mm[other], walls.end_mm[other]
     touching = (
@@ -96,7 +93,7 @@ def _walls_closer(walls: Walls, one: Int64Array, other: Int64Array, gap_mm: int)
 
 
 def _point_closer(point: Int64Array, start: Int64Array, end: Int64Array, gap_mm: int) -> Array:
-    """Tell which points are closer to their segments than a gap, without a square root or a division."""
+    """Return which points are closer to their segments than a gap, without a square root or a division."""
     along, to_point = end - start, point - start
     place = (along * to_point).sum(axis=1)
     length_square = (along * along).sum(axis=1)

@@ -2,48 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from fireworld.city.city import Float32Array, Float64Array, Footprints
-from fireworld.city.walls import walls_of
+from fireworld.city.city import Array, Float32Array, Float64Array, Footprints
+from fireworld.city.outlines import walls_of
 from fireworld.parameters import FireParameters
+from fireworld.records import MATERIALS
 
 FLOOR_HEIGHT_M: Final = 3
 
 
-@dataclass(frozen=True)
-class Physics:
-    """The constants of each building, (n,) each; single precision as in the official program."""
+def physics_of(footprints: Footprints, fire: FireParameters) -> dict[str, Array]:
+    """Work out the constants of each building, (n,) by their names in `City`; MODEL section 1.
 
-    volume_m3: Float32Array
-    heat_capacity: Float32Array
-    initial_fuel: Float32Array
-    ignition_point: Float32Array
-    wall_area_m2: Float64Array
-
-
-def physics_of(footprints: Footprints, fire: FireParameters) -> Physics:
-    """Work out the constants of each building; MODEL section 1.
-
-    volume = ground area * floors * 3 m; fuel and heat capacity are proportional to it by material.
+    volume = ground area * floors * 3 m; fuel and heat capacity are proportional to it by material. All but the walls
+    are single precision, as in the official program.
     """
     floors = footprints.floors.astype(np.float32)
     volume = footprints.ground_area_m2 * floors * np.float32(FLOOR_HEIGHT_M)
-    density = _by_material(footprints, fire.fuel_density_wood, fire.fuel_density_steel, fire.fuel_density_concrete)
-    capacity = _by_material(footprints, fire.heat_capacity_wood, fire.heat_capacity_steel, fire.heat_capacity_concrete)
-    ignition = _by_material(
-        footprints, fire.ignition_point_wood, fire.ignition_point_steel, fire.ignition_point_concrete
-    )
-    return Physics(
-        volume_m3=volume,
-        heat_capacity=volume * capacity,
-        initial_fuel=volume * density,
-        ignition_point=ignition,
-        wall_area_m2=wall_area_m2(footprints),
-    )
+    return {
+        "volume_m3": volume,
+        "heat_capacity": volume * _by_material(footprints, fire, "heat_capacity"),
+        "initial_fuel": volume * _by_material(footprints, fire, "fuel_density"),
+        "ignition_point": _by_material(footprints, fire, "ignition_point"),
+        "wall_area_m2": wall_area_m2(footprints),
+    }
 
 
 def wall_area_m2(footprints: Footprints) -> Float64Array:
@@ -59,6 +44,7 @@ def wall_area_m2(footprints: Footprints) -> Float64Array:
     return total.astype(np.float64) / 1e6
 
 
-def _by_material(footprints: Footprints, wood: float, steel: float, concrete: float) -> Float32Array:
-    """Look up one figure per building by its material."""
-    return np.array([wood, steel, concrete], dtype=np.float32)[footprints.material]
+def _by_material(footprints: Footprints, fire: FireParameters, name: str) -> Float32Array:
+    """Look up a parameter of each building by its material."""
+    values = [getattr(fire, f"{name}_{material}") for material in MATERIALS]
+    return np.array(values, dtype=np.float32)[footprints.material]

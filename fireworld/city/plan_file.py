@@ -1,4 +1,4 @@
-"""City files: JSON to Plan and back, every mistake named by file, building and key.
+"""City files: JSON to Plan, every mistake named by file, building and key.
 
 The layout is the one of the official traces: `buildings`, each with id, apexes and more; optional `streets` and
 `hydrants`. What a trace's city says of a run (ignitions, water, brigades) is left to who replays it.
@@ -7,32 +7,21 @@ The layout is the one of the official traces: `buildings`, each with id, apexes 
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any, Final, Never
 
 import numpy as np
 
-from fireworld.city.city import Footprints, Int64Array, Plan, StreetMap
+from fireworld.city.city import Footprints, Int64Array, Plan, StreetMap, freeze
 from fireworld.city.fields import Fields
 from fireworld.city.footpaths import footpaths
-from fireworld.city.freeze import freeze
 from fireworld.city.outlines import Building, Corner, assemble, centroid_mm, doubled_area_mm2
 from fireworld.errors import CityError, expected
 
 READ_KEYS: Final = ("name", "buildings", "streets", "hydrants")
 IGNORED_KEYS: Final = (
-    "brigade_moves",
-    "brigades",
-    "civilians",
-    "comment",
-    "extinguish",
-    "ignitions",
-    "later_ignitions",
-    "seed",
-    "steps",
-    "units",
-    "water",
-)
+    "brigade_moves", "brigades", "civilians", "comment", "extinguish", "ignitions", "later_ignitions", "seed", "steps",
+    "units", "water",
+)  # fmt: skip
 BUILDING_KEYS: Final = ("id", "type", "apexes", "floors", "code", "ground_area", "x", "y", "inflammable")
 BUILDING_TYPES: Final = ("building", "refuge", "firestation", "ambulancecentre", "policeoffice", "gasstation")
 """Official types, in any spelling of case, spaces and underscores; fireworld knows refuges from the rest."""
@@ -41,19 +30,6 @@ COORDINATE_MAX_MM: Final = 1_000_000_000
 ID_MAX: Final = 2**31 - 1
 FLOORS_MAX: Final = 500
 GROUND_AREA_MAX_M2: Final = 10_000_000
-
-
-def load_plan(path: Path) -> Plan:
-    """Read a city file.
-
-    Raises:
-        CityError: it cannot be read or makes no city.
-    """
-    try:
-        text = path.read_bytes()
-    except OSError as error:
-        raise CityError(expected(str(path), "", "a city file that can be read", error.strerror or str(error))) from None
-    return parse_plan(text, where=str(path), name=path.stem)
 
 
 def parse_plan(text: bytes, *, where: str, name: str = "city") -> Plan:
@@ -84,38 +60,6 @@ def parse_plan(text: bytes, *, where: str, name: str = "city") -> Plan:
     footprints = assemble(buildings)
     streets = _streets(document, footprints)
     return freeze(Plan(name=document.text("name", default=name), footprints=footprints, streets=streets))
-
-
-def dump_plan(plan: Plan) -> dict[str, Any]:
-    """Turn a plan into a city document: `parse_plan` of its JSON gives the same plan.
-
-    Hydrants get identifiers after the buildings' highest.
-    """
-    footprints, streets = plan.footprints, plan.streets
-    corners, ptr = footprints.outline_mm.ravel().tolist(), (2 * footprints.outline_ptr).tolist()
-    next_id = int(footprints.building_id.max()) + 1
-    return {
-        "name": plan.name,
-        "buildings": [
-            {
-                "id": int(footprints.building_id[b]),
-                "type": "refuge" if footprints.refuge[b] else "building",
-                "apexes": corners[ptr[b] : ptr[b + 1]],
-                "floors": int(footprints.floors[b]),
-                "code": int(footprints.material[b]),
-                "ground_area": int(footprints.ground_area_m2[b]),
-                "x": int(footprints.centroid_mm[b, 0]),
-                "y": int(footprints.centroid_mm[b, 1]),
-                "inflammable": bool(footprints.inflammable[b]),
-            }
-            for b in range(len(footprints.building_id))
-        ],
-        "streets": {"nodes": streets.node_mm.tolist(), "edges": streets.street.tolist()},
-        "hydrants": [
-            {"id": next_id + k, "x": int(streets.node_mm[node, 0]), "y": int(streets.node_mm[node, 1])}
-            for k, node in enumerate(streets.hydrant_node.tolist())
-        ],
-    }
 
 
 def _parse_json(text: bytes, where: str) -> Any:

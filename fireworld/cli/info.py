@@ -53,8 +53,8 @@ def command(context: click.Context, *, log: Path | None, as_json: bool, schema: 
 def _show_schema(log: Log | None, *, as_json: bool) -> None:
     """Print the messages of a log, or those that this version writes."""
     from fireworld_recorder.describe import describe
-    from fireworld_recorder.plain import plain
     from fireworld_recorder.recover import channels_of
+    from fireworld_recorder.totals import plain
     from fireworld_recorder.writer import own_channels
 
     from fireworld.errors import LogError, one_line

@@ -7,23 +7,22 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Final, Never, TypeVar
 
-from msgspec import Meta
-
 from fireworld.errors import TraceError, expected
 from fireworld.parameters import BrigadeParameters, FireParameters
 from fireworld.scenario.document import ANY_AMOUNT, BOUNDS
+from fireworld.scenario.explain import within
 
 PREFIX: Final = "resq-fire."
 FIRE_KEYS: Final = {
-    "wooden_energy": "fuel_density_wood",
-    "steel_energy": "fuel_density_steel",
-    "concrete_energy": "fuel_density_concrete",
-    "wooden_capacity": "heat_capacity_wood",
-    "steel_capacity": "heat_capacity_steel",
-    "concrete_capacity": "heat_capacity_concrete",
-    "wooden_ignition": "ignition_point_wood",
-    "steel_ignition": "ignition_point_steel",
-    "concrete_ignition": "ignition_point_concrete",
+    **{
+        f"{theirs}_{their_name}": f"{name}_{material}"
+        for their_name, name in (
+            ("energy", "fuel_density"),
+            ("capacity", "heat_capacity"),
+            ("ignition", "ignition_point"),
+        )
+        for theirs, material in (("wooden", "wood"), ("steel", "steel"), ("concrete", "concrete"))
+    },
     "cell_size": "air_cell_mm",
     "air_to_air_flow": "air_to_air_flow",
     "air_to_building_flow": "air_to_building_flow",
@@ -60,7 +59,7 @@ class Configuration:
     values: Mapping[str, Any]
 
     def has(self, keys: Mapping[str, str]) -> bool:
-        """Tell whether all of some keys are set."""
+        """Return whether all of some keys are set."""
         return all(self.values.get(PREFIX + key) is not None for key in keys)
 
     def parameters(self, section: type[Section], keys: Mapping[str, str]) -> Section:
@@ -95,21 +94,15 @@ class Configuration:
         """Read one parameter within the bounds that it has in a scenario."""
         value = self.number(key) / MILLIMETRES.get(name, 1.0)
         bounds = BOUNDS.get(name, ANY_AMOUNT)
-        if not _within(value, bounds) or (kind == "int" and value != int(value)):
+        if not within(value, bounds) or (kind == "int" and value != int(value)):
             what = "a whole number" if kind == "int" else "a number"
             least = f"at least {bounds.ge:g}" if bounds.ge is not None else f"above {bounds.gt:g}"
             self._refuse(key, f"{what} {least} and at most {bounds.le:g}", self.values[PREFIX + key])
         return int(value) if kind == "int" else value
 
     def _refuse(self, key: str, wanted: str, got: object) -> Never:
-        """Complain about one key."""
+        """Raise for one key."""
         raise TraceError(expected(self.where, f"params: {PREFIX}{key}", wanted, got))
-
-
-def _within(value: float, bounds: Meta) -> bool:
-    """Tell whether a value is within its bounds; NaN is not."""
-    above = value >= bounds.ge if bounds.ge is not None else bounds.gt is not None and value > bounds.gt
-    return bool(above and bounds.le is not None and value <= bounds.le)
 
 
 def read_configuration(where: str, text: str) -> Configuration:

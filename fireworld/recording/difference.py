@@ -68,7 +68,7 @@ class Difference:
     @property
     def header(self) -> Mapping[str, tuple[str | int, str | int]]:
         """What the runs were asked to do differently; no difference by itself."""
-        from fireworld_recorder.comparable import header_differences
+        from fireworld_recorder.header import header_differences
 
         return header_differences(self.runs[0].header, self.runs[1].header)
 
@@ -99,7 +99,7 @@ class Difference:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the comparison as plain values, as `fireworld diff --json` writes it."""
-        from fireworld_recorder.plain import plain
+        from fireworld_recorder.totals import plain
 
         recordings = [{"path": run_name(run), "state": run.state, "damage": run.damage} for run in self.runs]
         digests = [run.digest for run in self.runs]
@@ -195,7 +195,7 @@ def diff(
     if tolerances or ignore:
         _ = difference.rules  # raises for a name that does not exist
     if not (any_scenario or same_digest):
-        from fireworld_recorder.comparable import check_same_scenario
+        from fireworld_recorder.header import check_same_scenario
 
         check_same_scenario(runs[0].header, runs[1].header, names=difference.names)
     if not difference.known_same and difference.first is not None and difference.first.step is None:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from fireworld_recorder.header import to_metadata
-from fireworld_recorder.plain import plain
 from fireworld_recorder.reader import Log
-from fireworld_recorder.totals import totals_of
+from fireworld_recorder.totals import plain, totals_of
 
 from fireworld.records import FORMAT
 

@@ -34,7 +34,7 @@ class Verification:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as plain values, as `fireworld verify --json` writes it."""
-        from fireworld_recorder.plain import plain
+        from fireworld_recorder.totals import plain
 
         known = {"same": self.same, "digests": [self.digest]}
         return known | ({"n_steps_compared": self.n_steps} if self.difference is None else plain(self.difference))

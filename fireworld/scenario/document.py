@@ -34,15 +34,11 @@ POSITIVE: Final = Meta(gt=0, le=1e9)
 SHARE: Final = Meta(ge=0, le=1)
 ANY_AMOUNT: Final = Meta(ge=0, le=10**9)
 BOUNDS: Final = {
-    "fuel_density_wood": POSITIVE,
-    "fuel_density_steel": POSITIVE,
-    "fuel_density_concrete": POSITIVE,
-    "heat_capacity_wood": POSITIVE,
-    "heat_capacity_steel": POSITIVE,
-    "heat_capacity_concrete": POSITIVE,
-    "ignition_point_wood": POSITIVE,
-    "ignition_point_steel": POSITIVE,
-    "ignition_point_concrete": POSITIVE,
+    **{
+        f"{name}_{material}": POSITIVE
+        for name in ("fuel_density", "heat_capacity", "ignition_point")
+        for material in ("wood", "steel", "concrete")
+    },
     "air_cell_mm": Meta(ge=1000, le=100_000),
     "air_heat_capacity": POSITIVE,
     "air_heat_kept": SHARE,
@@ -199,7 +195,7 @@ class BrigadeTeam(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
 
 class Document(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """All that a scenario file says."""
+    """All that a scenario file holds."""
 
     name: Annotated[str, Meta(description="Name of the scenario; by default the file's.")] = ""
     description: Annotated[str, Meta(description="What is to see here, in one line.")] = ""
@@ -266,22 +262,12 @@ def broken_rules(document: Document) -> Iterator[tuple[str, str, object]]:
     """Yield (key, what is expected, what was found) for every rule between keys that does not hold."""
     yield from _broken_city_rules(document.city)
     for index, fire in enumerate(document.fires):
-        if (fire.at is None) == (fire.buildings is None):
-            yield (
-                f"fires.{index}",
-                "exactly one of `at` and `buildings`",
-                "none of them" if fire.at is None else "both of them",
-            )
+        yield from _not_one(f"fires.{index}", at=fire.at, buildings=fire.buildings)
         if fire.at is None and fire.n_buildings is not None:
             yield f"fires.{index}.n_buildings", "null without `at`", fire.n_buildings
         yield from _repeated(f"fires.{index}.buildings", fire.buildings or ())
     civilians = document.civilians
-    if (civilians.n is None) == (civilians.buildings is None):
-        yield (
-            "civilians",
-            "exactly one of `n` and `buildings`",
-            "none of them" if civilians.n is None else "both of them",
-        )
+    yield from _not_one("civilians", n=civilians.n, buildings=civilians.buildings)
     if civilians.to_m is not None and civilians.to_m < civilians.from_m:
         yield "civilians.to_m", f"at least from_m ({civilians.from_m})", civilians.to_m
     yield from _repeated("civilians.buildings", civilians.buildings or ())
@@ -297,8 +283,7 @@ def broken_rules(document: Document) -> Iterator[tuple[str, str, object]]:
 
 def _broken_city_rules(city: CitySource) -> Iterator[tuple[str, str, object]]:
     """Yield the rules between the keys of a city that do not hold."""
-    if (city.generated is None) == (city.file is None):
-        yield "city", "exactly one of `generated` and `file`", "none of them" if city.file is None else "both of them"
+    yield from _not_one("city", generated=city.generated, file=city.file)
     if city.file is None and city.sha256 is not None:
         yield "city.sha256", "null without `file`", city.sha256
     if city.generated is None:
@@ -313,8 +298,16 @@ def _broken_city_rules(city: CitySource) -> Iterator[tuple[str, str, object]]:
         yield "city.generated.fill", "the least share before the greatest", f"the list {list(fill)}"
 
 
+def _not_one(key: str, **options: object) -> Iterator[tuple[str, str, object]]:
+    """Check that exactly one of two keys has a value."""
+    n_given = sum(value is not None for value in options.values())
+    if n_given != 1:
+        one, other = options
+        yield key, f"exactly one of `{one}` and `{other}`", "both of them" if n_given else "none of them"
+
+
 def _repeated(key: str, values: tuple[object, ...]) -> Iterator[tuple[str, str, object]]:
-    """Find what a list says twice."""
+    """Find what a list holds twice."""
     seen: set[object] = set()
     for value in values:
         if value in seen:

@@ -1,4 +1,4 @@
-"""Say what a document was expected to hold, in words: for errors and for the docs.
+"""What a document was expected to hold, in words: for errors and for the docs.
 
 msgspec judges whether a document fits its types; this walks the same types once more to name the first key at
 fault, what was expected there and what was found.
@@ -6,12 +6,13 @@ fault, what was expected there and what was found.
 
 from __future__ import annotations
 
-import difflib
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from msgspec import inspect
+from msgspec import Meta, inspect
+
+from fireworld.errors import nearest
 
 
 class Fault(NamedTuple):
@@ -44,10 +45,11 @@ def find_faults(value: object, kind: inspect.Type, key: str = "") -> Iterator[Fa
     elif isinstance(kind, inspect.StructType):
         yield from _struct_faults(value, kind, key)
     elif isinstance(kind, inspect.VarTupleType | inspect.TupleType):
-        if not isinstance(value, list) or not _fits_length(len(value), kind):
+        n = len(value) if isinstance(value, list) else -1
+        kinds = kind.item_types if isinstance(kind, inspect.TupleType) else [kind.item_type] * n
+        if not isinstance(value, list) or n != len(kinds) or n < (getattr(kind, "min_length", None) or 0):
             yield Fault(key, words(kind), _shown(value))
             return
-        kinds = [kind.item_type] * len(value) if isinstance(kind, inspect.VarTupleType) else kind.item_types
         for index, (item, item_kind) in enumerate(zip(value, kinds, strict=True)):
             yield from find_faults(item, item_kind, _join(key, str(index)))
     elif not _fits(value, kind):
@@ -89,12 +91,6 @@ def bare(kind: inspect.Type) -> inspect.Type:
     return kind
 
 
-def nearest(word: str, names: Iterable[str]) -> str:
-    """Return a hint at the name that is most like a word, or "" if none is."""
-    close = difflib.get_close_matches(word, list(names), n=1)
-    return f"try {close[0]}" if close else ""
-
-
 def _struct_faults(value: object, kind: inspect.StructType, key: str) -> Iterator[Fault]:
     """Yield unknown keys, then missing ones, then what is wrong with the values."""
     if not isinstance(value, Mapping):
@@ -114,34 +110,27 @@ def _struct_faults(value: object, kind: inspect.StructType, key: str) -> Iterato
 
 
 def _fits(value: object, kind: inspect.Type) -> bool:
-    """Tell whether msgspec would take a scalar."""
+    """Return whether msgspec would take a scalar."""
     match kind:
         case inspect.LiteralType():
             return isinstance(value, str) and value in kind.values
         case inspect.IntType():
-            return isinstance(value, int) and not isinstance(value, bool) and _within(value, kind)
+            return isinstance(value, int) and not isinstance(value, bool) and within(value, kind)
         case inspect.FloatType():
-            return isinstance(value, int | float) and not isinstance(value, bool) and _within(value, kind)
+            return isinstance(value, int | float) and not isinstance(value, bool) and within(value, kind)
         case inspect.StrType():
             return isinstance(value, str) and (kind.pattern is None or re.search(kind.pattern, value) is not None)
         case _:
             raise AssertionError(f"no scalar: {kind}")
 
 
-def _within(number: float, kind: inspect.IntType | inspect.FloatType) -> bool:
-    """Tell whether a number keeps its bounds."""
+def within(number: float, kind: inspect.IntType | inspect.FloatType | Meta) -> bool:
+    """Return whether a number keeps its bounds; NaN does not."""
     return (
         (kind.ge is None or number >= kind.ge)
         and (kind.gt is None or number > kind.gt)
         and (kind.le is None or number <= kind.le)
     )
-
-
-def _fits_length(length: int, kind: inspect.VarTupleType | inspect.TupleType) -> bool:
-    """Tell whether a list is as long as it should be."""
-    if isinstance(kind, inspect.TupleType):
-        return length == len(kind.item_types)
-    return length >= (kind.min_length or 0)
 
 
 def _bounds(kind: inspect.IntType | inspect.FloatType) -> str:

@@ -137,7 +137,7 @@ class Scenario(Document, frozen=True, kw_only=True):
         return f"<Scenario {self.name or 'without a name'}: {self.city.summary}, {people}, {self.steps} steps>"
 
     def _document(self) -> dict[str, Any]:
-        """Return what the scenario's file says, as plain values."""
+        """Return the content of the scenario's file, as plain values."""
         content: dict[str, Any] = json.loads(msgspec.json.encode(self))
         del content["source"], content["city_sha256"]
         return content
@@ -157,7 +157,8 @@ def parse_scenario(text: bytes | str, *, source: str, folder: Path | None = None
     """
     document = read_yaml(text, source=source)
     if not isinstance(document, dict):
-        raise ScenarioError(expected(source, "", "a scenario (keys and values)", _kind_of(document)))
+        got = "nothing at all" if document is None else f"a {type(document).__name__} value"
+        raise ScenarioError(expected(source, "", "a scenario (keys and values)", got))
     return scenario_of(document, source=source, folder=folder)
 
 
@@ -206,7 +207,7 @@ def scenario_of(values: Mapping[str, Any], *, source: str, folder: Path | None) 
 
 
 def read_scenario(path: Path, *, source: str | None = None) -> Scenario:
-    """Read a scenario file; its name is the file's unless it says another.
+    """Read a scenario file; its name is the file's unless it has another.
 
     Args:
         path: the file.
@@ -245,7 +246,7 @@ def split_settings(settings: Iterable[str], *, example: str = "brigades.n=7") ->
 
     Args:
         settings: what was given.
-        example: what the complaint suggests.
+        example: what the error suggests.
 
     Raises:
         ScenarioError: no "=", or a key said twice.
@@ -287,17 +288,12 @@ def _entry(at: Any, name: str, *, key: str, source: str) -> str | int:
 
 
 def _without_nulls(value: Any) -> Any:
-    """Drop the keys that say nothing."""
+    """Drop the keys without a value."""
     if isinstance(value, dict):
         return {key: _without_nulls(content) for key, content in value.items() if content is not None}
     return [_without_nulls(item) for item in value] if isinstance(value, list) else value
 
 
 def _reason(error: OSError | ValueError) -> str:
-    """Say why a file cannot be read; a path with a null byte is a ValueError."""
+    """Return why a file cannot be read; a path with a null byte is a ValueError."""
     return (error.strerror if isinstance(error, OSError) else None) or str(error)
-
-
-def _kind_of(document: object) -> str:
-    """Name what a file holds that is no scenario."""
-    return "nothing at all" if document is None else f"a {type(document).__name__} value"

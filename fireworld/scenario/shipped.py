@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from fireworld.errors import ScenarioError, expected
-from fireworld.scenario.explain import nearest
+from fireworld.errors import ScenarioError, expected, nearest
 from fireworld.scenario.scenario import Scenario, read_scenario
 
 
@@ -29,7 +28,7 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     path = Path(name_or_path)
     if path.suffix in {".yaml", ".yml"} or path.parent != Path() or path.is_file():
         return read_scenario(path)
-    hint = nearest(str(name_or_path), names) or "try `fireworld scenarios`"
+    hint = nearest(str(name_or_path), names, otherwise="try `fireworld scenarios`")
     raise ScenarioError(expected("scenario", "", "the name of a scenario or a .yaml file", str(name_or_path), hint))
 
 

@@ -69,13 +69,8 @@ _LAYOUTS: Final[dict[type[Any], _Layout]] = {}
 
 def _layout(record_type: type[Any]) -> _Layout:
     """Return the layout of a record type; worked out once."""
-    layout = _LAYOUTS.get(record_type)
-    if layout is None:
-        layout = _LAYOUTS[record_type] = _make_layout(record_type)
-    return layout
-
-
-def _make_layout(record_type: type[Any]) -> _Layout:
+    if record_type in _LAYOUTS:
+        return _LAYOUTS[record_type]
     zeros = {"string": "", "bytes": b"", "bool": False, "double": 0.0, "float": 0.0}
     layout = _Layout({}, [])
     for item in sorted(message_of(record_type).fields, key=lambda field: field.number):
@@ -86,7 +81,7 @@ def _make_layout(record_type: type[Any]) -> _Layout:
         absent = packing.pack(0) if packing else b""
         layout.slots[item.number] = _Slot(item.name, item.wire, wire_type, dtype, zeros.get(item.wire, 0))
         layout.plan.append((item.name, tag, item.wire, dtype, item.wire == "uint8", packing, absent))
-    return layout
+    return _LAYOUTS.setdefault(record_type, layout)
 
 
 def encode(record: Any) -> bytes:
@@ -179,6 +174,11 @@ def walk(data: Buffer) -> Iterator[tuple[int, int, Any]]:
             raise LogError(f"field {number} is longer than its message")
         yield number, wire_type, data[position : position + length]
         position += length
+
+
+def parts(data: Buffer, number: int) -> Iterator[Any]:
+    """Yield the values of one field, as `walk` yields them."""
+    return (value for found, _, value in walk(data) if found == number)
 
 
 def long_fields(data: Buffer, n_bytes: int) -> list[tuple[int, int]]:

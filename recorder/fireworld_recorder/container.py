@@ -143,12 +143,6 @@ def _raise_overrun(file: IO[bytes], size: int, offset: int) -> None:
     raise TruncatedError("the file ends inside a record")
 
 
-def data_checksum_fits(body: bytes, checksum: int) -> bool:
-    """Compare the checksum of the data section with the one its last record holds (0 is none)."""
-    (stored,) = Fields(body).numbers("<I")
-    return stored in {0, checksum}
-
-
 def check_tail(tail: bytes, offset: int) -> None:
     """Check all that follows the data section: index, footer, closing magic.
 
@@ -222,17 +216,11 @@ def split(block: bytes, position: int = 0) -> Iterator[tuple[int, int, memoryvie
         position = start + length
 
 
-def channel_id_of(message: memoryview) -> int:
-    """Return the channel of a message record."""
-    if len(message) < _MESSAGE.size:
+def read_message(body: memoryview) -> tuple[int, memoryview]:
+    """Return the channel and the payload of a message record."""
+    if len(body) < _MESSAGE.size:
         raise LogError("a message is shorter than its head")
-    channel_id: int = _MESSAGE.unpack_from(message)[0]
-    return channel_id
-
-
-def payload_of(message: memoryview) -> memoryview:
-    """Return the payload of a message record."""
-    return message[_MESSAGE.size :]
+    return _MESSAGE.unpack_from(body)[0], body[_MESSAGE.size :]
 
 
 def read_channel(body: memoryview) -> ChannelRecord:

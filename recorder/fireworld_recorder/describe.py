@@ -9,7 +9,7 @@ from typing import Any, Final
 from fireworld.errors import LogError
 from fireworld.records import PHASES
 from fireworld_recorder.chain import SCENE_PREFIX
-from fireworld_recorder.codec import walk
+from fireworld_recorder.codec import parts, walk
 from fireworld_recorder.schema import TOPICS, Field, Message, NamedArray, message_of
 from fireworld_recorder.writer import Channel
 
@@ -83,7 +83,7 @@ def describe(channels: Iterable[Channel]) -> list[TopicWords]:
 def _fields(channel: Channel, known: Message | None) -> Iterator[FieldWords]:
     """Read a FileDescriptorSet: file = 1, in it message_type = 4."""
     ours = {item.number: item for item in known.fields} if known else {}
-    messages = [message for file in _parts(channel.schema, 1) for message in _parts(file, 4)]
+    messages = [message for file in parts(channel.schema, 1) for message in parts(file, 4)]
     name = channel.schema_name.rpartition(".")[2]
     own = [message for message in messages if _name(message) == name]  # a set may hold what the message is made of, too
     for message in own or messages:
@@ -92,9 +92,9 @@ def _fields(channel: Channel, known: Message | None) -> Iterator[FieldWords]:
 
 def _message_fields(message: Any, ours: Mapping[int, Field], prefix: str = "") -> Iterator[FieldWords]:
     """Read a DescriptorProto: field = 2, nested_type = 3; fields of nested messages follow their own."""
-    for part in _parts(message, 2):
+    for part in parts(message, 2):
         yield _field(part, ours, prefix)
-    for nested in _parts(message, 3):
+    for nested in parts(message, 3):
         yield from _message_fields(nested, _OF_ARRAYS, f"{_name(nested)}.")
 
 
@@ -112,10 +112,5 @@ def _field(part: Any, ours: Mapping[int, Field], prefix: str) -> FieldWords:
     return FieldWords(number, prefix + name, known.proto_type, known.shape, known.unit, known.doc)
 
 
-def _parts(data: Any, number: int) -> Iterator[Any]:
-    """Yield the values of one field."""
-    return (value for found, _, value in walk(data) if found == number)
-
-
 def _name(message: Any) -> str:
-    return "".join(str(value, "utf-8") for value in _parts(message, 1))
+    return "".join(str(value, "utf-8") for value in parts(message, 1))

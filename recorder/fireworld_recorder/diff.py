@@ -10,7 +10,7 @@ from functools import partial
 
 from fireworld.errors import LogError, expected
 from fireworld.records import CityRecord, Recording, Snapshot, StepRecord, Steps, StoredRun
-from fireworld_recorder.comparable import header_differences
+from fireworld_recorder.header import header_differences
 from fireworld_recorder.match import Rules
 from fireworld_recorder.schema import Commit
 from fireworld_recorder.spread import Spread, SpreadRow, SpreadTally

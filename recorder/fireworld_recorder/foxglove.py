@@ -8,34 +8,44 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fireworld.records import STEP_SECONDS
-from fireworld_recorder.codec import varint
-from fireworld_recorder.foxglove_schema import (
-    ENUMERATIONS,
-    MESSAGES,
-    Item,
-    descriptor_set,
-    length_delimited,
-    schema_name,
-)
+from fireworld_recorder.codec import parts, varint, walk
 from fireworld_recorder.writer import Channel
 
 FRAME: Final = "city"
 """The one frame of reference: metres east, north and up, as the city has them."""
 Rgb = tuple[int, int, int]
-_LAYOUTS: Final = {"double": ("<d", 1), "fixed32": ("<I", 5)}
-"""Layout and wire type of the numbers of fixed length."""
-_NUMERIC: Final = {"u1": "UINT8", "i4": "INT32", "u4": "UINT32", "f4": "FLOAT32", "f8": "FLOAT64"}
+DESCRIPTORS: Final = {
+    root: Path(__file__).with_name(f"foxglove_{root}.binpb").read_bytes()
+    for root in ("PointCloud", "SceneUpdate", "Log")
+}
+"""Foxglove's published schema of each message that a topic can have: a FileDescriptorSet with all that is in it."""
+_FIELDS: Final = {
+    str(next(parts(message, 1)), "utf-8"): {
+        str(field[1], "utf-8"): (field[3], field[5])
+        for field in ({number: value for number, _, value in walk(part)} for part in parts(message, 2))
+    }
+    for data in DESCRIPTORS.values()
+    for file in parts(data, 1)
+    for message in parts(file, 4)
+}
+"""Number and type, as descriptor.proto numbers it, of every field of every message."""
+_LAYOUTS: Final = {1: ("<d", 1), 7: ("<I", 5)}
+"""Layout and wire type of the numbers of fixed length, double and fixed32."""
+_NUMERIC_TYPES: Final = {"u1": 1, "i4": 6, "u4": 5, "f4": 7, "f8": 8}
+_LINE_LIST: Final = 2
+_LEVELS: Final = {"DEBUG": 1, "INFO": 2, "WARNING": 3, "ERROR": 4, "FATAL": 5}
 
 
 def channel(topic: str, root: str) -> Channel:
     """A topic of one of Foxglove's messages."""
-    return Channel(topic, schema_name(root), descriptor_set(root))
+    return Channel(topic, f"foxglove.{root}", DESCRIPTORS[root])
 
 
 def point_cloud(step: int, points: NDArray[Any]) -> bytes:
@@ -80,7 +90,7 @@ def lines(segments_m: NDArray[Any], rgb: Rgb, *, thickness_m: float) -> bytes:
     """Encode separate lines of one color, (n, 2, 3) ends; nothing if there are none."""
     if len(segments_m) == 0:
         return b""
-    kind = varint(_tag("LinePrimitive", "type", 0)) + varint(ENUMERATIONS["LinePrimitive.Type"]["LINE_LIST"])
+    kind = varint(_tag("LinePrimitive", "type", 0)) + varint(_LINE_LIST)
     content = kind + _part("LinePrimitive", "pose", _pose()) + _value("LinePrimitive", "thickness", thickness_m)
     content += _points("LinePrimitive", segments_m.reshape(-1, 3)) + _part("LinePrimitive", "color", _color(rgb))
     return _part("SceneEntity", "lines", content)
@@ -106,13 +116,13 @@ def label(xyz_m: Sequence[float], text: str, *, height_m: float, rgb: Rgb) -> by
 
 def log_line(step: int, *, level: str, text: str, name: str) -> bytes:
     """Encode a line of a log; `level` is one of Log.Level."""
-    number = varint(_tag("Log", "level", 0)) + varint(ENUMERATIONS["Log.Level"][level])
+    number = varint(_tag("Log", "level", 0)) + varint(_LEVELS[level])
     return _stamp(step) + number + _part("Log", "message", text) + _part("Log", "name", name)
 
 
 def _stamp(step: int) -> bytes:
     """Field 1 of every message that has a time: a Timestamp of whole seconds."""
-    return length_delimited(1, b"\x08" + varint(step * STEP_SECONDS) if step else b"")
+    return _length_delimited(1, b"\x08" + varint(step * STEP_SECONDS) if step else b"")
 
 
 def _pose(xyz_m: Sequence[float] = (0.0, 0.0, 0.0)) -> bytes:
@@ -133,32 +143,33 @@ def _columns(table: NDArray[Any], names: str) -> dict[str, Any]:
 
 
 def _packed_field(name: str, kind: str, offset: int) -> bytes:
-    number = ENUMERATIONS["PackedElementField.NumericType"][_NUMERIC[kind]]
-    type_ = varint(_tag("PackedElementField", "type", 0)) + varint(number)
+    type_ = varint(_tag("PackedElementField", "type", 0)) + varint(_NUMERIC_TYPES[kind])
     return _part("PackedElementField", "name", name) + _value("PackedElementField", "offset", offset) + type_
 
 
-def _item(message: str, field: str) -> Item:
-    return next(item for item in MESSAGES[message] if item.name == field)
-
-
 def _tag(message: str, field: str, wire_type: int) -> int:
-    return _item(message, field).number << 3 | wire_type
+    number: int = _FIELDS[message][field][0]
+    return number << 3 | wire_type
 
 
 def _part(message: str, field: str, data: bytes | str) -> bytes:
-    return length_delimited(_tag(message, field, 2) >> 3, data)
+    return _length_delimited(_FIELDS[message][field][0], data)
+
+
+def _length_delimited(number: int, data: bytes | str) -> bytes:
+    content = data.encode() if isinstance(data, str) else data
+    return b"%b%b%b" % (varint(number << 3 | 2), varint(len(content)), content)
 
 
 def _value(message: str, field: str, value: float) -> bytes:
     """Encode a double or a fixed32, whichever the field is."""
-    layout, wire_type = _LAYOUTS[_item(message, field).type]
+    layout, wire_type = _LAYOUTS[_FIELDS[message][field][1]]
     return varint(_tag(message, field, wire_type)) + struct.pack(layout, value)
 
 
 def _of_doubles(message: str, data: bytes) -> bytes:
     """Encode a message of doubles only, all of them."""
-    tags = [varint(_tag(message, item.name, 1)) for item in MESSAGES[message]]
+    tags = [varint(_tag(message, name, 1)) for name in _FIELDS[message]]
     return b"".join(tag + data[8 * place : 8 * place + 8] for place, tag in enumerate(tags))
 
 
@@ -168,7 +179,7 @@ Parts = Sequence[bytes | str]
 
 def _doubles(message: str) -> Parts:
     """Parts of a message of doubles only."""
-    return [part for item in MESSAGES[message] for part in (varint(_tag(message, item.name, 1)), item.name)]
+    return [part for name in _FIELDS[message] for part in (varint(_tag(message, name, 1)), name)]
 
 
 def _wrapped(message: str, field: str, parts: Parts) -> Parts:

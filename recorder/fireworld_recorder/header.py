@@ -1,4 +1,7 @@
-"""The run header as metadata that checks itself: text keys and values, and the hashes of the attachments."""
+"""The run header: as metadata that checks itself, and against the header of another run.
+
+As metadata it is text keys and values, and the hashes of the attachments.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,7 @@ from fireworld.records import FORMAT, RunHeader
 METADATA_NAME: Final = "fireworld.run"
 PROFILE: Final = "fireworld"
 _ATTACHMENT: Final = "attachment:"
+_DIGEST_SHOWN: Final = 12
 _FIELDS: Final = tuple(item for item in dataclasses.fields(RunHeader) if item.name != "attachments")
 
 
@@ -73,6 +77,24 @@ def from_metadata(metadata: Mapping[str, str], attachments: Mapping[str, bytes])
                 raise LogError(expected(name, "", "the attachment as it was recorded", "other bytes or none"))
             named[name] = attachments[name]
     return RunHeader(**values, attachments=named)  # type: ignore[arg-type]  # checked field by field above
+
+
+def header_differences(a: RunHeader, b: RunHeader) -> dict[str, tuple[str | int, str | int]]:
+    """Return what the runs were asked to do differently; attachments are covered by the digests."""
+    pairs = {item.name: (getattr(a, item.name), getattr(b, item.name)) for item in _FIELDS}
+    return {name: pair for name, pair in pairs.items() if pair[0] != pair[1]}
+
+
+def check_same_scenario(a: RunHeader, b: RunHeader, *, names: tuple[str, str]) -> None:
+    """Raise LogError if two runs, called by `names`, are of different scenarios."""
+    if a.scenario_digest != b.scenario_digest:
+        first, second = (
+            f"{header.scenario} ({header.scenario_digest[:_DIGEST_SHOWN]}) in {name}"
+            for header, name in zip((a, b), names, strict=True)
+        )
+        raise LogError(
+            f"cannot compare runs of different scenarios, {first} and {second}; try --any-scenario if that is meant"
+        )
 
 
 def _integer(key: str, text: str) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -50,36 +50,21 @@ class Log(RecordingBase):
         self.found = found
         self.header: RunHeader = found.header
         self.city: CityRecord = decode(CityRecord, found.city)
+        self.digest = found.hash.hex()
+        """The hash of the last committed step: the identity of the run up to there, 64 hexadecimal digits."""
+        self.state: State = found.state
+        """Whether the log is complete, partial (cut off, or under way) or damaged."""
+        self.damage = found.damage
+        """What is wrong and how far the log is good; None if nothing is wrong."""
+        self.snapshots: Sequence[int] = found.snapshots
+        """Steps after which a snapshot was recorded."""
+        self.topics: Mapping[str, TopicSize] = found.topics
+        """Messages and their bytes before compression, by topic."""
 
     @property
     def steps(self) -> Array:
         """(k,) int64: the committed steps, rising."""
         return np.array(self.found.steps, dtype=np.int64)
-
-    @property
-    def digest(self) -> str:
-        """The hash of the last committed step: the identity of the run up to there, 64 hexadecimal digits."""
-        return self.found.hash.hex()
-
-    @property
-    def state(self) -> State:
-        """Whether the log is complete, partial (cut off, or under way) or damaged."""
-        return self.found.state
-
-    @property
-    def damage(self) -> str | None:
-        """What is wrong and how far the log is good; None if nothing is wrong."""
-        return self.found.damage
-
-    @property
-    def snapshots(self) -> list[int]:
-        """Steps after which a snapshot was recorded."""
-        return list(self.found.snapshots)
-
-    @property
-    def topics(self) -> Mapping[str, TopicSize]:
-        """Messages and their bytes before compression, by topic."""
-        return self.found.topics
 
     def __iter__(self) -> Iterator[StepRecord]:
         for raw in self.raw_steps():

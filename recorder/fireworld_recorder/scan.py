@@ -184,7 +184,7 @@ def messages(
         position = start.position if record.offset == start.offset else 0
         for _, opcode, body in container.split(_block(record, decompressor), position):
             if opcode == _MESSAGE:
-                yield _channel_of(body, channels).topic, container.payload_of(body)
+                yield _topic_and_payload(body, channels)
 
 
 def _block(record: Record, decompressor: zstandard.ZstdDecompressor) -> bytes:
@@ -194,11 +194,11 @@ def _block(record: Record, decompressor: zstandard.ZstdDecompressor) -> bytes:
     return record.head + record.body if record.opcode in _BARE else b""
 
 
-def _channel_of(message: memoryview, channels: Mapping[int, ChannelRecord]) -> ChannelRecord:
-    channel = channels.get(container.channel_id_of(message))
-    if channel is None:
+def _topic_and_payload(message: memoryview, channels: Mapping[int, ChannelRecord]) -> tuple[str, memoryview]:
+    channel_id, payload = container.read_message(message)
+    if channel_id not in channels:
         raise LogError("a message belongs to no channel")
-    return channel
+    return channels[channel_id].topic, payload
 
 
 class _Stream:
@@ -233,8 +233,7 @@ class _Stream:
             n_registrations = 0
             for position, opcode, body in container.split(_block(record, self._decompressor)):
                 if opcode == _MESSAGE:
-                    place = Start(record.offset, position)
-                    yield _channel_of(body, self.channels).topic, container.payload_of(body), place
+                    yield *_topic_and_payload(body, self.channels), Start(record.offset, position)
                 else:
                     n_registrations += 1
                     if n_registrations > container.REGISTRATIONS_MAX:
@@ -268,7 +267,8 @@ class _Stream:
                 raise LogError(f"channel {channel.id} changes its topic")
 
     def _check_end(self, record: Record, checksum: int) -> None:
-        if not container.data_checksum_fits(record.body, checksum):
+        (stored,) = Fields(record.body).numbers("<I")
+        if stored not in {0, checksum}:  # 0 is none
             raise LogError("bytes outside the steps were changed")
         offset = self._file.tell()
         container.check_tail(self._file.read(), offset)

@@ -1,8 +1,10 @@
-"""How a run had come out at the last step of it that was read, with the keys that JSON has for that."""
+"""How a run had come out at the last step of it that was read, and what JSON gets of that and of other results."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import dataclasses
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -20,7 +22,7 @@ JSON_KEYS: Final[Mapping[str, str]] = {
     "sum_of_rewards": "total_reward",
     "water_used_litres": "water_used_litres",
 }
-"""What JSON calls the quantities of an outcome."""
+"""What JSON calls the quantities of an outcome; None without one."""
 
 
 @dataclass(frozen=True)
@@ -30,12 +32,6 @@ class Totals:
     n_steps: int
     outcome: Outcome | None = None
     """None for a run without steps."""
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the totals as JSON has them; without an outcome all but the first are None."""
-        outcome = self.outcome
-        quantities = {key: None if outcome is None else getattr(outcome, name) for key, name in JSON_KEYS.items()}
-        return {"n_steps": self.n_steps, **quantities}
 
 
 def totals_at(last: StepRecord | None, n_steps: int, city: CityRecord) -> Totals:
@@ -68,3 +64,20 @@ def final_outcome(run: Steps) -> Outcome:
     if outcome is None:
         raise LogError("a run without steps has no outcome")
     return outcome
+
+
+def plain(value: Any) -> Any:
+    """Turn dataclasses and mappings into dicts, sequences into lists, and NaN, which JSON lacks, into text."""
+    if isinstance(value, Totals):
+        outcome = value.outcome
+        quantities = {key: None if outcome is None else getattr(outcome, name) for key, name in JSON_KEYS.items()}
+        return plain({"n_steps": value.n_steps, **quantities})
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {item.name: plain(getattr(value, item.name)) for item in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str | bytes):
+        return [plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value

@@ -14,11 +14,11 @@ from fireworld.errors import OutputError, expected
 from fireworld.files import check_output
 from fireworld.records import FORMAT, STEP_SECONDS, CityRecord, RunHeader, Snapshot, StepRecord
 from fireworld_recorder.chain import Chain, step_messages
-from fireworld_recorder.codec import encode, encode_snapshot
+from fireworld_recorder.codec import encode, encode_snapshot, long_fields
 from fireworld_recorder.container import CHUNK_BYTES_MAX
 from fireworld_recorder.container_writer import ContainerWriter
 from fireworld_recorder.header import METADATA_NAME, PROFILE, to_metadata
-from fireworld_recorder.schema import PACKAGE, Commit, descriptors
+from fireworld_recorder.schema import DESCRIPTORS, PACKAGE, TOPICS, Commit, message_of
 
 PARTIAL_SUFFIX: Final = ".partial"
 _STEP_NANOSECONDS: Final = STEP_SECONDS * 1_000_000_000
@@ -50,7 +50,10 @@ class Scene(Protocol):
 
 def own_channels() -> list[Channel]:
     """List the channels of a new log, in their fixed order."""
-    return [Channel(message.topic, f"{PACKAGE}.{message.name}", data) for message, data in descriptors()]
+    # The file holds a set of one descriptor for each topic, one after another: a log carries each for its topic only.
+    data = DESCRIPTORS.read_bytes()
+    sets = zip(TOPICS, long_fields(data, 0), strict=True)
+    return [Channel(topic.topic, f"{PACKAGE}.{message_of(topic).name}", data[a:b]) for topic, (a, b) in sets]
 
 
 class StepFile:
@@ -86,8 +89,11 @@ class StepFile:
         self._open = False
         replace_partial = force or not self._keep_partial
         check_output(path, force=force)
-        if not replace_partial:
-            _check_leftover(self.partial)
+        if not replace_partial and self.partial.exists():
+            raise OutputError(
+                f"{self.partial}: a run that did not end left this, or one is under way;"
+                " try `fireworld recover` to keep its steps, or --force to replace it"
+            )
         with self._guard():
             self._file = self.partial.open("wb" if replace_partial else "xb")
             self._open = True
@@ -180,7 +186,7 @@ class StepFile:
             raise
 
 
-class LogWriter:
+class LogWriter(StepFile):
     """Records a run. Use it as a context manager: an exception inside leaves the committed steps as NAME.partial.
 
     Args:
@@ -207,7 +213,7 @@ class LogWriter:
         self._chain = Chain(encoded_city)
         self._scene = scene
         self._last_step = -1
-        self._file = StepFile(
+        super().__init__(
             Path(path),
             metadata=to_metadata(header),
             attachments=header.attachments,
@@ -222,11 +228,7 @@ class LogWriter:
         return self._chain.hash.hex()
 
     def write(self, record: StepRecord) -> None:
-        """Write one step; when this returns a kill cannot lose it.
-
-        Raises:
-            OutputError: the disk is full, or another fault of the output.
-        """
+        """Write one step; when this returns a kill cannot lose it. Errors are those of `commit`."""
         if record.step <= self._last_step:
             raise ValueError(f"steps are written in rising order, got {record.step} after {self._last_step}")
         messages = step_messages(record)
@@ -238,29 +240,5 @@ class LogWriter:
             messages.extend(self._scene.messages(record))
         commit = self._chain.commit(step=record.step, terminated=record.terminated, truncated=record.truncated)
         messages.append((Commit.topic, encode(commit)))
-        self._file.commit(record.step, messages)
+        self.commit(record.step, messages)
         self._last_step = record.step
-
-    def close(self) -> None:
-        """Write the index and give the log its name.
-
-        Raises:
-            OutputError: the disk is full, or another log has taken the name meanwhile.
-        """
-        self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._file.__exit__(kind, error, traceback)
-
-
-def _check_leftover(partial: Path) -> None:
-    if partial.exists():
-        raise OutputError(
-            f"{partial}: a run that did not end left this, or one is under way;"
-            " try `fireworld recover` to keep its steps, or --force to replace it"
-        )

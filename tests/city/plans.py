@@ -1,13 +1,17 @@
-"""Small plans for the tests."""
+"""Small plans for the tests, plans as city files, and the walls that rays meet."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from fireworld.city.city import Footprints, Plan, StreetMap
+from fireworld.city.city import Array, Footprints, Int32Array, Int64Array, Plan, StreetMap
+from fireworld.city.links import wall_grid, wall_table
 from fireworld.city.outlines import Building, Corner, assemble, centroid_mm, doubled_area_mm2
+from fireworld.kernels.rays import first_hits
+from fireworld.parameters import FireParameters
 
 
 def rectangle(x: int, y: int, width: int, depth: int) -> list[Corner]:
@@ -42,3 +46,58 @@ def street_map(nodes: Sequence[Corner], streets: Sequence[tuple[int, int]]) -> S
 
 def plan(*outlines: Sequence[Corner]) -> Plan:
     return Plan("small", footprints(*outlines), street_map([(0, 0), (1000, 0)], [(0, 1)]))
+
+
+def dump_plan(plan: Plan) -> dict[str, Any]:
+    """Turn a plan into a city document: `parse_plan` of its JSON gives the same plan.
+
+    Hydrants get identifiers after the buildings' highest.
+    """
+    footprints, streets = plan.footprints, plan.streets
+    corners, ptr = footprints.outline_mm.ravel().tolist(), (2 * footprints.outline_ptr).tolist()
+    next_id = int(footprints.building_id.max()) + 1
+    return {
+        "name": plan.name,
+        "buildings": [
+            {
+                "id": int(footprints.building_id[b]),
+                "type": "refuge" if footprints.refuge[b] else "building",
+                "apexes": corners[ptr[b] : ptr[b + 1]],
+                "floors": int(footprints.floors[b]),
+                "code": int(footprints.material[b]),
+                "ground_area": int(footprints.ground_area_m2[b]),
+                "x": int(footprints.centroid_mm[b, 0]),
+                "y": int(footprints.centroid_mm[b, 1]),
+                "inflammable": bool(footprints.inflammable[b]),
+            }
+            for b in range(len(footprints.building_id))
+        ],
+        "streets": {"nodes": streets.node_mm.tolist(), "edges": streets.street.tolist()},
+        "hydrants": [
+            {"id": next_id + k, "x": int(streets.node_mm[node, 0]), "y": int(streets.node_mm[node, 1])}
+            for k, node in enumerate(streets.hydrant_node.tolist())
+        ],
+    }
+
+
+def walls_hit(
+    footprints: Footprints,
+    order: Int32Array,
+    *,
+    source: Array,
+    start_mm: Array,
+    end_mm: Array,
+) -> Int64Array:
+    """Find the first wall that each given ray meets, -1 where there is none.
+
+    Args:
+        footprints: the buildings.
+        order: (n,) in which the official program visits the buildings.
+        source: (r,) wall that each ray leaves from, an index into `walls_of(footprints)`.
+        start_mm: (r, 2) start of each ray.
+        end_mm: (r, 2) end of each ray.
+    """
+    walls = wall_table(footprints, order, FireParameters())
+    rays = (source.astype(np.int64), start_mm.astype(np.int64), end_mm.astype(np.int64))
+    hits: Int64Array = first_hits(walls, wall_grid(walls), *rays)
+    return hits

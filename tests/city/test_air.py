@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fireworld.city.air import cover_cells
+from fireworld.city.build import visiting_order
 from fireworld.city.physics import physics_of
-from fireworld.city.visiting_order import visiting_order
 from fireworld.errors import CityError
 from fireworld.parameters import FireParameters
 from tests.city.plans import footprints, rectangle
@@ -101,12 +101,14 @@ def test_a_building_over_too_many_cells_is_refused_by_name():
 def test_physics_by_hand():
     # 10 m by 6 m of one storey, wood: 180 m3; three walls of 10, 6 and 10 m, 3 m high: the closing one is left out.
     physics = physics_of(footprints(rectangle(0, 0, 10_000, 6000)), FireParameters())
-    assert physics.volume_m3.tolist() == [180.0]
-    assert physics.initial_fuel.tolist() == [432_000.0]
-    assert physics.heat_capacity.tolist() == [pytest.approx(198.0)]
-    assert physics.ignition_point.tolist() == [47.0]
-    assert physics.wall_area_m2.tolist() == [78.0]
-    assert {physics.volume_m3.dtype, physics.initial_fuel.dtype, physics.heat_capacity.dtype} == {np.dtype(np.float32)}
+    assert physics["volume_m3"].tolist() == [180.0]
+    assert physics["initial_fuel"].tolist() == [432_000.0]
+    assert physics["heat_capacity"].tolist() == [pytest.approx(198.0)]
+    assert physics["ignition_point"].tolist() == [47.0]
+    assert physics["wall_area_m2"].tolist() == [78.0]
+    assert {physics["volume_m3"].dtype, physics["initial_fuel"].dtype, physics["heat_capacity"].dtype} == {
+        np.dtype(np.float32)
+    }
 
 
 def test_visiting_order_by_hand():

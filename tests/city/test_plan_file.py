@@ -11,8 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fireworld.city.generator import generate_plan
-from fireworld.city.plan_file import dump_plan, load_plan, parse_plan
+from fireworld.city.plan_file import parse_plan
+from fireworld.conformance.city_file import load_city_file
 from fireworld.errors import CityError
+from tests.city.plans import dump_plan
 
 HOUSE = {
     "id": 7,
@@ -78,7 +80,7 @@ def same(one, other):
 def test_a_city_is_read(tmp_path):
     path = tmp_path / "two.json"
     path.write_text(json.dumps(CITY))
-    plan = load_plan(path)
+    plan = load_city_file(path).plan
     assert plan.name == "two"
     footprints = plan.footprints
     assert footprints.building_id.tolist() == [7, 9]
@@ -223,7 +225,7 @@ def test_broken_files(text, message):
 def test_files_that_cannot_be_read(tmp_path):
     for path in (tmp_path / "missing.json", tmp_path):
         with pytest.raises(CityError, match="expected a city file that can be read, got"):
-            load_plan(path)
+            load_city_file(path)
 
 
 def places(value, path=()):

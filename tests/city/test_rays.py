@@ -7,11 +7,11 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from fireworld.city.links import radiation_links, walls_hit
-from fireworld.city.visiting_order import visiting_order
-from fireworld.city.walls import walls_of
+from fireworld.city.build import visiting_order
+from fireworld.city.links import radiation_links
+from fireworld.city.outlines import walls_of
 from fireworld.parameters import FireParameters
-from tests.city.plans import footprints, rectangle
+from tests.city.plans import footprints, rectangle, walls_hit
 
 FIRE = FireParameters()
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from fireworld.city.air import cover_cells
-from fireworld.city.build import build_city, with_links, with_order
+from fireworld.city.build import build_city, visiting_order, with_links, with_order
 from fireworld.city.city import City
-from fireworld.city.links import radiation_links, walls_hit
+from fireworld.city.links import radiation_links
+from fireworld.city.outlines import walls_of
 from fireworld.city.physics import physics_of
-from fireworld.city.plan_file import load_plan
-from fireworld.city.visiting_order import visiting_order
-from fireworld.city.walls import walls_of
+from fireworld.conformance.city_file import load_city_file
+from tests.city.plans import walls_hit
 from tests.reference import traces
 
 WITH_RAYS = ["mini", "mini_v1", "mini_v2", "mini_brigades"]
@@ -23,7 +23,7 @@ WITH_RAYS = ["mini", "mini_v1", "mini_v2", "mini_brigades"]
 @cache
 def case(name):
     trace = traces.Trace.named(name)
-    return load_plan(traces.TRACES / f"{traces.CITIES[name]}.json"), trace
+    return load_city_file(traces.TRACES / f"{traces.CITIES[name]}.json").plan, trace
 
 
 def rays_of(name):
@@ -83,11 +83,11 @@ def test_visiting_order(name):
 def test_physics_to_the_last_bit(name):
     plan, trace = case(name)
     arrays, physics = trace.arrays, physics_of(plan.footprints, trace.parameters)
-    np.testing.assert_array_equal(physics.volume_m3, arrays["volume"])
-    np.testing.assert_array_equal(physics.heat_capacity, arrays["capacity"])
-    np.testing.assert_array_equal(physics.initial_fuel, arrays["init_fuel"])
-    np.testing.assert_array_equal(physics.ignition_point, arrays["ignition_point"])
-    np.testing.assert_array_equal(physics.wall_area_m2, arrays["wall_area"])
+    np.testing.assert_array_equal(physics["volume_m3"], arrays["volume"])
+    np.testing.assert_array_equal(physics["heat_capacity"], arrays["capacity"])
+    np.testing.assert_array_equal(physics["initial_fuel"], arrays["init_fuel"])
+    np.testing.assert_array_equal(physics["ignition_point"], arrays["ignition_point"])
+    np.testing.assert_array_equal(physics["wall_area_m2"], arrays["wall_area"])
 
 
 @pytest.mark.parametrize("name", traces.CITIES)

@@ -9,7 +9,7 @@ import pytest
 from fireworld_recorder.reader import open_log
 
 from fireworld.city.generator import generate_plan
-from fireworld.city.plan_file import dump_plan
+from tests.city.plans import dump_plan
 
 pytestmark = pytest.mark.usefixtures("policies_file")
 

@@ -3,7 +3,8 @@
 import click
 import pytest
 
-from fireworld.cli import COMMANDS, reference
+from fireworld.cli import COMMANDS
+from tests.docs import cli_reference as reference
 
 FOUND = {context.command_path: command for context, command in reference.commands()}
 

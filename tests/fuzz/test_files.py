@@ -10,7 +10,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fireworld.city.plan_file import dump_plan, parse_plan
+from fireworld.city.plan_file import parse_plan
 from fireworld.conformance.city_file import load_city_file
 from fireworld.errors import TrainingError
 from fireworld.policy.teams.table_team import TableTeam
@@ -18,6 +18,7 @@ from fireworld.policy.teams.team import FORMAT, parse_team
 from fireworld.scenario import parse_scenario
 from fireworld.scenario.shipped import shipped_folder
 from fireworld.training.curriculum import load_curriculum
+from tests.city.plans import dump_plan
 from tests.city.test_plan_file import CITY
 from tests.fuzz.support import FOLDER, FUZZ, altered, changed, file_of, only_complaints, target
 

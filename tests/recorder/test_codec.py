@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from fireworld_recorder import codec, schema
 from fireworld_recorder.schema import TOPICS, Commit, message_of
-from google.protobuf import descriptor_pool, message_factory
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -52,7 +52,7 @@ def protobuf_types():
     """The protobuf library's message class of every record type, from the checked-in descriptors."""
     pool = descriptor_pool.DescriptorPool()
     types = {}
-    for file in schema.build_descriptors().file:
+    for file in descriptor_pb2.FileDescriptorSet.FromString(schema.DESCRIPTORS.read_bytes()).file:
         pool.Add(file)
     for topic in TOPICS:
         descriptor = pool.FindMessageTypeByName(f"{schema.PACKAGE}.{message_of(topic).name}")

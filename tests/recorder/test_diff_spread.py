@@ -5,8 +5,8 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from fireworld_recorder.comparable import check_same_scenario
 from fireworld_recorder.diff import StepRange, compare
+from fireworld_recorder.header import check_same_scenario
 from fireworld_recorder.reader import open_log
 from fireworld_recorder.spread import ValuePair
 

@@ -267,8 +267,8 @@ def test_interrupt_inside_a_step_keeps_the_steps_before(tmp_path, records, city,
 
     with contextlib.suppress(KeyboardInterrupt), LogWriter(tmp_path / "a.mcap", synthetic.header(), city) as log:
         log.write(records[0])
-        write = log._file._file.write
-        monkeypatch.setattr(log._file._writer, "_file", SimpleNamespace(write=interrupted))
+        write = log._file.write
+        monkeypatch.setattr(log._writer, "_file", SimpleNamespace(write=interrupted))
         log.write(records[1])
     assert not (tmp_path / "a.mcap").exists()
     assert open_log(tmp_path / "a.mcap.partial", partial=True).steps.tolist() == [0]

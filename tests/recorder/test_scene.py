@@ -6,13 +6,14 @@ import json
 
 import numpy as np
 import pytest
-from fireworld_recorder import foxglove_schema as schema
+from fireworld_recorder import foxglove
 from fireworld_recorder.reader import open_log
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import STOREY_M
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
 from fireworld.recording.pages.foxglove_scene import CITY, FIRE, LOG, POINTS, TEAM
+from tests.docs import foxglove_schema
 from tests.viewer.rrd import rerun_program
 
 RUN = ("run", "quick", "--steps", 12, "--policy", "easiest", "--json")
@@ -110,25 +111,49 @@ def rgb_of(color):
     return tuple(round(255 * part) for part in (color.r, color.g, color.b))
 
 
+FILES = [
+    file
+    for data in foxglove.DESCRIPTORS.values()
+    for file in descriptor_pb2.FileDescriptorSet.FromString(data).file
+    if file.package == "foxglove"
+]
+
+
+def type_of(item):
+    """Name of a field's type, as in TYPES."""
+    scalar = descriptor_pb2.FieldDescriptorProto.Type.Name(item.type).removeprefix("TYPE_").lower()
+    return item.type_name.removeprefix(".").removeprefix("foxglove.") or scalar
+
+
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_fields_have_the_published_numbers_and_types(name):
-    fields = {item.number: item for item in schema.MESSAGES[name]}
+    (first, *others) = [message for file in FILES for message in file.message_type if message.name == name]
+    assert all(other == first for other in others)
+    fields = {item.number: item for item in first.field}
     assert {number: item.name for number, item in fields.items()} == dict(enumerate(PUBLISHED[name].split(), start=1))
     for item in fields.values():
-        assert item.repeated == (item.name in REPEATED.split())
+        assert (item.label == item.LABEL_REPEATED) == (item.name in REPEATED.split())
         wanted = [kind for kind, names in TYPES.items() if item.name in names.split()]
         if item.name in MESSAGE_LISTS:
             wanted = [MESSAGE_LISTS[item.name]]
         elif item.name in {"type", "level"}:
             wanted = [kind for kind in ENUMERATIONS if kind.startswith(f"{name}.")]
-        assert [item.type] == wanted
+        assert [type_of(item)] == wanted
 
 
 def test_numbers_of_enumerations_are_the_published_ones():
+    messages = {message.name: message for file in FILES for message in file.message_type}
+    found = {f"{name}.{kind.name}": kind for name, message in messages.items() for kind in message.enum_type}
     for name, words in ENUMERATIONS.items():
-        assert list(schema.ENUMERATIONS[name].items()) == [(word, k) for k, word in enumerate(words.split())]
-    assert set(schema.ENUMERATIONS) == set(ENUMERATIONS)
-    assert set(schema.MESSAGES) == set(PUBLISHED)
+        numbers = [(value.name, value.number) for value in found[name].value]
+        assert numbers == [(word, k) for k, word in enumerate(words.split())]
+    assert set(found) == set(ENUMERATIONS)
+    assert set(messages) == set(PUBLISHED)
+
+
+@pytest.mark.parametrize("root", foxglove.DESCRIPTORS)
+def test_checked_in_descriptors_are_current(root):
+    assert foxglove.DESCRIPTORS[root] == foxglove_schema.descriptor_set(root), "run `make docs`"
 
 
 def test_points_are_the_buildings_at_every_step(log):

@@ -8,38 +8,39 @@ from typing import get_args
 
 from fireworld_recorder import schema, tables
 from fireworld_recorder.schema import COUNTS, TOPICS, Commit, message_of
+from fireworld_recorder.writer import own_channels
 from google.protobuf import descriptor_pb2
 
 from fireworld.records import DTYPES, STEP_TOPICS, CityRecord, Entity
+from tests.docs import log_format
 
 
 def test_checked_in_descriptors_are_those_of_the_records():
     stored = descriptor_pb2.FileDescriptorSet.FromString(schema.DESCRIPTORS.read_bytes())
-    assert stored == schema.build_descriptors(), "run `make docs`"
+    assert stored == log_format.build_descriptors(), "run `make docs`"
 
 
 def test_checked_in_proto_file_is_current():
-    assert schema.PROTO.read_text(encoding="utf-8") == schema.proto_text(), (
-        "run `python -m fireworld_recorder.schema --write`"
-    )
+    assert schema.PROTO.read_text(encoding="utf-8") == log_format.proto_text(), "run `make docs`"
 
 
 def test_docs_are_current():
-    page = schema.DOCS.read_text(encoding="utf-8")
-    assert page == schema.with_generated_part(page), "run `make docs`"
+    page = log_format.PAGE.read_text(encoding="utf-8")
+    assert page == log_format.with_generated_part(page), "run `make docs`"
     for topic in TOPICS:
         assert f"### {topic.topic}\n" in page
 
 
 def test_every_topic_carries_a_descriptor_set_of_its_own_message():
     names = []
-    for message, data in schema.descriptors():
-        files = descriptor_pb2.FileDescriptorSet.FromString(data).file
+    for topic, channel in zip(TOPICS, own_channels(), strict=True):
+        files = descriptor_pb2.FileDescriptorSet.FromString(channel.schema).file
         assert len(files) == 1
-        assert files[0].message_type[0].name == message.name
-        names.append(message.topic)
+        assert files[0].message_type[0].name == message_of(topic).name
+        assert channel.schema_name == f"{schema.PACKAGE}.{message_of(topic).name}"
+        names.append(channel.topic)
     assert names == [topic.topic for topic in TOPICS]
-    assert b"".join(data for _, data in schema.descriptors()) == schema.DESCRIPTORS.read_bytes()
+    assert b"".join(channel.schema for channel in own_channels()) == schema.DESCRIPTORS.read_bytes()
 
 
 def test_field_numbers_are_unique_and_arrays_have_a_numpy_type():

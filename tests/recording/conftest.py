@@ -10,10 +10,10 @@ import pytest
 from fireworld_recorder.reader import open_log
 from fireworld_recorder.writer import LogWriter
 
-from fireworld.city.plan_file import dump_plan
 from fireworld.scenario import load_scenario
 from fireworld.simulation.placement import scenario_plan
 from tests import command_line
+from tests.city.plans import dump_plan
 
 STEPS = 60
 POLICIES = '''

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fireworld.city.city import Footprints, Plan, StreetMap
-from fireworld.city.plan_file import dump_plan
 from fireworld.errors import ScenarioError
 from fireworld.scenario import load_scenario, parse_scenario, scenario_names
 from fireworld.simulation.placement import attachments, place, scenario_plan
+from tests.city.plans import dump_plan
 
 SIDE = 5
 PITCH_MM = 20_000

@@ -16,7 +16,7 @@ from fireworld.parameters import OFFICIAL_2011, PAPER
 from fireworld.scenario import Scenario, load_scenario, parse_scenario, scenario_names, split_settings
 from fireworld.scenario.document import BOUNDS, Document, resolve_reward, with_kind
 from fireworld.scenario.explain import find_faults
-from fireworld.scenario.reference import PAGE, renew
+from tests.docs.scenario_reference import PAGE, renew
 
 TEXT = """\
 description: A fire.
@@ -365,7 +365,7 @@ def test_more_brigades_change_nothing_else():
 
 def test_the_docs_list_every_key_as_it_is():
     page = PAGE.read_text(encoding="utf-8")
-    assert renew(page) == page, "run `python -m fireworld.scenario.reference`"
+    assert renew(page) == page, "run `make docs`"
 
 
 def test_the_docs_example_is_train_1():

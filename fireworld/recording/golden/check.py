@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from xml.etree.ElementTree import Element, SubElement
 
 from fireworld_recorder.diff import compare
-from fireworld_recorder.plain import plain
 from fireworld_recorder.reader import open_log
+from fireworld_recorder.totals import plain
 
 from fireworld.errors import FireworldError, OutputError, expected
 from fireworld.files import check_output

@@ -1,14 +1,17 @@
-"""Foxglove's published message schemas, as far as a scene uses them: the names and numbers, and their descriptors.
+"""The schemas of a scene's topics: names and numbers of Foxglove's published messages, and their descriptors.
 
 Names and numbers are those of the `foxglove` protobuf package; all fields are declared, also those that a scene never
-writes, because a panel may look for them. The descriptors are made here, so that recording needs no protobuf library.
+writes, because a panel may look for them. `python -m tests.docs.foxglove_schema` renews the descriptors beside
+`fireworld_recorder.foxglove`, so that recording needs no protobuf library.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Final, NamedTuple
 
+from fireworld_recorder import foxglove
 from fireworld_recorder.codec import varint
 
 TIMESTAMP: Final = "google.protobuf.Timestamp"
@@ -147,11 +150,6 @@ ENUMERATIONS: Final[Mapping[str, Mapping[str, int]]] = {
 }  # fmt: skip
 
 
-def schema_name(root: str) -> str:
-    """Full name of a message, which is how a reader finds what to do with a topic."""
-    return f"{_PACKAGE}.{root}"
-
-
 def descriptor_set(root: str) -> bytes:
     """Encode a FileDescriptorSet of a message and of all that it is made of."""
     names = _reachable(root)
@@ -226,3 +224,9 @@ def _enumerations(name: str) -> Iterator[bytes]:
                 length_delimited(2, length_delimited(1, key) + _number(2, value)) for key, value in values.items()
             ]
             yield length_delimited(1, own_name) + b"".join(entries)
+
+
+if __name__ == "__main__":
+    folder = Path(foxglove.__file__).parent
+    for root in foxglove.DESCRIPTORS:
+        (folder / f"foxglove_{root}.binpb").write_bytes(descriptor_set(root))

@@ -1,11 +1,13 @@
-"""The field reference in docs/scenarios.md, made from the types; `python -m fireworld.scenario.reference` renews it."""
+"""The field reference in docs/scenarios.md, made from the types.
+
+`python -m tests.docs.scenario_reference` renews it.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
-from pathlib import Path
 from typing import Final
 
 from msgspec import NODEFAULT, Struct, inspect, to_builtins
@@ -13,10 +15,11 @@ from msgspec import NODEFAULT, Struct, inspect, to_builtins
 from fireworld.parameters import PRESETS
 from fireworld.scenario.document import Document, Overrides
 from fireworld.scenario.explain import bare, words
+from tests.docs.pages import ROOT
 
-BEGIN: Final = "<!-- made by fireworld.scenario.reference -->"
+BEGIN: Final = "<!-- made by tests.docs.scenario_reference -->"
 END: Final = "<!-- end -->"
-PAGE: Final = Path(__file__).parents[2] / "docs" / "scenarios.md"
+PAGE: Final = ROOT / "docs" / "scenarios.md"
 
 
 def field_reference() -> str:

@@ -1,16 +1,16 @@
-"""The command-line reference docs/cli.md, made from the commands; `python -m fireworld.cli.reference` renews it."""
+"""The command-line reference docs/cli.md, made from the commands; `python -m tests.docs.cli_reference` renews it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Final
 
 import click
 
 from fireworld.cli import root
+from tests.docs.pages import ROOT
 
-PAGE: Final = Path(__file__).parents[2] / "docs" / "cli.md"
+PAGE: Final = ROOT / "docs" / "cli.md"
 WIDTH: Final = 100
 HEAD: Final = """\
 # The command line
@@ -51,7 +51,7 @@ def _with_those_below(command: click.Command, context: click.Context) -> Iterato
     if isinstance(command, click.Group):
         for name in command.list_commands(context):
             below = command.get_command(context, name)
-            assert below is not None, name  # noqa: S101 - a group knows the commands it lists
+            assert below is not None, name
             yield from _with_those_below(below, click.Context(below, info_name=name, parent=context))
 
 
