@@ -1,6 +1,6 @@
 """Named physical parameters with their units, and the presets of the official simulator.
 
-Every figure is a fact of the official RoboCup Rescue simulator of the named year, or of `paper`: the values that
+Every value is a fact of the official RoboCup Rescue simulator of the named year, or of `paper`: the values that
 fireworld uses where the paper is silent. A scenario may set any of them.
 """
 

@@ -39,5 +39,5 @@ numba.config.SLP_VECTORIZE = 1  # turns four sums side by side into vector instr
 
 
 def is_cold() -> bool:
-    """Tell whether nothing is compiled yet, so that the first call will take a while."""
+    """Return whether nothing is compiled yet, so that the first call will take a while."""
     return not any(Path(numba.config.CACHE_DIR).glob("**/*.nbi"))

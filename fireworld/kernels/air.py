@@ -84,7 +84,7 @@ def spread_air(fire: FireState, constants: FireConstants) -> None:
 
 @inner
 def meets_heat(x0: int, x1: int, y0: int, y1: int, span_low: Array, span_end: Array) -> bool:
-    """Tell whether a block of air reaches into the warm span of one of its rows."""
+    """Return whether a block of air reaches into the warm span of one of its rows."""
     for x in range(x0, x1):  # noqa: SIM110 - a generator is slow in compiled code
         if y0 < span_end[x] and y1 > span_low[x]:
             return True
@@ -101,7 +101,7 @@ def widen_spans(x0: int, x1: int, y0: int, y1: int, span_low: Array, span_end: A
 
 @inner
 def are_full(span_low: Array, span_end: Array, pitch: int) -> bool:
-    """Tell whether the spans hold all cells of the city, as they do where much burns: then none can be widened."""
+    """Return whether the spans hold all cells of the city, as they do where much burns: then none can be widened."""
     edge, full = np.uint64(pitch - PADDING + 1), True
     for x in range(ONE, np.uint64(len(span_low) - 1)):
         full &= span_low[x] == ONE and span_end[x] >= edge

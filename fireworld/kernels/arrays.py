@@ -1,7 +1,7 @@
 """The arrays that kernels work on, grouped by concern; n buildings, m street nodes.
 
 Named tuples of arrays, because numba compiles and caches them ahead (a jitclass is not cached across processes).
-"Tables" are fixed during an episode, "State" is what a step may change.
+"Arrays" are fixed during an episode, "State" is what a step may change.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Array = NDArray[Any]
 class BuildingArrays(NamedTuple):
     """What is fixed of each building, (n,)."""
 
-    building_id: Array  # int64, keys the building's luck and breaks ties
+    building_id: Array  # int64, keys the building's random draws and breaks ties
     order: Array  # uint32, in which the air exchange visits the buildings
     capacity: Array  # float64, energy per degree (a float32 number)
     initial_fuel: Array  # float32, energy
@@ -47,7 +47,7 @@ class LinkArrays(NamedTuple):
 
 
 class FireConstants(NamedTuple):
-    """The scalars of the fire model; parameters.FireParameters says what they mean."""
+    """The scalars of the fire model; parameters.FireParameters has their meaning."""
 
     burn_rate_mean: float
     burn_rate_sd: float
@@ -127,7 +127,7 @@ class CityArrays(NamedTuple):
 
 
 class HealthConstants(NamedTuple):
-    """The scalars of the damage model; parameters.HealthParameters says what they mean."""
+    """The scalars of the damage model; parameters.HealthParameters has their meaning."""
 
     slight_damage: float
     slight_below: float  # the three outcomes exclude each other: one uniform draw, cumulative bounds
@@ -208,7 +208,7 @@ class BrigadeState(NamedTuple):
 
 
 class SiteState(NamedTuple):
-    """Fire sites: connected sets of burning buildings. At most n of them; counts[0] says how many are in use."""
+    """Fire sites: connected sets of burning buildings. At most n of them; counts[0] is how many are in use."""
 
     counts: Array  # (3,) int32: sites in use, last number given, burning buildings
     label: Array  # (n,) int32, number of the site of each burning building, 0 none: kept from step to step

@@ -24,7 +24,7 @@ def greedy(values: Array) -> int:
 
 @kernel
 def explores(brigade: int, policy: PolicyArrays, seed: int, step: int) -> bool:
-    """Tell whether a brigade takes a random action in this step instead of the one its table prefers."""
+    """Return whether a brigade takes a random action in this step instead of the one its table prefers."""
     epsilon = policy.epsilon[0]
     return policy.kind[brigade] == TABLE and epsilon > 0.0 and uniform(seed, EXPLORE, brigade, step) < epsilon
 
@@ -50,7 +50,7 @@ def choose(brigade: int, state: int, policy: PolicyArrays, seed: int, step: int)
 
 @kernel
 def keeps_choice(brigade: int, last_action: int, commit: int, step: int) -> bool:
-    """Tell whether a brigade goes on with what it chose before.
+    """Return whether a brigade repeats what it chose before.
 
     Choices are kept for `commit` steps by a clock that all share, brigade after brigade; a brigade that did nothing
     chooses at once.

@@ -1,7 +1,7 @@
 """Keyed draws in compiled code: the twin of `fireworld.draws`, with normal deviates.
 
 The normal deviate comes from a table of quantiles with linear interpolation: exact on every processor, because it
-needs no logarithm, and far cheaper than the usual transforms. `tests/city/test_draws.py` says how the table is made.
+needs no logarithm, and far cheaper than the usual transforms. `tests/city/test_draws.py` makes the table.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ BLOCK = np.uint64(64)
 
 @inner
 def is_burning(energy: float, capacity: float, ignition_point: float, fuel: float, inflammable: int) -> bool:
-    """Tell whether a building burns: hot enough, fuel left, inflammable (codes 1 to 3).
+    """Return whether a building burns: hot enough, fuel left, inflammable (codes 1 to 3).
 
     Takes numbers, not arrays: passing groups of arrays to a small function costs more than the function.
     """
@@ -49,7 +49,7 @@ def draw_burn_rates(
 ) -> float:
     """Draw the burn rate of every burning building from N(mean, sd) and return their sum; MODEL 2.3.
 
-    Keyed by the building's id and the step: which other buildings burn changes nobody's luck.
+    Keyed by the building's id and the step: which other buildings burn changes nobody's draws.
     """
     total = 0.0
     for b in range(len(fire.energy)):
@@ -85,7 +85,7 @@ def burn(buildings: BuildingArrays, fire: FireState) -> None:
 
 @inner
 def is_dry(water: Array, start: int, end: int) -> bool:
-    """Tell whether no water lies on any building of a block."""
+    """Return whether no water lies on any building of a block."""
     wet = False
     for b in range(start, end):
         wet |= water[b] != 0

@@ -50,7 +50,7 @@ def harm(
         first: entity number of the first person, for the draws.
 
     Returns:
-        The sum of the damage draws and noise, which tells two runs' luck apart.
+        The sum of the damage draws and noise, by which runs with different draws differ.
     """
     total = 0.0
     for person in range(len(hp)):

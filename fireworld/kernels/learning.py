@@ -69,7 +69,7 @@ def choose_and_learn(brigade: int, table: int, state: int, action: int, epsilon:
 def go_on_and_learn(brigade: int, table: int, state: int, action: int, learner: Learner) -> None:
     """Learn from the choice that a brigade is bound to when its episode is truncated.
 
-    It would go on with that action, so what comes next is worth the action's value where the brigade is by now: by any
+    It would repeat that action, so what comes next is worth the action's value where the brigade is by now: by any
     rule, for there is nothing to choose.
     """
     update(brigade, table, learner.tables[table, state, action], learner)

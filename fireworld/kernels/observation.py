@@ -70,7 +70,7 @@ def observe(
 ) -> int:
     """Write the eight features that a brigade sees and return its state; -1 (features 0) without a site. MODEL 5.
 
-    Given `brigades.action`, into which choices are written one after another, the flags tell what the others chose:
+    Given `brigades.action`, into which choices are written one after another, the flags are what the others chose:
     those before it in this step, those after it in the last one.
 
     Args:

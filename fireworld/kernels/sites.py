@@ -120,7 +120,7 @@ def assign_brigades(
 ) -> None:
     """Keep every brigade with its site; follow a site that merged; send it to the nearest fire when its site is out.
 
-    Runs before the labels of the step before are overwritten: they tell where a merged site went.
+    Runs before the labels of the step before are overwritten: they show where a merged site went.
     """
     for brigade in range(len(brigades.site)):
         number = brigades.site[brigade]

@@ -31,7 +31,7 @@ KIND = {name: index for index, name in enumerate(EVENT_KINDS)}
 
 @dataclass(frozen=True)
 class _Before:
-    """What the events of the next step are told from."""
+    """What the events of the next step follow from."""
 
     fieryness: Array
     civilian_hp: Array
@@ -164,7 +164,7 @@ class Observer:
         )
 
     def _events(self) -> Events:
-        """Tell what changed, in the order of the phases."""
+        """Return what changed, in the order of the phases."""
         before, arrays = self._before, self.world.state
         brigades, civilians = arrays.brigades, arrays.civilians
         refilled = _zero_against_more(brigades.refilling, before.refilling)
@@ -181,7 +181,7 @@ class Observer:
         )
 
     def _fire_events(self) -> list[tuple[str, Sequence[int]]]:
-        """Tell what happened to buildings and sites; most steps change few codes, so only those are looked at."""
+        """Return what happened to buildings and sites; most steps change few codes, so only those are looked at."""
         code, site = self.world.state.fire.fieryness, self.world.state.sites.label
         changed = (code != self._before.fieryness).nonzero()[0]
         if len(changed) == 0:

@@ -223,7 +223,7 @@ def copy_into(world: WorldState, source: WorldState) -> None:
 
 
 def take_snapshot(world: WorldState) -> dict[str, Array]:
-    """Copy everything that replay needs to go on from here."""
+    """Copy everything that is needed to resume from here."""
     return {name: array.copy() for name, array in named_arrays(world) if name not in SCRATCH}
 
 

@@ -103,7 +103,7 @@ def test_the_official_step_of_death():
 
 @pytest.mark.parametrize("row", range(6))
 def test_exposed_people_fare_like_the_official_ones(row):
-    """20000 people with keyed luck, 1 to 300 steps inside fire: survivors and mean HP within sampling error."""
+    """20000 people with keyed draws, 1 to 300 steps inside fire: survivors and mean HP within sampling error."""
     n, steps = 20_000, int(MISC["exposure_steps"][row])
     hp, damage = np.full(n, 10_000, dtype=np.int32), np.zeros(n)
     for step in range(1, 301):

@@ -12,7 +12,7 @@ from fireworld.city.city import Array, City, Float64Array
 from fireworld.draws import BURN_RATE, DAMAGE, DAMAGE_NOISE
 from fireworld.parameters import Parameters
 from fireworld.policy.kernel import KernelPolicy
-from tests.reference import fire, luck, outcome, people, ranking, sites, team
+from tests.reference import fire, outcome, people, random_draws, ranking, sites, team
 from tests.reference.learning import Learner
 
 PAPERS = outcome.Reward()
@@ -230,7 +230,7 @@ def burn(tables: Tables, world: World, *, seed: int, step: int) -> None:
     burning = np.flatnonzero(fire.is_burning(tables.fire, world.fire))
     parameters = tables.parameters.fire
     rate = np.zeros(len(world.fire.energy))
-    deviates = luck.normals(seed, BURN_RATE, burning, step)
+    deviates = random_draws.normals(seed, BURN_RATE, burning, step)
     rate[burning] = parameters.burn_rate_mean + parameters.burn_rate_sd * deviates
     fire.advance_fire(tables.fire, world.fire, rate)
 
@@ -246,10 +246,10 @@ def hurt(tables: Tables, world: World, *, seed: int, step: int) -> None:
     if not len(exposed) and not hurt_before.any():
         return
     exposure, noise = np.zeros(len(crowd.hp)), np.zeros(len(crowd.hp))
-    draw = luck.uniforms(seed, DAMAGE, exposed, step)
+    draw = random_draws.uniforms(seed, DAMAGE, exposed, step)
     exposure[exposed] = people.expose(draw, parameters) * crowd.share[exposed]
     harmed = np.flatnonzero(hurt_before | (exposure > 0))
-    noise[harmed] = parameters.noise_mean + parameters.noise_sd * luck.normals(seed, DAMAGE_NOISE, harmed, step)
+    noise[harmed] = parameters.noise_mean + parameters.noise_sd * random_draws.normals(seed, DAMAGE_NOISE, harmed, step)
     people.suffer(crowd.hp, crowd.damage, exposure, noise, parameters)
 
 

@@ -27,7 +27,7 @@ from fireworld.simulation.placement import Placement
 from fireworld.simulation.start import prepare_start
 from fireworld.simulation.world import World
 from tests.kernels.small import assess
-from tests.reference import episode, luck, outcome, sites, team
+from tests.reference import episode, outcome, random_draws, sites, team
 
 pytestmark = pytest.mark.slow
 
@@ -323,10 +323,10 @@ def assert_same_sites(compiled: World, plain: episode.World, seen: sites.Sites |
 )
 @settings(deadline=None, max_examples=60)
 def test_draws(seed, purpose, entities, step):
-    """Many at once are the same luck as one by one; the episodes above show that it is that of the kernels."""
+    """Many at once are the same draws as one by one; the episodes above show that it is that of the kernels."""
     many = np.array(entities)
-    assert luck.uniforms(seed, purpose, many, step).tolist() == [
+    assert random_draws.uniforms(seed, purpose, many, step).tolist() == [
         draws.uniform(seed, purpose, e, step) for e in entities
     ]
-    expected = [luck.normal_of(draws.hash_key(seed, purpose, entity, step)) for entity in entities]
-    assert luck.normals(seed, purpose, many, step).tolist() == expected
+    expected = [random_draws.normal_of(draws.hash_key(seed, purpose, entity, step)) for entity in entities]
+    assert random_draws.normals(seed, purpose, many, step).tolist() == expected

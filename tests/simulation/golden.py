@@ -1,6 +1,6 @@
 """Digests of two short runs: the simulator's behaviour in 128 characters.
 
-A change of physics, of rules or of luck changes them. If that is meant, renew them and say why in the commit:
+A change of physics, of rules or of random draws changes them. If that is meant, renew them and say why in the commit:
 
     python -m tests.simulation.golden
 """

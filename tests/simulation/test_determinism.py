@@ -12,14 +12,14 @@ from tests.simulation.golden import RUNS, digest_of, golden
 
 pytestmark = pytest.mark.slow
 
-SAY_DIGESTS = (
+PRINT_DIGESTS = (
     "from tests.simulation.golden import RUNS, digest_of\nfor run in RUNS.values():\n    print(digest_of(*run))\n"
 )
 
 
 @pytest.mark.parametrize("name", RUNS)
 def test_the_simulator_does_what_it_did(name):
-    """Physics, rules or luck have changed if this fails; tests/world/golden.py says what to do."""
+    """Physics, rules or random draws have changed if this fails: see tests/simulation/golden.py."""
     assert digest_of(*RUNS[name]) == golden()[name]
 
 
@@ -39,7 +39,7 @@ def test_all_golden_runs_are_pinned():
 )
 def test_other_processes_compute_the_same(settings):
     done = subprocess.run(
-        [sys.executable, "-c", SAY_DIGESTS], env=os.environ | settings, capture_output=True, text=True, check=False
+        [sys.executable, "-c", PRINT_DIGESTS], env=os.environ | settings, capture_output=True, text=True, check=False
     )
     assert done.stderr == ""
     assert done.stdout.split() == list(golden().values())

@@ -1,4 +1,4 @@
-"""What must hold in every step of every run: fuel, water, codes, health, streets, speed, heat, luck."""
+"""What must hold in every step of every run: fuel, water, codes, health, streets, speed, heat, random draws."""
 
 from __future__ import annotations
 
@@ -160,7 +160,7 @@ def block(*more):
 
 @given(seed=st.integers(0, 2**32 - 1), step=st.integers(1, 500))
 @settings(max_examples=30, deadline=None)
-def test_a_building_far_away_changes_no_luck(seed, step):
+def test_a_building_far_away_changes_no_draws(seed, step):
     constants = fire_constants(PAPER.fire)
     rates = []
     for city in (BLOCK, BLOCK_AND_FARM):
@@ -175,7 +175,7 @@ def test_a_building_far_away_changes_no_luck(seed, step):
 BLOCK, BLOCK_AND_FARM = block(), block((5, 2_000_000, 2_000_000))
 
 
-def test_the_luck_of_a_building_does_not_depend_on_what_else_burns():
+def test_the_draws_of_a_building_do_not_depend_on_what_else_burns():
     constants, buildings = fire_constants(PAPER.fire), building_arrays(BLOCK, PAPER.fire)
     alone, together = fresh_fire(BLOCK), fresh_fire(BLOCK)
     alone.energy[3] = 1e6
@@ -186,7 +186,7 @@ def test_the_luck_of_a_building_does_not_depend_on_what_else_burns():
 
 
 @pytest.mark.parametrize("names", [("fixed", "random"), ("table", "each-another")])
-def test_two_policies_on_one_seed_meet_the_same_luck(names):
+def test_two_policies_on_one_seed_see_the_same_draws(names):
     keys = []
     for name in names:
         world = town_world(seed=8, n_steps_max=15)
@@ -196,7 +196,7 @@ def test_two_policies_on_one_seed_meet_the_same_luck(names):
     assert len(set(keys[0])) == 15
 
 
-def test_another_seed_is_other_luck():
+def test_another_seed_is_other_draws():
     outcomes = set()
     for seed in range(4):
         world = town_world(seed=1)
