@@ -228,20 +228,22 @@ class SiteState(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What a step was worth, as one array each of float64; the names below are positions in them."""
+    """What a step was worth, as one array each of float64; below, what is where in them."""
 
-    reward: Array  # (6,) the four terms, TOTAL, SUM_SO_FAR
-    stock: Array  # (4,) the four terms as a stock
-    score: Array  # (3,) SCORE, SCORE_MAX, SCORE_NOW
-    counts: Array  # (4,) int32: BURNING, WATER_DAMAGED, BURNT_OUT, CIVILIANS_ALIVE
+    reward: Array  # (6,) the TERMS, then at TOTAL and SUM_SO_FAR their sum and the return
+    stock: Array  # (4,) the TERMS as a stock
+    score: Array  # (3,) SCORES
+    counts: Array  # (4,) int32, COUNTS
     water: Array  # (1,) litres sprayed so far
-    draws: Array  # (2,) sums of the burn rates, BURN_RATES, and of the damage draws, DAMAGES
+    draws: Array  # (2,) DRAWS
 
 
 TOTAL, SUM_SO_FAR = len(TERMS), len(TERMS) + 1
-SCORE, SCORE_MAX, SCORE_NOW = 0, 1, 2
-BURNING, WATER_DAMAGED, BURNT_OUT, CIVILIANS_ALIVE = 0, 1, 2, 3
-BURN_RATES, DAMAGES = 0, 1
+SCORES = ("score", "score_max", "score_now")
+COUNTS = ("n_burning", "n_water_damaged", "n_burnt_out", "n_civilians_alive")
+DRAWS = ("burn_rate_sum", "health_sum")
+"""Each named as in `fireworld.records`."""
+BURNING = COUNTS.index("n_burning")
 
 
 class WorldState(NamedTuple):

@@ -5,21 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fireworld import rewards
-from fireworld.kernels.arrays import (
-    BURNING,
-    BURNT_OUT,
-    CIVILIANS_ALIVE,
-    SCORE,
-    SCORE_MAX,
-    SCORE_NOW,
-    SUM_SO_FAR,
-    TOTAL,
-    WATER_DAMAGED,
-    CivilianState,
-    FireState,
-    GeometryArrays,
-    Outcome,
-)
+from fireworld.kernels.arrays import SUM_SO_FAR, TOTAL, CivilianState, FireState, GeometryArrays, Outcome
 from fireworld.kernels.jit import inner, kernel
 from fireworld.rewards import Reward, Tally
 
@@ -72,12 +58,11 @@ def assess(
         if civilians.hp[civilian] > 0:
             n_alive += 1
     counts, score = outcome.counts, outcome.score
-    counts[BURNING], counts[WATER_DAMAGED] = n_burning, n_water_damaged
-    counts[BURNT_OUT], counts[CIVILIANS_ALIVE] = n_burnt_out, n_alive
+    counts[0], counts[1], counts[2], counts[3] = n_burning, n_water_damaged, n_burnt_out, n_alive
     healthy = hp / full_hp if full_hp > 0 else 1.0
-    score[SCORE] = (n_alive + healthy) * np.sqrt(saved / area)
-    score[SCORE_MAX] = len(civilians.hp) + 1.0
-    score[SCORE_NOW] = n_alive * exp_of_minus(5.0 * (1.0 - healthy))
+    score[0] = (n_alive + healthy) * np.sqrt(saved / area)
+    score[1] = len(civilians.hp) + 1.0
+    score[2] = n_alive * exp_of_minus(5.0 * (1.0 - healthy))
     amount = amounts(Tally(n_burning, n_water_damaged, n_burnt_out, n_alive, hp, full_hp))
     total = 0.0
     for term in range(TOTAL):

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from fireworld.kernels.arrays import (
-    BURN_RATES,
-    DAMAGES,
     BrigadeState,
     CityArrays,
     CivilianState,
@@ -52,9 +50,9 @@ def finish_step(
         step: simulated step.
     """
     outcome.water[0] += act(brigades, fire, city.streets, city.geometry, constants.brigades)
-    outcome.draws[BURN_RATES] = draw_burn_rates(city.buildings, fire, constants.fire, seed, step)
+    outcome.draws[0] = draw_burn_rates(city.buildings, fire, constants.fire, seed, step)
     advance_fire(city.buildings, city.cover, city.links, fire, constants.fire)
-    outcome.draws[DAMAGES] = hurt(fire, civilians, brigades, constants.health, seed, step)
+    outcome.draws[1] = hurt(fire, civilians, brigades, constants.health, seed, step)
     assess(fire, civilians, city.geometry, constants.reward, outcome)
 
 

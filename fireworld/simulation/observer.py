@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fireworld.draws import STEP, hash_key
-from fireworld.kernels.arrays import BURN_RATES, DAMAGES, Array
+from fireworld.kernels.arrays import DRAWS, Array
 from fireworld.kernels.brigades import REFILLING
 from fireworld.records import (
     EVENT_KINDS,
@@ -56,15 +56,13 @@ class Observer:
             choices: what `World.step` returned; None before the first step.
         """
         world = self.world
-        draws = world.state.outcome.draws.tolist()
         events = self._events() if choices is not None else _events([])
         snapshot_due = world.step_number % SNAPSHOT_EVERY_STEPS == 0
         record = StepRecord(
             step=world.step_number,
             draws=Draws(
                 key=hash_key(world.seed, STEP, 0, world.step_number),
-                burn_rate_sum=draws[BURN_RATES],
-                health_sum=draws[DAMAGES],
+                **dict(zip(DRAWS, world.state.outcome.draws.tolist(), strict=True)),
             ),
             observations=self._observations(choices),
             decisions=self._decisions(choices),

@@ -10,15 +10,8 @@ import numpy as np
 from fireworld.city.city import City
 from fireworld.errors import LogError
 from fireworld.kernels.arrays import (
-    BURNING,
-    BURNT_OUT,
-    CIVILIANS_ALIVE,
-    SCORE,
-    SCORE_MAX,
-    SCORE_NOW,
-    SUM_SO_FAR,
-    TOTAL,
-    WATER_DAMAGED,
+    COUNTS,
+    SCORES,
     Array,
     BrigadeState,
     CityArrays,
@@ -39,6 +32,8 @@ SCRATCH = {"fire.span", "fire.rate", "fire.emitted", "fire.scratch"} | {
     f"sites.{name}" for name in SiteState._fields if name not in {"counts", "label"}
 }
 """Arrays that no snapshot holds: what a step needs of them, it computes, or `restore_snapshot` makes it anew."""
+REWARDS: Final = (*(term.name for term in TERMS), "total", "sum_so_far")
+"""Fields of `Rewards` in the order of the outcome's array."""
 
 
 def warm_spans(warm: Array, shape: tuple[int, ...]) -> Array:
@@ -112,29 +107,25 @@ def fresh_brigades(city: City, refuges: Array, tank_litres: int, hp: int) -> Bri
 
 def fresh_sites(n: int) -> SiteState:
     """Return the site state of a city of n buildings in which nothing burns."""
+    zeros = {name: np.zeros(n) for name in SiteState._fields}
     return SiteState(
-        counts=np.zeros(3, dtype=np.int32),
-        label=np.zeros(n, dtype=np.int32),
-        place=np.full(n, -1, dtype=np.int32),
-        member=np.zeros(n, dtype=np.uint32),
-        start=np.zeros(n + 1, dtype=np.int32),
-        number=np.zeros(n, dtype=np.int32),
-        volume=np.zeros(n),
-        west=np.zeros(n),
-        south=np.zeros(n),
-        east=np.zeros(n),
-        north=np.zeros(n),
-        center_square=np.zeros(n),
-        civilian_square=np.zeros(n),
-        free_sides=np.zeros(n, dtype=np.uint8),
-        building_civilian_square=np.zeros(n),
+        **zeros
+        | {
+            "counts": np.zeros(3, dtype=np.int32),
+            "label": np.zeros(n, dtype=np.int32),
+            "place": np.full(n, -1, dtype=np.int32),
+            "member": np.zeros(n, dtype=np.uint32),
+            "start": np.zeros(n + 1, dtype=np.int32),
+            "number": np.zeros(n, dtype=np.int32),
+            "free_sides": np.zeros(n, dtype=np.uint8),
+        }
     )
 
 
 def fresh_outcome() -> Outcome:
     """Return an outcome of which nothing is known yet."""
     return Outcome(
-        reward=np.zeros(SUM_SO_FAR + 1),
+        reward=np.zeros(len(REWARDS)),
         stock=np.zeros(len(TERMS)),
         score=np.zeros(3),
         counts=np.zeros(4, dtype=np.int32),
@@ -181,25 +172,15 @@ def fresh_world(city: City, parameters: Parameters, placement: Placement) -> Wor
 
 def rewards_of(world: WorldState) -> Rewards:
     """Return what the last step was worth, as it is recorded."""
-    reward = world.outcome.reward.tolist()
-    terms = {term.name: reward[place] for place, term in enumerate(TERMS)}
-    return Rewards(**terms, total=reward[TOTAL], sum_so_far=reward[SUM_SO_FAR])
+    return Rewards(**dict(zip(REWARDS, world.outcome.reward.tolist(), strict=True)))
 
 
 def score_of(world: WorldState) -> Score:
     """Return how the world stands, as it is recorded."""
     outcome = world.outcome
-    score, counts = outcome.score.tolist(), outcome.counts.tolist()
-    return Score(
-        score=score[SCORE],
-        score_max=score[SCORE_MAX],
-        score_now=score[SCORE_NOW],
-        n_burning=counts[BURNING],
-        n_water_damaged=counts[WATER_DAMAGED],
-        n_burnt_out=counts[BURNT_OUT],
-        n_civilians_alive=counts[CIVILIANS_ALIVE],
-        water_used_litres=outcome.water.item(),
-    )
+    scores = dict(zip(SCORES, outcome.score.tolist(), strict=True))
+    counts = dict(zip(COUNTS, outcome.counts.tolist(), strict=True))
+    return Score(**scores, **counts, water_used_litres=outcome.water.item())
 
 
 def named_arrays(world: WorldState | CityArrays) -> Iterator[tuple[str, Array]]:
