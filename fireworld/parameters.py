@@ -1,12 +1,12 @@
 """Named physical parameters with their units, and the presets of the official simulator.
 
-Every figure is a fact of the official RoboCup Rescue simulator of the named year, or of `paper`: the values that
+Every value is a fact of the official RoboCup Rescue simulator of the named year, or of `paper`: the values that
 fireworld uses where the paper is silent. A scenario may set any of them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 
@@ -94,8 +94,3 @@ PAPER: Final = Parameters(
     ),
 )
 PRESETS: Final = {"official-2011": OFFICIAL_2011, "official-2013": OFFICIAL_2013, "paper": PAPER}
-
-
-def field_names(section: type[FireParameters | HealthParameters | BrigadeParameters]) -> list[str]:
-    """List the keys that a scenario may set in one section."""
-    return [item.name for item in fields(section)]

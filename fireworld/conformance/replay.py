@@ -32,15 +32,6 @@ class Moment:
     results: list[int]  # codes of the step's requests
 
 
-@dataclass(frozen=True)
-class Setting:
-    """What a replay starts from."""
-
-    own_city: City  # as fireworld builds it
-    city: City  # with the order and the links of the trace
-    fire: FireParameters
-
-
 def fire_parameters(trace: Trace) -> FireParameters:
     """Return the trace's parameters; those that its other arrays make superfluous may be missing.
 
@@ -58,8 +49,11 @@ def fire_parameters(trace: Trace) -> FireParameters:
     return fire
 
 
-def prepare(city_file: CityFile, trace: Trace) -> Setting:
+def prepare(city_file: CityFile, trace: Trace) -> tuple[City, City, FireParameters]:
     """Build the city as the trace's parameters want it.
+
+    Returns:
+        The city as fireworld builds it, the same with the order and the links of the trace, and the parameters.
 
     Raises:
         CityError: it cannot be built, such as with these air cells.
@@ -73,23 +67,23 @@ def prepare(city_file: CityFile, trace: Trace) -> Setting:
         city = with_links(city, ptr=trace.links.ptr, building=trace.links.building, share=trace.links.share)
     if trace.order is not None:
         city = with_order(city, trace.order)
-    return Setting(own, city, fire)
+    return own, city, fire
 
 
-def replay(city_file: CityFile, trace: Trace, setting: Setting) -> Iterator[Moment]:
+def replay(city_file: CityFile, trace: Trace, city: City, parameters: FireParameters) -> Iterator[Moment]:
     """Run the engine through all steps of a trace and yield the state after each, step 0 first.
 
     Raises:
         TraceError: a building burns in more steps than the trace has rates for, or a parameter of the brigades is
             missing.
     """
-    inputs, fire_is = city_file.inputs, fire_constants(setting.fire)
-    tables, fire = city_arrays(setting.city, setting.fire), fresh_fire(setting.city)
-    crew = Crew(city_file, trace, tables, setting.city) if inputs.brigade_id or inputs.requests else None
-    rates = Rates(trace, setting)
+    inputs, fire_is = city_file.inputs, fire_constants(parameters)
+    tables, fire = city_arrays(city, parameters), fresh_fire(city)
+    crew = Crew(city_file, trace, tables, city) if inputs.brigade_id or inputs.requests else None
+    rates = Rates(trace, city, parameters)
     for b in inputs.ignitions:
         ignite(b, tables.buildings, fire)
-    yield _moment(0, setting.city, fire, crew, [])
+    yield _moment(0, city, fire, crew, [])
     for step in range(1, trace.n_steps + 1):
         for b in inputs.later_ignitions.get(step, ()):
             ignite(b, tables.buildings, fire)
@@ -99,7 +93,7 @@ def replay(city_file: CityFile, trace: Trace, setting: Setting) -> Iterator[Mome
         results = crew.act(step, fire) if crew is not None else []
         fire.rate[:] = rates.take(fire.fieryness, step)
         advance_fire(tables.buildings, tables.cover, tables.links, fire, fire_is)
-        yield _moment(step, setting.city, fire, crew, results)
+        yield _moment(step, city, fire, crew, results)
 
 
 def _moment(step: int, city: City, fire: FireState, crew: Crew | None, results: list[int]) -> Moment:
@@ -121,12 +115,11 @@ def _moment(step: int, city: City, fire: FireState, crew: Crew | None, results: 
 class Rates:
     """The burn rates of a trace: in every step in which a building burns it takes the next of its list."""
 
-    def __init__(self, trace: Trace, setting: Setting) -> None:
-        n = setting.city.n_buildings
+    def __init__(self, trace: Trace, city: City, parameters: FireParameters) -> None:
         self._trace = trace
-        self._identifiers = setting.city.footprints.building_id
-        self._constant = np.full(n, setting.fire.burn_rate_mean)
-        self._taken = np.zeros(n, dtype=np.int64)
+        self._identifiers = city.footprints.building_id
+        self._constant = np.full(city.n_buildings, parameters.burn_rate_mean)
+        self._taken = np.zeros(city.n_buildings, dtype=np.int64)
 
     def take(self, codes: Array, step: int) -> Array:
         """Return the rates of a step, (n,); codes (n,) are those before it."""
