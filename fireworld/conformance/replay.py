@@ -20,7 +20,7 @@ from fireworld.simulation.city_arrays import air_inside, brigade_constants, city
 from fireworld.simulation.state import fresh_brigades, fresh_fire
 
 RAY_SEED = 1
-"""Luck of the rays where a trace has no links."""
+"""Seed of the random rays where a trace has no links."""
 
 
 @dataclass(frozen=True)
@@ -33,11 +33,7 @@ class Moment:
 
 
 def fire_parameters(trace: Trace) -> FireParameters:
-    """Return the trace's parameters; those that its other arrays make superfluous may be missing.
-
-    Raises:
-        TraceError: one that is needed is missing, or out of bounds.
-    """
+    """Return the trace's parameters; TraceError if one is missing that its other arrays do not replace."""
     keys = dict(FIRE_KEYS)
     for group, needed in ((BURN_KEYS, trace.rates is None), (RAY_KEYS, trace.links is None)):
         if needed or trace.configuration.has(group):
@@ -60,7 +56,7 @@ def prepare(city_file: CityFile, trace: Trace) -> tuple[City, City, FireParamete
         TraceError: a parameter is missing or out of bounds.
     """
     fire = fire_parameters(trace)
-    named = replace(city_file.plan, name=city_file.where)  # what complaints begin with
+    named = replace(city_file.plan, name=city_file.where)  # what errors begin with
     own = build_city(named, fire, seed=RAY_SEED)
     city = own
     if trace.links is not None:
@@ -139,7 +135,7 @@ class Rates:
 
 
 class Crew:
-    """The brigades of a city file: moved as it says, refilled and judged by the engine.
+    """The brigades of a city file: moved by its rows, refilled and judged by the engine.
 
     Attributes:
         team: their state, by rising id.
@@ -157,7 +153,7 @@ class Crew:
         self._place(self._inputs.start)
 
     def act(self, step: int, fire: FireState) -> list[int]:
-        """Move, refill and spray as a step's rows say; return the requests' result codes."""
+        """Move, refill and spray by a step's rows; return the requests' result codes."""
         team = self.team
         self._place(self._inputs.moves.get(step, ()))
         refill(team.refuge, team.hydrant, team.hp, team.tank, self._constants)
