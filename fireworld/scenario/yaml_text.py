@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import re
+from functools import partial
 from typing import Any, Final
 
 import yaml
@@ -88,7 +89,7 @@ def _float(loader: _Reader, node: yaml.ScalarNode) -> float | str:
     return number if math.isfinite(number) else str(node.value)
 
 
-_Reader.add_constructor(CORE + "map", lambda loader, node: loader.construct_mapping(node, deep=True))
+_Reader.add_constructor(CORE + "map", partial(_Reader.construct_mapping, deep=True))
 _Reader.add_constructor(CORE + "float", _float)
 for _kind, _pattern in (("int", INTEGER), ("float", FLOAT), ("bool", BOOLEAN), ("null", NULL)):
     _Reader.add_implicit_resolver(CORE + _kind, _pattern, None)
