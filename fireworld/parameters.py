@@ -6,7 +6,7 @@ fireworld uses where the paper is silent. A scenario may set any of them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 
@@ -94,8 +94,3 @@ PAPER: Final = Parameters(
     ),
 )
 PRESETS: Final = {"official-2011": OFFICIAL_2011, "official-2013": OFFICIAL_2013, "paper": PAPER}
-
-
-def field_names(section: type[FireParameters | HealthParameters | BrigadeParameters]) -> list[str]:
-    """List the keys that a scenario may set in one section."""
-    return [item.name for item in fields(section)]

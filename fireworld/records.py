@@ -42,30 +42,15 @@ ACTIVITIES: Final = ("idle", "driving", "spraying", "driving-to-refuge", "refill
 """What a brigade did in a step."""
 
 EVENT_KINDS: Final = (
-    "ignited",
-    "extinguished",
-    "burnt-out",
-    "civilian-hurt",
-    "civilian-died",
-    "tank-empty",
-    "refilled",
-    "site-out",
-    "brigade-hurt",
-    "brigade-died",
-)
+    "ignited", "extinguished", "burnt-out", "civilian-hurt", "civilian-died", "tank-empty", "refilled", "site-out",
+    "brigade-hurt", "brigade-died",
+)  # fmt: skip
 """Kinds of events. The entity of the first three is a building, then civilians, brigades, a fire site, brigades."""
 
 FIERYNESS: Final = (
-    "unburnt",
-    "heating",
-    "burning",
-    "inferno",
-    "water-damaged",
-    "minor-damage",
-    "moderate-damage",
-    "severe-damage",
-    "burnt-out",
-)
+    "unburnt", "heating", "burning", "inferno",
+    "water-damaged", "minor-damage", "moderate-damage", "severe-damage", "burnt-out",
+)  # fmt: skip
 """The official fieryness codes 0 to 8; 1 to 3 burn, 5 to 7 are extinguished."""
 
 MATERIALS: Final = ("wood", "steel", "concrete")
@@ -358,16 +343,8 @@ class StepRecord:
 
 
 STEP_TOPICS: Final[tuple[type[Any], ...]] = (
-    Draws,
-    Observations,
-    Decisions,
-    Brigades,
-    Buildings,
-    Civilians,
-    Rewards,
-    Score,
-    Events,
-)
+    Draws, Observations, Decisions, Brigades, Buildings, Civilians, Rewards, Score, Events,
+)  # fmt: skip
 """The topics of a step in the order in which things happen (then /snapshot where due, then /commit)."""
 
 PHASES: Final[Mapping[str, str]] = {
@@ -384,7 +361,6 @@ PHASES: Final[Mapping[str, str]] = {
     "/snapshot": "state",
 }
 """The phase of a step that each topic belongs to."""
-
 
 _STEP_TOPICS: Final = {topic.topic.removeprefix("/"): topic for topic in STEP_TOPICS}
 
@@ -422,12 +398,10 @@ class Steps(Protocol):
     @property
     def header(self) -> RunHeader:
         """What identifies the run."""
-        ...
 
     @property
     def city(self) -> CityRecord:
         """The city it ran in."""
-        ...
 
     def __iter__(self) -> Iterator[StepRecord]: ...
 
@@ -439,7 +413,6 @@ class Recording(Steps, Protocol):
     @property
     def steps(self) -> Array:
         """(k,) int64: the committed steps, rising."""
-        ...
 
     def column(self, topic: str, name: str = "") -> Array:
         """Return one field, named as for `find_field`, over all steps: (k, width) of an array field, (k,) of a value.
@@ -448,11 +421,9 @@ class Recording(Steps, Protocol):
             FieldError: there is no such field, or its length changes from step to step (sites, events); for those
                 there is `ragged`.
         """
-        ...
 
     def ragged(self, topic: str, name: str = "") -> Sequence[Array]:
         """Return one array field over all steps as a list of k arrays."""
-        ...
 
 
 @runtime_checkable
@@ -462,17 +433,14 @@ class StoredRun(Recording, Protocol):
     @property
     def digest(self) -> str:
         """The identity of the run, 64 hexadecimal digits; empty if it is not known."""
-        ...
 
     @property
     def state(self) -> str:
         """complete, partial or damaged."""
-        ...
 
     @property
     def damage(self) -> str | None:
         """What is wrong, and up to which step it is good; None if nothing is wrong."""
-        ...
 
     def __len__(self) -> int: ...
 
@@ -482,7 +450,6 @@ class StoredRun(Recording, Protocol):
         Raises:
             LogError: there is no such step.
         """
-        ...
 
 
 class RecordingBase(ABC):
@@ -501,7 +468,7 @@ class RecordingBase(ABC):
         """Yield a field, as `find_field` returns it, of every step."""
 
     def column(self, topic: str, name: str = "") -> Array:
-        """Return one field over all steps: (k, width) of an array field, (k,) of a value.
+        """Return one field over all steps, as `Recording` defines it.
 
         Raises:
             FieldError: there is no such field, or its length changes from step to step; then use `ragged`.
@@ -570,9 +537,5 @@ class MemoryRecording(RecordingBase):
         return (getattr(getattr(record, record_type.topic[1:]), item.name) for record in self._records)
 
     def step(self, number: int) -> StepRecord:
-        """Return one step.
-
-        Raises:
-            LogError: there is no such step.
-        """
+        """Return one step; errors as for `position`."""
         return self._records[self.position(number)]

@@ -30,7 +30,7 @@ def cover_cells(footprints: Footprints, cell_mm: int, *, where: str = "city") ->
     Args:
         footprints: the buildings.
         cell_mm: side of a cell.
-        where: name of the city for complaints.
+        where: name of the city in errors.
 
     Raises:
         CityError: the city is too large for the grid, or a building covers no sample point.

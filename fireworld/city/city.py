@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Footprints:
-    """What a map says of its n buildings. Lengths in whole millimetres, as in official files."""
+    """The n buildings of a map. Lengths in whole millimetres, as in official files."""
 
     building_id: Int64Array  # (n,)
     refuge: UInt8Array  # (n,) 1 where tanks are refilled
@@ -34,7 +34,7 @@ class Footprints:
 
 @dataclass(frozen=True)
 class StreetMap:
-    """What a map says of its streets: a graph with m nodes and k streets."""
+    """The streets of a map: a graph with m nodes and k streets."""
 
     node_mm: Int32Array  # (m, 2)
     street: Int32Array  # (k, 2) the two nodes of each street; straight between them

@@ -1,4 +1,4 @@
-"""Reading the parts of a JSON document with complaints that name file, place and key."""
+"""Reading the parts of a JSON document with errors that name file, place and key."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ class Fields:
 
     where: str
     prefix: str
-    """What stands before its keys in complaints, such as `streets.`"""
+    """What stands before its keys in errors, such as `streets.`"""
     value: Any
 
     def refuse(self, key: str, wanted: str, got: object) -> Never:
-        """Complain about one key."""
+        """Raise CityError for one key."""
         raise CityError(expected(self.where, f"{self.prefix}{key}".rstrip(".: "), wanted, got))
 
     def object(self) -> dict[str, Any]:
@@ -31,7 +31,7 @@ class Fields:
         return found
 
     def allow_only(self, *known: str) -> None:
-        """Refuse keys that nobody reads: they are slips of the pen."""
+        """Raise CityError for keys that nobody reads: they are slips of the pen."""
         for key in self.object():
             if key not in known:
                 self.refuse(key, f"one of the keys {', '.join(known)}", "another key")

@@ -46,6 +46,70 @@ class _Layout:
         return index * (self.block[axis] * self.lot + self.street) + self.street // 2
 
 
+@dataclass(frozen=True)
+class _Lot:
+    """One lot, of which every property is a draw of its own."""
+
+    layout: _Layout
+    seed: int
+    column: int
+    row: int
+
+    def draw(self, purpose: int, bound: int) -> int:
+        """Draw a whole number in [0, bound) for one property."""
+        return draws.below(self.seed, draws.CITY, _lot_key(self.column, self.row), purpose, bound=bound)
+
+    def building(self, *, building_id: int, fill: tuple[float, float], refuge: bool) -> Building:
+        """Put a building on the lot."""
+        corners = self._footprint(fill)
+        percent = self.draw(MATERIAL, 100)
+        return Building(
+            building_id=building_id,
+            corners_mm=corners,
+            centroid_mm=centroid_mm(corners),
+            floors=FLOORS_OF_DRAW[self.draw(FLOORS, len(FLOORS_OF_DRAW))],
+            material=0 if percent < WOOD_PERCENT else 1 if percent < WOOD_PERCENT + STEEL_PERCENT else 2,
+            ground_area_m2=doubled_area_mm2(corners) // 2_000_000,
+            inflammable=not refuge,
+            refuge=refuge,
+        )
+
+    def _footprint(self, fill: tuple[float, float]) -> list[Corner]:
+        """Draw an outline, counterclockwise from the south-west corner.
+
+        Both sides lie between the roots of the shares of the lot, so their product lies between the shares.
+        """
+        side = self.layout.lot
+        shortest = math.isqrt(round(side * side * fill[0])) + 1
+        longest = max(shortest, math.isqrt(round(side * side * fill[1])))
+        width = shortest + self.draw(WIDTH, longest - shortest + 1)
+        depth = shortest + self.draw(DEPTH, longest - shortest + 1)
+        # An edge is in the middle half of the slack, so that no two buildings ever touch.
+        west = (
+            self.layout.lot_start(0, self.column) + (side - width) // 4 + self.draw(OFFSET_X, (side - width) // 2 + 1)
+        )
+        south = self.layout.lot_start(1, self.row) + (side - depth) // 4 + self.draw(OFFSET_Y, (side - depth) // 2 + 1)
+        east, north = west + width, south + depth
+
+        shape = self.draw(SHAPE, 4 * L_SHAPE_ONE_IN)  # 0 to 3: which corner of an L-shape is missing
+        notch_width = width // 4 + self.draw(NOTCH_WIDTH, width // 4)
+        notch_depth = depth // 4 + self.draw(NOTCH_DEPTH, depth // 4)
+        left = width * depth - notch_width * notch_depth
+        if shape > 3 or left < shortest * shortest:
+            return [(west, south), (east, south), (east, north), (west, north)]
+        inner_x = east - notch_width if shape in {1, 2} else west + notch_width
+        inner_y = north - notch_depth if shape in {2, 3} else south + notch_depth
+        notches = [
+            [(west, inner_y), (inner_x, inner_y), (inner_x, south)],
+            [(inner_x, south), (inner_x, inner_y), (east, inner_y)],
+            [(east, inner_y), (inner_x, inner_y), (inner_x, north)],
+            [(inner_x, north), (inner_x, inner_y), (west, inner_y)],
+        ]
+        corners: list[list[Corner]] = [[(west, south)], [(east, south)], [(east, north)], [(west, north)]]
+        corners[shape] = notches[shape]
+        return [corner for part in corners for corner in part]
+
+
 def generate_plan(
     *,
     columns: int,
@@ -77,13 +141,15 @@ def generate_plan(
         name: name of the city.
 
     Raises:
-        CityError: a figure that makes no city.
+        CityError: a value that makes no city.
     """
     layout = _Layout(lot=round(lot_m * 1000), street=round(street_m * 1000), block=block)
     _check(name, layout, columns=columns, rows=rows, refuges=refuges, fill=fill, hydrant_share=hydrant_share)
     refuge_lots = _refuge_lots(layout, columns, rows, refuges)
     buildings = [
-        _building(layout, seed, column, row, building_id=row * columns + column, fill=fill, refuge_lots=refuge_lots)
+        _Lot(layout, seed, column, row).building(
+            building_id=row * columns + column, fill=fill, refuge=(row, column) in refuge_lots
+        )
         for row in range(rows)
         for column in range(columns)
     ]
@@ -101,7 +167,7 @@ def _check(
     fill: tuple[float, float],
     hydrant_share: float,
 ) -> None:
-    """Refuse figures that make no city."""
+    """Raise CityError for values that make no city."""
 
     def demand(holds: bool, key: str, wanted: str, got: object) -> None:
         if not holds:
@@ -137,69 +203,6 @@ def _refuge_lots(
     return taken
 
 
-def _building(
-    layout: _Layout,
-    seed: int,
-    column: int,
-    row: int,
-    *,
-    building_id: int,
-    fill: tuple[float, float],
-    refuge_lots: set[tuple[int, int]],
-) -> Building:
-    """Put a building on one lot."""
-    corners = _footprint(layout, seed, column, row, fill)
-    refuge = (row, column) in refuge_lots
-    percent = _draw(seed, column, row, MATERIAL, 100)
-    return Building(
-        building_id=building_id,
-        corners_mm=corners,
-        centroid_mm=centroid_mm(corners),
-        floors=FLOORS_OF_DRAW[_draw(seed, column, row, FLOORS, len(FLOORS_OF_DRAW))],
-        material=0 if percent < WOOD_PERCENT else 1 if percent < WOOD_PERCENT + STEEL_PERCENT else 2,
-        ground_area_m2=doubled_area_mm2(corners) // 2_000_000,
-        inflammable=not refuge,
-        refuge=refuge,
-    )
-
-
-def _footprint(layout: _Layout, seed: int, column: int, row: int, fill: tuple[float, float]) -> list[Corner]:
-    """Draw an outline, counterclockwise from the south-west corner.
-
-    Both sides lie between the roots of the shares of the lot, so their product lies between the shares.
-    """
-    shortest = math.isqrt(round(layout.lot * layout.lot * fill[0])) + 1
-    longest = max(shortest, math.isqrt(round(layout.lot * layout.lot * fill[1])))
-    width = shortest + _draw(seed, column, row, WIDTH, longest - shortest + 1)
-    depth = shortest + _draw(seed, column, row, DEPTH, longest - shortest + 1)
-    west = layout.lot_start(0, column) + _offset(layout.lot - width, seed, column, row, OFFSET_X)
-    south = layout.lot_start(1, row) + _offset(layout.lot - depth, seed, column, row, OFFSET_Y)
-    east, north = west + width, south + depth
-
-    shape = _draw(seed, column, row, SHAPE, 4 * L_SHAPE_ONE_IN)  # 0 to 3: which corner of an L-shape is missing
-    notch_width = width // 4 + _draw(seed, column, row, NOTCH_WIDTH, width // 4)
-    notch_depth = depth // 4 + _draw(seed, column, row, NOTCH_DEPTH, depth // 4)
-    left = width * depth - notch_width * notch_depth
-    if shape > 3 or left < shortest * shortest:
-        return [(west, south), (east, south), (east, north), (west, north)]
-    inner_x = east - notch_width if shape in {1, 2} else west + notch_width
-    inner_y = north - notch_depth if shape in {2, 3} else south + notch_depth
-    notches = [
-        [(west, inner_y), (inner_x, inner_y), (inner_x, south)],
-        [(inner_x, south), (inner_x, inner_y), (east, inner_y)],
-        [(east, inner_y), (inner_x, inner_y), (inner_x, north)],
-        [(inner_x, north), (inner_x, inner_y), (west, inner_y)],
-    ]
-    corners: list[list[Corner]] = [[(west, south)], [(east, south)], [(east, north)], [(west, north)]]
-    corners[shape] = notches[shape]
-    return [corner for part in corners for corner in part]
-
-
-def _offset(slack: int, seed: int, column: int, row: int, purpose: int) -> int:
-    """Draw how far a footprint lies from the edge of its lot: the middle half of the slack, so none ever touch."""
-    return slack // 4 + _draw(seed, column, row, purpose, slack // 2 + 1)
-
-
 def _streets(layout: _Layout, seed: int, columns: int, rows: int, hydrant_share: float) -> StreetMap:
     """Lay streets around every block, with a node at each crossing; numbered in row order."""
     across, along = -(-columns // layout.block[0]) + 1, -(-rows // layout.block[1]) + 1
@@ -225,11 +228,6 @@ def _streets(layout: _Layout, seed: int, columns: int, rows: int, hydrant_share:
         street=np.array(streets, dtype=np.int32),
         hydrant_node=np.array(hydrants, dtype=np.int32),
     )
-
-
-def _draw(seed: int, column: int, row: int, purpose: int, bound: int) -> int:
-    """Draw a whole number in [0, bound) for one property of a lot."""
-    return draws.below(seed, draws.CITY, _lot_key(column, row), purpose, bound=bound)
 
 
 def _lot_key(column: int, row: int) -> int:

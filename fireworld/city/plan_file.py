@@ -1,7 +1,7 @@
 """City files: JSON to Plan, every mistake named by file, building and key.
 
 The layout is the one of the official traces: `buildings`, each with id, apexes and more; optional `streets` and
-`hydrants`. What a trace's city says of a run (ignitions, water, brigades) is left to who replays it.
+`hydrants`. What a trace's city has of a run (ignitions, water, brigades) is left to who replays it.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ def parse_plan(text: bytes, *, where: str, name: str = "city") -> Plan:
 
     Args:
         text: JSON.
-        where: what to call the file in complaints.
-        name: name of a city that does not say its own.
+        where: what errors call the file.
+        name: name of a city without one of its own.
 
     Raises:
         CityError: it makes no city.
@@ -56,14 +56,14 @@ def parse_plan(text: bytes, *, where: str, name: str = "city") -> Plan:
             document.refuse(f"buildings.{index}.id", "an identifier of its own", building.building_id)
         taken.add(building.building_id)
         buildings.append(building)
-    _refuse_crossing_outlines(document, buildings)
+    _check_outlines(document, buildings)
     footprints = assemble(buildings)
     streets = _streets(document, footprints)
     return freeze(Plan(name=document.text("name", default=name), footprints=footprints, streets=streets))
 
 
 def _parse_json(text: bytes, where: str) -> Any:
-    """Parse JSON, refusing what Python would let pass: repeated keys, NaN and infinities."""
+    """Parse JSON, but not what Python would let pass: repeated keys, NaN and infinities."""
 
     def pairs(items: list[tuple[str, Any]]) -> dict[str, Any]:
         found: dict[str, Any] = {}
@@ -133,8 +133,8 @@ def _corners(item: Fields) -> list[Corner]:
     return corners
 
 
-def _refuse_crossing_outlines(document: Fields, buildings: list[Building]) -> None:
-    """Refuse the first building whose outline crosses or touches itself."""
+def _check_outlines(document: Fields, buildings: list[Building]) -> None:
+    """Raise CityError for the first building whose outline crosses or touches itself."""
     import shapely
 
     corners = np.array([corner for building in buildings for corner in building.corners_mm], dtype=np.float64)

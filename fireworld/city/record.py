@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from fireworld.city.city import Array, City
@@ -30,15 +32,12 @@ def city_record(
     """
     footprints, streets, air = city.footprints, city.streets, city.air
     middle_x, middle_y = city.middle_mm
-    hydrants = streets.node_mm[streets.hydrant_node]
     return CityRecord(
         name=city.name,
         building_id=footprints.building_id.astype(np.int32),
         outline_ptr=footprints.outline_ptr,
-        outline_x_m=_metres(footprints.outline_mm[:, 0]),
-        outline_y_m=_metres(footprints.outline_mm[:, 1]),
-        center_x_m=_metres(footprints.centroid_mm[:, 0]),
-        center_y_m=_metres(footprints.centroid_mm[:, 1]),
+        **_in_metres("outline", footprints.outline_mm),
+        **_in_metres("center", footprints.centroid_mm),
         floors=footprints.floors,
         material=footprints.material,
         inflammable=footprints.inflammable,
@@ -51,15 +50,12 @@ def city_record(
         link_ptr=city.links.ptr,
         link_building=city.links.building,
         link_share=city.links.share,
-        node_x_m=_metres(streets.node_mm[:, 0]),
-        node_y_m=_metres(streets.node_mm[:, 1]),
+        **_in_metres("node", streets.node_mm),
         street_from=np.ascontiguousarray(streets.street[:, 0]),
         street_to=np.ascontiguousarray(streets.street[:, 1]),
         refuge_building=np.flatnonzero(footprints.refuge).astype(np.int32),
-        hydrant_x_m=_metres(hydrants[:, 0]),
-        hydrant_y_m=_metres(hydrants[:, 1]),
-        civilian_x_m=_metres(np.asarray(civilian_mm).reshape(-1, 2)[:, 0]),
-        civilian_y_m=_metres(np.asarray(civilian_mm).reshape(-1, 2)[:, 1]),
+        **_in_metres("hydrant", streets.node_mm[streets.hydrant_node]),
+        **_in_metres("civilian", np.asarray(civilian_mm).reshape(-1, 2)),
         civilian_building=np.asarray(civilian_building, dtype=np.int32),
         civilian_hp=np.asarray(civilian_hp, dtype=np.int32),
         brigade_tank_litres=np.full(n_brigades, brigades.tank_litres, dtype=np.int32),
@@ -75,6 +71,6 @@ def city_record(
     )
 
 
-def _metres(length_mm: Array) -> Array:
-    """Turn whole millimetres into metres."""
-    return length_mm / 1000.0
+def _in_metres(name: str, points_mm: Array) -> dict[str, Any]:
+    """Return the fields with the coordinates of points, (n, 2) whole millimetres."""
+    return {f"{name}_{axis}_m": points_mm[:, k] / 1000.0 for k, axis in enumerate("xy")}

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 if TYPE_CHECKING:
-    from fireworld.conformance.check import FirstDifference, Pair, Report
-    from fireworld.conformance.measure import Tally
+    from fireworld.conformance.check import FirstDifference, Pair, Report, Tally
 
 _HEADINGS: Final = {
     "fieryness": "codes",

@@ -1,4 +1,4 @@
-"""Reading the arrays of a trace file (.npz) with complaints that name file, array and place."""
+"""Reading the arrays of a trace file (.npz) with errors that name file, array and place."""
 
 from __future__ import annotations
 
@@ -20,21 +20,9 @@ from fireworld.errors import TraceError, expected
 
 SHAPED: Final = "a file with arrays (.npz)"
 UNREADABLE: Final = (
-    ValueError,
-    EOFError,
-    KeyError,
-    IndexError,
-    TypeError,
-    MemoryError,
-    OverflowError,
-    RuntimeError,
-    zipfile.BadZipFile,
-    zlib.error,
-    lzma.LZMAError,
-    struct.error,
-    tokenize.TokenError,
-    SyntaxError,
-)
+    ValueError, EOFError, LookupError, TypeError, MemoryError, OverflowError, RuntimeError, SyntaxError,
+    zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, tokenize.TokenError,
+)  # fmt: skip
 """What zipfile and numpy raise on damaged, encrypted or malicious files."""
 
 
@@ -49,11 +37,11 @@ class Arrays:
         return key in self.stored
 
     def refuse(self, key: str, wanted: str, got: object) -> Never:
-        """Complain about one array."""
+        """Raise for one array."""
         raise TraceError(expected(self.where, key, wanted, got))
 
     def refuse_first(self, key: str, wrong: Array, wanted: str, values: Array) -> None:
-        """Complain about the first element where `wrong` is true, if there is one."""
+        """Raise for the first element where `wrong` is true, if there is one."""
         if wrong.any():
             place = np.unravel_index(int(np.argmax(wrong)), wrong.shape)
             index = "".join(f"[{int(i)}]" for i in place)
@@ -105,7 +93,7 @@ class Arrays:
         return found
 
     def _check_shape(self, key: str, found: Array, shape: tuple[int | None, ...]) -> None:
-        """Refuse an array of another shape."""
+        """Raise for an array of another shape."""
         fits = len(found.shape) == len(shape) and all(
             wanted is None or length == wanted for length, wanted in zip(found.shape, shape, strict=True)
         )

@@ -1,20 +1,63 @@
-"""Check: a trace replayed and compared, output by output, and what there is to say about it."""
+"""Check: a trace replayed and compared, output by output: how far apart they are, and what counts as a difference."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
-from fireworld.city.city import Array, City
+from fireworld.city.city import Array, City, Float64Array
 from fireworld.conformance.city_file import CityFile
 from fireworld.conformance.configuration import RAY_KEYS
-from fireworld.conformance.derived import TableDifference, differing_tables
-from fireworld.conformance.measure import Tally
+from fireworld.conformance.derived import RELATIVE_TOLERANCE, TableDifference, differing_tables
 from fireworld.conformance.replay import Moment, prepare, replay
 from fireworld.conformance.trace import Series, Trace, load_trace
+
+EXACT: Final = frozenset({"fieryness", "fuel", "water", "ever_watered", "tank", "requests"})
+"""Outputs that must be equal; the others may be apart by the tolerance."""
+
+
+@dataclass
+class Tally:
+    """How one output compares over all steps so far."""
+
+    name: str
+    n_compared: int = 0
+    n_differing: int = 0
+    largest: float | None = None
+    """Largest relative difference; None for outputs that must be equal."""
+
+    def add(self, ours: Array, theirs: Array, *, scale: Array | float, resolution: float) -> Array:
+        """Compare the values of a step and return where they differ, bool of the same shape.
+
+        A difference is relative to the greater of the trace's value and a scale, because what is left of a building's
+        heat after it was cooled all the way is rounding noise: relative to itself it means nothing.
+
+        Args:
+            ours: computed here.
+            theirs: the trace's.
+            scale: what counts as a small value: for energies the heat capacity, which is one degree.
+            resolution: rounding of the trace's type; the tolerance is not finer than that.
+        """
+        if self.name in EXACT:
+            with np.errstate(over="ignore"):
+                differs: Array = ours != theirs.astype(ours.dtype)
+        else:
+            gap = relative_gap(ours, theirs, scale)
+            self.largest = max(self.largest or 0.0, float(gap.max(initial=0.0)))
+            differs = gap > max(RELATIVE_TOLERANCE, resolution)
+        self.n_compared += differs.size
+        self.n_differing += int(np.count_nonzero(differs))
+        return differs
+
+
+def relative_gap(ours: Array, theirs: Array, scale: Array | float) -> Float64Array:
+    """Return |ours - theirs| / max(|theirs|, scale), infinite where ours is not finite."""
+    with np.errstate(all="ignore"):
+        gap = np.abs(ours - theirs) / np.maximum(np.abs(theirs), scale)
+    return np.where(np.isfinite(gap), gap, np.inf)
 
 
 @dataclass(frozen=True)
@@ -80,16 +123,16 @@ def check(city_file: CityFile, path: Path) -> Report:
         CityError: the city cannot be built with the trace's parameters.
     """
     trace = load_trace(path, city_file)
-    setting = prepare(city_file, trace)
+    own_city, city, fire = prepare(city_file, trace)
     with_rays = trace.configuration.has(RAY_KEYS)
-    tables = differing_tables(trace.arrays, setting.own_city, setting.fire, with_rays=with_rays)
-    comparison = Comparison(trace, setting.city)
-    for moment in replay(city_file, trace, setting):
+    tables = differing_tables(trace.arrays, own_city, fire, with_rays=with_rays)
+    comparison = Comparison(trace, city)
+    for moment in replay(city_file, trace, city, fire):
         comparison.add(moment)
     return Report(
         trace=trace.where,
         n_steps=trace.n_steps,
-        n_buildings=setting.city.n_buildings,
+        n_buildings=city.n_buildings,
         tallies=comparison.tallies,
         tables=tuple(tables),
         first_difference=comparison.first,
@@ -98,7 +141,7 @@ def check(city_file: CityFile, path: Path) -> Report:
 
 
 def _notes(trace: Trace, city_name: str) -> list[str]:
-    """Say what the trace does not have, and what makes one wonder."""
+    """List what the trace does not have, and what makes one wonder."""
     notes = []
     if trace.order is None:
         notes.append("the trace has no order: fireworld's own is used")
@@ -114,7 +157,7 @@ def _notes(trace: Trace, city_name: str) -> list[str]:
 
 
 def _is_comparable(series: Series, trace: Trace, city: City) -> bool:
-    """Tell whether an output has the same shape here; of another air grid the derived tables tell already."""
+    """Return whether an output has the same shape here; another air grid is a difference of the derived tables."""
     if series.name != "air" or series.values.shape[1:] == city.air.shape:
         return True
     if "grid_shape" not in trace.arrays:
@@ -165,7 +208,7 @@ class Comparison:
             self.first = self._describe(name, moment, place, Pair(ours[place].item(), theirs[place].item()))
 
     def _describe(self, name: str, moment: Moment, place: tuple[int, ...], values: Pair) -> FirstDifference:
-        """Say where an output differs; of a building, its code and energy too."""
+        """Describe where an output differs; of a building, its code and energy too."""
         if name == "requests":
             requests = self._trace.requests
             assert requests is not None  # noqa: S101 - there is an output of them

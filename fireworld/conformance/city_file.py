@@ -1,4 +1,4 @@
-"""What a trace's city file says of the run: fires lit, water poured, brigades and what they asked for."""
+"""What a trace's city file has of the run: fires lit, water poured, brigades and what they asked for."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def load_city_file(path: Path) -> CityFile:
     """Read a city file.
 
     Raises:
-        CityError: it cannot be read, makes no city, or tells of something that the city does not have.
+        CityError: it cannot be read, makes no city, or names something that the city does not have.
     """
     try:
         text = path.read_bytes()

@@ -77,11 +77,7 @@ class Configuration:
         return section(**values)
 
     def number(self, key: str) -> float:
-        """Return the value of one key.
-
-        Raises:
-            TraceError: it is missing or no number.
-        """
+        """Return the value of one key; TraceError if it is missing or no number."""
         found = self.values.get(PREFIX + key)
         if found is None:
             self._refuse(key, "this key to be set", "nothing")
@@ -106,11 +102,7 @@ class Configuration:
 
 
 def read_configuration(where: str, text: str) -> Configuration:
-    """Parse the JSON text of a configuration.
-
-    Raises:
-        TraceError: it is no JSON object.
-    """
+    """Parse the JSON text of a configuration; TraceError if it is no JSON object."""
     try:
         values = json.loads(text)
     except (ValueError, RecursionError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -10,80 +11,46 @@ import numpy as np
 from fireworld.city.city import Array, City
 from fireworld.city.links import wall_table
 from fireworld.conformance.arrays import Arrays
-from fireworld.conformance.measure import RELATIVE_TOLERANCE
 from fireworld.parameters import FireParameters
 
-BUILDING_TABLES: Final = (
-    "x",
-    "y",
-    "floors",
-    "code",
-    "ground_area",
-    "inflammable",
-    "wall_area",
-    "volume",
-    "capacity",
-    "init_fuel",
-    "ignition_point",
-    "order",
-)
-"""Tables with an entry for each building."""
-OTHER_TABLES: Final = (
-    "apex_ptr",
-    "apexes",
-    "cell_size",
-    "grid_origin",
-    "grid_shape",
-    "cell_ptr",
-    "cell_x",
-    "cell_y",
-    "cell_pct",
-)
-RAY_TABLES: Final = ("ray_base", "walls")
-DERIVED: Final = (*BUILDING_TABLES, *OTHER_TABLES, *RAY_TABLES)
+BUILDING_TABLES: Final[Mapping[str, Callable[[City], Array]]] = {
+    "x": lambda city: city.footprints.centroid_mm[:, 0],
+    "y": lambda city: city.footprints.centroid_mm[:, 1],
+    "floors": lambda city: city.footprints.floors,
+    "code": lambda city: city.footprints.material,
+    "ground_area": lambda city: city.footprints.ground_area_m2,
+    "inflammable": lambda city: city.footprints.inflammable,
+    "wall_area": lambda city: city.wall_area_m2,
+    "volume": lambda city: city.volume_m3,
+    "capacity": lambda city: city.heat_capacity,
+    "init_fuel": lambda city: city.initial_fuel,
+    "ignition_point": lambda city: city.ignition_point,
+    "order": lambda city: city.order,
+}
+"""Tables with an entry for each building, by name, in the units and shapes that they have in a trace."""
+OTHER_TABLES: Final[Mapping[str, Callable[[City], Array]]] = {
+    "apex_ptr": lambda city: city.footprints.outline_ptr,
+    "apexes": lambda city: city.footprints.outline_mm,
+    "cell_size": lambda city: np.array([city.air.cell_mm]),
+    "grid_origin": lambda city: np.array(city.air.origin_mm),
+    "grid_shape": lambda city: np.array(city.air.shape),
+    "cell_ptr": lambda city: city.air.ptr,
+    "cell_x": lambda city: city.air.x,
+    "cell_y": lambda city: city.air.y,
+    "cell_pct": lambda city: city.air.percent,
+}
+DERIVED: Final = (*BUILDING_TABLES, *OTHER_TABLES, "ray_base", "walls")
+RELATIVE_TOLERANCE: Final = 1e-9
 
 
 @dataclass(frozen=True)
 class TableDifference:
-    """A table that fireworld derives otherwise than the trace."""
+    """A table that fireworld derives differently from the trace."""
 
     table: str
     n_entries: int
     n_differing: int
     sentence: str
-
-
-def derived_tables(city: City, fire: FireParameters) -> dict[str, Array]:
-    """Collect the tables of a city under the names, and in the units and shapes, that they have in a trace."""
-    footprints, air = city.footprints, city.air
-    walls = wall_table(footprints, city.order, fire)
-    start = np.column_stack([walls.x, walls.y])
-    end = start + np.column_stack([walls.dx, walls.dy])
-    return {
-        "x": footprints.centroid_mm[:, 0],
-        "y": footprints.centroid_mm[:, 1],
-        "floors": footprints.floors,
-        "code": footprints.material,
-        "ground_area": footprints.ground_area_m2,
-        "inflammable": footprints.inflammable,
-        "wall_area": city.wall_area_m2,
-        "volume": city.volume_m3,
-        "capacity": city.heat_capacity,
-        "init_fuel": city.initial_fuel,
-        "ignition_point": city.ignition_point,
-        "order": city.order,
-        "apex_ptr": footprints.outline_ptr,
-        "apexes": footprints.outline_mm,
-        "cell_size": np.array([air.cell_mm]),
-        "grid_origin": np.array(air.origin_mm),
-        "grid_shape": np.array(air.shape),
-        "cell_ptr": air.ptr,
-        "cell_x": air.x,
-        "cell_y": air.y,
-        "cell_pct": air.percent,
-        "ray_base": np.bincount(walls.building, weights=walls.n_rays).astype(np.int64),
-        "walls": np.column_stack([walls.building, start, end, walls.n_rays]),
-    }
 
 
 def differing_tables(arrays: Arrays, city: City, fire: FireParameters, *, with_rays: bool) -> list[TableDifference]:
@@ -98,9 +65,15 @@ def differing_tables(arrays: Arrays, city: City, fire: FireParameters, *, with_r
     Raises:
         TraceError: a table has a wrong shape or something that is no number.
     """
+    derived = {name: table(city) for name, table in {**BUILDING_TABLES, **OTHER_TABLES}.items()}
+    if with_rays:
+        walls = wall_table(city.footprints, city.order, fire)
+        ends = (walls.x, walls.y, walls.x + walls.dx, walls.y + walls.dy)
+        derived["ray_base"] = np.bincount(walls.building, weights=walls.n_rays).astype(np.int64)
+        derived["walls"] = np.column_stack([walls.building, *ends, walls.n_rays])
     found = []
-    for name, ours in derived_tables(city, fire).items():
-        if name in arrays and (with_rays or name not in RAY_TABLES):
+    for name, ours in derived.items():
+        if name in arrays:
             length = city.n_buildings if name in (*BUILDING_TABLES, "ray_base") else None
             theirs = arrays.floats(name, length, *ours.shape[1:])
             difference = _compare(name, ours, theirs, city, stored=arrays.get(name).dtype)

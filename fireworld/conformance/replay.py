@@ -20,7 +20,7 @@ from fireworld.simulation.city_arrays import air_inside, brigade_constants, city
 from fireworld.simulation.state import fresh_brigades, fresh_fire
 
 RAY_SEED = 1
-"""Luck of the rays where a trace has no links."""
+"""Seed of the random rays where a trace has no links."""
 
 
 @dataclass(frozen=True)
@@ -32,21 +32,8 @@ class Moment:
     results: list[int]  # codes of the step's requests
 
 
-@dataclass(frozen=True)
-class Setting:
-    """What a replay starts from."""
-
-    own_city: City  # as fireworld builds it
-    city: City  # with the order and the links of the trace
-    fire: FireParameters
-
-
 def fire_parameters(trace: Trace) -> FireParameters:
-    """Return the trace's parameters; those that its other arrays make superfluous may be missing.
-
-    Raises:
-        TraceError: one that is needed is missing, or out of bounds.
-    """
+    """Return the trace's parameters; TraceError if one is missing that its other arrays do not replace."""
     keys = dict(FIRE_KEYS)
     for group, needed in ((BURN_KEYS, trace.rates is None), (RAY_KEYS, trace.links is None)):
         if needed or trace.configuration.has(group):
@@ -58,38 +45,41 @@ def fire_parameters(trace: Trace) -> FireParameters:
     return fire
 
 
-def prepare(city_file: CityFile, trace: Trace) -> Setting:
+def prepare(city_file: CityFile, trace: Trace) -> tuple[City, City, FireParameters]:
     """Build the city as the trace's parameters want it.
+
+    Returns:
+        The city as fireworld builds it, the same with the order and the links of the trace, and the parameters.
 
     Raises:
         CityError: it cannot be built, such as with these air cells.
         TraceError: a parameter is missing or out of bounds.
     """
     fire = fire_parameters(trace)
-    named = replace(city_file.plan, name=city_file.where)  # what complaints begin with
+    named = replace(city_file.plan, name=city_file.where)  # what errors begin with
     own = build_city(named, fire, seed=RAY_SEED)
     city = own
     if trace.links is not None:
         city = with_links(city, ptr=trace.links.ptr, building=trace.links.building, share=trace.links.share)
     if trace.order is not None:
         city = with_order(city, trace.order)
-    return Setting(own, city, fire)
+    return own, city, fire
 
 
-def replay(city_file: CityFile, trace: Trace, setting: Setting) -> Iterator[Moment]:
+def replay(city_file: CityFile, trace: Trace, city: City, parameters: FireParameters) -> Iterator[Moment]:
     """Run the engine through all steps of a trace and yield the state after each, step 0 first.
 
     Raises:
         TraceError: a building burns in more steps than the trace has rates for, or a parameter of the brigades is
             missing.
     """
-    inputs, fire_is = city_file.inputs, fire_constants(setting.fire)
-    tables, fire = city_arrays(setting.city, setting.fire), fresh_fire(setting.city)
-    crew = Crew(city_file, trace, tables, setting.city) if inputs.brigade_id or inputs.requests else None
-    rates = Rates(trace, setting)
+    inputs, fire_is = city_file.inputs, fire_constants(parameters)
+    tables, fire = city_arrays(city, parameters), fresh_fire(city)
+    crew = Crew(city_file, trace, tables, city) if inputs.brigade_id or inputs.requests else None
+    rates = Rates(trace, city, parameters)
     for b in inputs.ignitions:
         ignite(b, tables.buildings, fire)
-    yield _moment(0, setting.city, fire, crew, [])
+    yield _moment(0, city, fire, crew, [])
     for step in range(1, trace.n_steps + 1):
         for b in inputs.later_ignitions.get(step, ()):
             ignite(b, tables.buildings, fire)
@@ -99,7 +89,7 @@ def replay(city_file: CityFile, trace: Trace, setting: Setting) -> Iterator[Mome
         results = crew.act(step, fire) if crew is not None else []
         fire.rate[:] = rates.take(fire.fieryness, step)
         advance_fire(tables.buildings, tables.cover, tables.links, fire, fire_is)
-        yield _moment(step, setting.city, fire, crew, results)
+        yield _moment(step, city, fire, crew, results)
 
 
 def _moment(step: int, city: City, fire: FireState, crew: Crew | None, results: list[int]) -> Moment:
@@ -121,12 +111,11 @@ def _moment(step: int, city: City, fire: FireState, crew: Crew | None, results: 
 class Rates:
     """The burn rates of a trace: in every step in which a building burns it takes the next of its list."""
 
-    def __init__(self, trace: Trace, setting: Setting) -> None:
-        n = setting.city.n_buildings
+    def __init__(self, trace: Trace, city: City, parameters: FireParameters) -> None:
         self._trace = trace
-        self._identifiers = setting.city.footprints.building_id
-        self._constant = np.full(n, setting.fire.burn_rate_mean)
-        self._taken = np.zeros(n, dtype=np.int64)
+        self._identifiers = city.footprints.building_id
+        self._constant = np.full(city.n_buildings, parameters.burn_rate_mean)
+        self._taken = np.zeros(city.n_buildings, dtype=np.int64)
 
     def take(self, codes: Array, step: int) -> Array:
         """Return the rates of a step, (n,); codes (n,) are those before it."""
@@ -146,7 +135,7 @@ class Rates:
 
 
 class Crew:
-    """The brigades of a city file: moved as it says, refilled and judged by the engine.
+    """The brigades of a city file: moved by its rows, refilled and judged by the engine.
 
     Attributes:
         team: their state, by rising id.
@@ -164,7 +153,7 @@ class Crew:
         self._place(self._inputs.start)
 
     def act(self, step: int, fire: FireState) -> list[int]:
-        """Move, refill and spray as a step's rows say; return the requests' result codes."""
+        """Move, refill and spray by a step's rows; return the requests' result codes."""
         team = self.team
         self._place(self._inputs.moves.get(step, ()))
         refill(team.refuge, team.hydrant, team.hp, team.tank, self._constants)

@@ -2,13 +2,14 @@
 
 PyYAML reads YAML 1.1, where `no` is false, `010` is eight and `12:30` is 750, and where a key written twice
 silently wins. Here such words stay text (so that the type check names them), a key may be written once, and
-anchors, aliases and tags are refused.
+anchors, aliases and tags are errors.
 """
 
 from __future__ import annotations
 
 import math
 import re
+from functools import partial
 from typing import Any, Final
 
 import yaml
@@ -22,7 +23,7 @@ NULL: Final = re.compile(r"(?:null|~|)$")
 CORE: Final = "tag:yaml.org,2002:"
 
 
-class _RefusedError(yaml.MarkedYAMLError):
+class _ForbiddenError(yaml.MarkedYAMLError):
     """Good YAML that a scenario may not use."""
 
     def __init__(self, wanted: str, got: str, mark: yaml.Mark) -> None:
@@ -36,33 +37,33 @@ class _Reader(yaml.SafeLoader):
     yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012 -- PyYAML's own class attribute, filled below
 
     def compose_node(self, parent: Any, index: Any) -> Any:
-        """Refuse aliases and anchors: a scenario says each thing once, where it belongs."""
+        """Raise for aliases and anchors: a scenario has each thing once, where it belongs."""
         event = self.peek_event()  # type: ignore[no-untyped-call]  # the stubs leave it out
         if getattr(event, "anchor", None):
-            raise _RefusedError("every value written out", f"the anchor or alias {event.anchor}", event.start_mark)
+            raise _ForbiddenError("every value written out", f"the anchor or alias {event.anchor}", event.start_mark)
         if getattr(event, "tag", None):
-            raise _RefusedError("values without tags", f"the tag {event.tag}", event.start_mark)
+            raise _ForbiddenError("values without tags", f"the tag {event.tag}", event.start_mark)
         return super().compose_node(parent, index)
 
     def construct_scalar(self, node: Any) -> Any:
-        """Join characters that JSON writes as two escapes; refuse half of such a pair, which is no text."""
+        """Join characters that JSON writes as two escapes; raise for half of such a pair, which is no text."""
         text = super().construct_scalar(node)
         if text.isascii():
             return text
         try:
             return text.encode("utf-16", "surrogatepass").decode("utf-16")
         except UnicodeDecodeError:
-            raise _RefusedError("Unicode text", "half a surrogate pair", node.start_mark) from None
+            raise _ForbiddenError("Unicode text", "half a surrogate pair", node.start_mark) from None
 
     def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
-        """Refuse keys that are written twice, or are not text."""
+        """Raise for keys that are written twice, or are not text."""
         mapping: dict[Any, Any] = {}
         for key_node, value_node in node.value:
             key = self.construct_object(key_node, deep=True)
             if not isinstance(key, str):
-                raise _RefusedError("a word as key", repr(key), key_node.start_mark)
+                raise _ForbiddenError("a word as key", repr(key), key_node.start_mark)
             if key in mapping:
-                raise _RefusedError("each key once", f"{key!r} a second time", key_node.start_mark)
+                raise _ForbiddenError("each key once", f"{key!r} a second time", key_node.start_mark)
             mapping[key] = self.construct_object(value_node, deep=deep)
         return mapping
 
@@ -82,18 +83,13 @@ def _text(writer: _Writer, text: str) -> yaml.ScalarNode:
     return writer.represent_scalar(CORE + "str", text, style=style)
 
 
-def _mapping(loader: _Reader, node: yaml.MappingNode) -> dict[Any, Any]:
-    """Read a mapping whole."""
-    return loader.construct_mapping(node, deep=True)
-
-
 def _float(loader: _Reader, node: yaml.ScalarNode) -> float | str:
     """Read a number; one too large for a float stays text, so that the type check shows it as it was written."""
     number = float(loader.construct_scalar(node))
     return number if math.isfinite(number) else str(node.value)
 
 
-_Reader.add_constructor(CORE + "map", _mapping)
+_Reader.add_constructor(CORE + "map", partial(_Reader.construct_mapping, deep=True))
 _Reader.add_constructor(CORE + "float", _float)
 for _kind, _pattern in (("int", INTEGER), ("float", FLOAT), ("bool", BOOLEAN), ("null", NULL)):
     _Reader.add_implicit_resolver(CORE + _kind, _pattern, None)
@@ -124,7 +120,7 @@ def read_yaml(text: bytes | str, *, source: str) -> Any:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f"{source}: line {mark.line + 1}, column {mark.column + 1}" if mark else source
-        if isinstance(error, _RefusedError):
+        if isinstance(error, _ForbiddenError):
             raise ScenarioError(expected(where, "", error.wanted, str(error.problem))) from None
         raise ScenarioError(expected(where, "", "YAML", _broken(error.problem or error.context))) from None
     except yaml.YAMLError as error:

@@ -1,7 +1,8 @@
 """Records to protobuf bytes and back, without the protobuf library: flat messages, packed arrays, one pass.
 
 Arrays travel as their own little-endian bytes, so both directions are a copy. The bytes are those that the protobuf
-library writes: fields by rising number, zeros and empty arrays left out.
+library writes: fields by rising number, zeros and empty arrays left out. What decodes raises LogError for bytes that
+are not such a message.
 """
 
 from __future__ import annotations
@@ -144,11 +145,7 @@ def _read_varint(data: Buffer, position: int) -> tuple[int, int]:
 
 
 def walk(data: Buffer) -> Iterator[tuple[int, int, Any]]:
-    """Yield number, wire type and raw value (an int, or the bytes as they lie there) of every field.
-
-    Raises:
-        LogError: the bytes are not a protobuf message.
-    """
+    """Yield number, wire type and raw value (an int, or the bytes as they lie there) of every field."""
     position, end = 0, len(data)
     while position < end:
         tag = data[position]
@@ -229,11 +226,7 @@ def _read(slot: _Slot, wire_type: int, raw: Any) -> Any:
 
 
 def decode(record_type: type[RecordType], data: Buffer) -> RecordType:
-    """Decode a record; unknown fields are skipped, absent ones are zero or empty.
-
-    Raises:
-        LogError: the bytes are not a message of this type.
-    """
+    """Decode a record; unknown fields are skipped, absent ones are zero or empty."""
     layout = _layout(record_type).slots
     values: dict[str, Any] = {}
     for number, wire_type, raw in walk(data):
@@ -250,11 +243,7 @@ def decode(record_type: type[RecordType], data: Buffer) -> RecordType:
 
 
 def decode_field(record_type: type[Any], number: int, data: Buffer) -> Any:
-    """Decode one field and step over the others.
-
-    Raises:
-        LogError: the bytes are not a message of this type.
-    """
+    """Decode one field and step over the others."""
     slot = _layout(record_type).slots[number]
     for found, wire_type, raw in walk(data):
         if found == number:
@@ -278,11 +267,7 @@ def encode_snapshot(arrays: Mapping[str, Array]) -> bytes:
 
 
 def decode_snapshot(data: Buffer) -> Snapshot:
-    """Decode named arrays.
-
-    Raises:
-        LogError: the bytes are not a snapshot.
-    """
+    """Decode named arrays."""
     arrays: dict[str, Array] = {}
     for number, wire_type, raw in walk(data):
         if number != 1:

@@ -1,7 +1,8 @@
 """Read an MCAP file that may be damaged: every length is checked before it is believed.
 
 The readers of the mcap library trust record lengths, return nothing of a truncated file, and raise whatever a
-flipped byte makes them stumble over; this reads the little of the container that a log uses.
+flipped byte makes them stumble over; this reads the little of the container that a log uses. Every function raises
+LogError for what is damaged, and TruncatedError where the file ends too early.
 """
 
 from __future__ import annotations
@@ -111,10 +112,6 @@ def records(file: IO[bytes], size: int) -> Iterator[Record]:
     Args:
         file: positioned at the start of a record.
         size: bytes of the file, or those of them to read.
-
-    Raises:
-        TruncatedError: the file ends inside the data section.
-        LogError: the bytes are not a record.
     """
     offset = file.tell()
     while True:
@@ -149,10 +146,6 @@ def check_tail(tail: bytes, offset: int) -> None:
     Args:
         tail: the bytes after the data section.
         offset: where they begin in the file.
-
-    Raises:
-        TruncatedError: the tail is cut off.
-        LogError: the tail is damaged.
     """
     n_end = _RECORD.size + _FOOTER.size + len(MAGIC)
     if len(tail) < n_end or tail[-len(MAGIC) :] != MAGIC:
@@ -170,9 +163,6 @@ def unpack_chunk(body: bytes, decompressor: zstandard.ZstdDecompressor) -> bytes
     Args:
         body: of the chunk record.
         decompressor: used for chunk after chunk, because making one takes as long as a chunk.
-
-    Raises:
-        LogError: the chunk is damaged.
     """
     fields = Fields(body)
     _, _, size, checksum = fields.numbers("<QQQI")
@@ -197,11 +187,7 @@ def unpack_chunk(body: bytes, decompressor: zstandard.ZstdDecompressor) -> bytes
 
 
 def split(block: bytes, position: int = 0) -> Iterator[tuple[int, int, memoryview]]:
-    """Yield position, opcode and body of every record inside a chunk.
-
-    Raises:
-        LogError: a record is longer than its chunk, or does not belong into one.
-    """
+    """Yield position, opcode and body of every record inside a chunk; LogError for one that does not belong there."""
     view, end = memoryview(block), len(block)
     while position < end:
         if end - position < _RECORD.size:
@@ -238,11 +224,7 @@ def read_schema(body: memoryview) -> SchemaRecord:
 
 
 def read_attachment(body: bytes) -> tuple[str, bytes]:
-    """Return name and bytes of an attachment.
-
-    Raises:
-        LogError: its checksum does not fit.
-    """
+    """Read an attachment record: its name and bytes."""
     fields = Fields(body)
     fields.numbers("<QQ")
     name = fields.text()

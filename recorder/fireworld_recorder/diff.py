@@ -47,7 +47,7 @@ class RunComparison:
 
     @property
     def same(self) -> bool:
-        """Whether the runs are the same, whatever their headers say."""
+        """Whether the runs are the same, whatever their headers are."""
         return self.first is None
 
 

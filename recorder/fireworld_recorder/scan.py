@@ -142,11 +142,7 @@ def _read_city(stream_of_messages: Iterator[tuple[str, memoryview, Start]]) -> b
 
 
 def _follow(found: Scan, chain: Chain, stream_of_messages: Iterator[tuple[str, memoryview, Start]]) -> None:
-    """Read step after step.
-
-    Raises:
-        LogError: the first fault; what was found before it is good.
-    """
+    """Read step after step; LogError is the first fault, and what was found before it is good."""
     start: Start | None = None
     sizes: dict[str, TopicSize] = {}
     for topic, payload, place in stream_of_messages:
@@ -173,11 +169,7 @@ def _follow(found: Scan, chain: Chain, stream_of_messages: Iterator[tuple[str, m
 def messages(
     file: IO[bytes], n_bytes: int, start: Start, channels: Mapping[int, ChannelRecord]
 ) -> Iterator[tuple[str, memoryview]]:
-    """Yield topic and payload of every message from a step's start on.
-
-    Raises:
-        LogError: the log is damaged there.
-    """
+    """Yield topic and payload of every message from a step's start on; LogError if the log is damaged there."""
     decompressor = zstandard.ZstdDecompressor()
     file.seek(start.offset)
     for record in container.records(file, n_bytes):
@@ -214,11 +206,7 @@ class _Stream:
         self._decompressor = zstandard.ZstdDecompressor()
 
     def messages(self) -> Iterator[tuple[str, memoryview, Start]]:
-        """Yield topic, payload and place of every message.
-
-        Raises:
-            LogError: at the first fault of the file.
-        """
+        """Yield topic, payload and place of every message; LogError at the first fault of the file."""
         found = self._file.read(len(container.MAGIC))
         if found != container.MAGIC:
             what = f"a file that begins with {found!r}" if found else "an empty file"

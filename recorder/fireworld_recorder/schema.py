@@ -82,11 +82,6 @@ class Field:
         return count if self.width == 1 else f"{count} * {self.width}"
 
     @property
-    def text(self) -> str:
-        """The documentation after the shape, where that has a name."""
-        return f"({self.shape},) {self.doc}".strip() if self.per in COUNTS else self.doc
-
-    @property
     def proto_type(self) -> str:
         """The protobuf type; "uint8" is our name for an unsigned number below 128, one byte as a varint."""
         scalar = "uint32" if self.wire == "uint8" else self.wire

@@ -41,11 +41,9 @@ class Scene(Protocol):
     @property
     def channels(self) -> Sequence[Channel]:
         """The topics, in fixed order."""
-        ...
 
     def messages(self, record: StepRecord) -> Sequence[tuple[str, bytes]]:
         """Encode what is to be drawn of a step; steps come in rising order."""
-        ...
 
 
 def own_channels() -> list[Channel]:

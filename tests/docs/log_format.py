@@ -8,7 +8,17 @@ from __future__ import annotations
 import dataclasses
 from typing import Final
 
-from fireworld_recorder.schema import DESCRIPTORS, PACKAGE, PROTO, TOPICS, Message, NamedArray, message_of
+from fireworld_recorder.schema import (
+    COUNTS,
+    DESCRIPTORS,
+    PACKAGE,
+    PROTO,
+    TOPICS,
+    Field,
+    Message,
+    NamedArray,
+    message_of,
+)
 from google.protobuf import descriptor_pb2
 
 from fireworld.records import PHASES, Snapshot
@@ -53,6 +63,11 @@ def build_descriptors() -> descriptor_pb2.FileDescriptorSet:
     return files
 
 
+def text_of(item: Field) -> str:
+    """Return the documentation of a field after its shape, where that has a name."""
+    return f"({item.shape},) {item.doc}".strip() if item.per in COUNTS else item.doc
+
+
 def proto_text() -> str:
     """Write the messages as a .proto file for people to read."""
     lines = [
@@ -62,7 +77,9 @@ def proto_text() -> str:
     ]
 
     def body(message: Message, indent: str) -> list[str]:
-        return [f"{indent}  {item.proto_type} {item.name} = {item.number};  // {item.text}" for item in message.fields]
+        return [
+            f"{indent}  {item.proto_type} {item.name} = {item.number};  // {text_of(item)}" for item in message.fields
+        ]
 
     for record_type in TOPICS:
         message = message_of(record_type)
@@ -85,7 +102,7 @@ def docs_text() -> str:
             lines += ["Field 1, `arrays`, repeats this message:", ""]
             fields = message_of(NamedArray).fields
         lines += ["| no. | field | type | meaning |", "|---|---|---|---|"]
-        lines += [f"| {item.number} | `{item.name}` | {item.proto_type} | {item.text} |" for item in fields]
+        lines += [f"| {item.number} | `{item.name}` | {item.proto_type} | {text_of(item)} |" for item in fields]
         lines += [""]
     return "\n".join(lines)
 
