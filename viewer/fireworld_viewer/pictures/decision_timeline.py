@@ -11,7 +11,7 @@ from fireworld.records import ACTION_NAMES, ACTIVITIES, Array, Recording
 from fireworld_viewer import colors
 from fireworld_viewer.pictures.city_map import hexadecimal
 from fireworld_viewer.pictures.figure_files import INK, new_figure
-from fireworld_viewer.story.choices import per_brigade
+from fireworld_viewer.story.series import per_brigade
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,7 +12,7 @@ from fireworld.records import ACTIONS, ACTIVITIES, Recording
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import CityMesh
 from fireworld_viewer.rerun_view.layers import Layers, number_columns
-from fireworld_viewer.story.choices import choices_of, per_brigade
+from fireworld_viewer.story.series import choices_of, per_brigade
 
 _DRIVING: Final = ACTIVITIES.index("driving")
 _BALL_RADIUS_M: Final = 4.0

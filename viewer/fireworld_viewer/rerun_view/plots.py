@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from fireworld.records import Recording
 from fireworld_viewer import colors
 from fireworld_viewer.rerun_view.layers import Layers
-from fireworld_viewer.story.choices import choices_of
-from fireworld_viewer.story.series import LABELS, REWARD_TERMS, series
+from fireworld_viewer.story.series import LABELS, REWARD_TERMS, choices_of, series
 
 SCORES: Final = ("score.score", "score.score_now")
 COUNTS: Final = ("score.n_burning", "score.n_water_damaged", "score.n_burnt_out")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fireworld.records import ACTION_NAMES, ACTIVITIES, Recording
 from fireworld_viewer import colors
 from fireworld_viewer.rerun_view.layers import Layers
-from fireworld_viewer.story.choices import per_brigade
+from fireworld_viewer.story.series import per_brigade
 
 NO_CHOICE: Final = "no choice"
 """Of a brigade that refills or is dead, or where nothing burns."""

@@ -10,8 +10,8 @@ import rerun
 from fireworld.records import Recording
 from fireworld_viewer import colors
 from fireworld_viewer.rerun_view.layers import Layers
-from fireworld_viewer.story.choices import choices_of
 from fireworld_viewer.story.narration import LogLine, decision_lines, event_lines
+from fireworld_viewer.story.series import choices_of
 
 
 def log_text(layers: Layers, recording: Recording) -> None:
