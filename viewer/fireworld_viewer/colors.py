@@ -86,6 +86,7 @@ HEALTHY_RGB: Final[Rgb] = (96, 240, 120)
 HURT_RGB: Final[Rgb] = (250, 250, 250)
 DYING_RGB: Final[Rgb] = (225, 60, 235)
 DEAD_RGB: Final[Rgb] = (10, 10, 10)
+HEALTH_RGB: Final[tuple[Rgb, ...]] = (HEALTHY_RGB, HURT_RGB, DYING_RGB, DEAD_RGB)
 
 BETTER_RGB: Final[Rgb] = (64, 132, 230)
 SAME_RGB: Final[Rgb] = (188, 184, 176)

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fireworld.errors import ViewError
 from fireworld.files import written_beside
 from fireworld.records import Recording
 from fireworld_viewer import colors
 from fireworld_viewer.pictures.city_map import GROUND, STREET
-from fireworld_viewer.pictures.figure_files import INK, PAPER
+from fireworld_viewer.pictures.figure_files import INK, PAPER, import_library
 from fireworld_viewer.pictures.map_grid import MapGrid
 from fireworld_viewer.pictures.map_legend import LABELS, count_marks
 from fireworld_viewer.pictures.maps import cells_of
@@ -34,6 +32,9 @@ _HOLD_SECONDS: Final = 2.0
 _TRANSPARENT: Final = 255
 """Number of the color that shows the frame before; it comes after all others."""
 _NEAR: Final = 6
+_NO_AV: Final = (
+    "film: PyAV, which writes .mp4, is not installed; try pip install 'fireworld[film]', or a film that ends in .gif"
+)
 Frame = NDArray[np.uint8]
 """(height, width, 3) sRGB; both even."""
 
@@ -61,7 +62,7 @@ def save_film(
     """
     write = FILMS[path.suffix.lower()]
     if write is _write_mp4:
-        import_av()
+        import_library("av", _NO_AV)
     frames = FilmFrames(recordings, steps)
     with written_beside(path) as partial:
         write(frames, partial, fps, on_frame)
@@ -125,21 +126,6 @@ class FilmFrames:
             self._rows[key] = self._canvas.copy_from_bbox(row.get_window_extent().padded(2.0))
 
 
-def import_av() -> ModuleType:
-    """Import PyAV.
-
-    Raises:
-        ViewError: it is not installed.
-    """
-    try:
-        import av
-    except ImportError:
-        hint = "try pip install 'fireworld[film]', or a film that ends in .gif"
-        raise ViewError(f"film: PyAV, which writes .mp4, is not installed; {hint}") from None
-    module: ModuleType = av
-    return module
-
-
 def _write_gif(frames: FilmFrames, path: Path, fps: float, on_frame: Callable[[], object]) -> None:
     """Write a GIF: one palette for all frames, and of each frame what has changed."""
     samples = [frames.frame(place) for place in sorted({round(k * (len(frames) - 1) / 2) for k in range(3)})]
@@ -189,7 +175,7 @@ def _palette(samples: Sequence[Frame]) -> Image:
 
 def _write_mp4(frames: FilmFrames, path: Path, fps: float, on_frame: Callable[[], object]) -> None:
     """Write H.264 that every browser plays; one thread, so that the bytes are the same on every machine."""
-    av = import_av()
+    av = import_library("av", _NO_AV)
     options = {"crf": "20", "preset": "veryfast", "threads": "1"}
     with av.open(str(path), mode="w", format="mp4", options={"movflags": "+faststart"}) as film:
         stream = film.add_stream("libx264", rate=Fraction(fps).limit_denominator(1000), options=options)

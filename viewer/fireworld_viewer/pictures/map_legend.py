@@ -16,23 +16,32 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.legend import Legend
 
-HEALTH: Final[Mapping[str, colors.Rgb]] = {
-    "well": colors.HEALTHY_RGB,
-    "hurt": colors.HURT_RGB,
-    "dying": colors.DYING_RGB,
-    "dead": colors.DEAD_RGB,
-}
-"""Civilians with more than 3/4 of their health, more than 1/4, less, and none."""
-
 _JET: Final = "water jet"
 _WAY: Final = "way to a target"
 _TANK: Final = "water in the tank"
 _BRIGADE: Final = "brigade"
 _DOING: Final = tuple(f"brigade {activity.removeprefix('driving-').replace('-', ' ')}" for activity in ACTIVITIES)
-_CIVILIAN: Final = tuple(f"civilian {health}" for health in HEALTH)
+_CIVILIAN: Final = ("civilian well", "civilian hurt", "civilian dying", "civilian dead")
+"""With more than 3/4 of their health, more than 1/4, less, and none."""
 _CODES: Final = tuple(name.replace("-", " ") for name in FIERYNESS)
-LABELS: Final = (*_CODES, "refuge", "hydrant", *_CIVILIAN, _BRIGADE, *_DOING, _TANK, _JET, _WAY)
+_UPRIGHT: Final = ((-0.25, -1.0), (0.25, -1.0), (0.25, 1.0), (-0.25, 1.0), (-0.25, -1.0))
+_MARKS: Final[Mapping[str, tuple[colors.Rgb, Any, float]]] = {
+    **{label: (rgb, "s", 9.0) for label, rgb in zip(_CODES, colors.FIERYNESS_RGB, strict=True)},
+    "refuge": (colors.REFUGE_RGB, "s", 9.0),
+    "hydrant": (colors.HYDRANT_RGB, "s", 5.0),
+    **{label: (rgb, "o", 6.0) for label, rgb in zip(_CIVILIAN, colors.HEALTH_RGB, strict=True)},
+    "civilian dead": (colors.DEAD_RGB, "X", 6.0),
+    _BRIGADE: (colors.ACTIVITY_RGB[2], "o", 10.0),
+    **{label: (rgb, "o", 10.0) for label, rgb in zip(_DOING, colors.ACTIVITY_RGB, strict=True)},
+    _TANK: (colors.WATER_RGB, _UPRIGHT, 11.0),
+}
+"""Color, shape and size."""
+LABELS: Final = (*_MARKS, _JET, _WAY)
 """Everything that can be on a map, in the order of the legend."""
+LEGEND_STYLE: Final[Mapping[str, Any]] = {
+    "loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "frameon": False, "labelcolor": INK, "borderaxespad": 0,
+}  # fmt: skip
+"""To the right of a map."""
 _UNCOUNTED: Final = frozenset({_TANK, _JET, _WAY})
 
 
@@ -61,9 +70,8 @@ def draw_legend(axes: Axes, labels: Sequence[str], *, n_maps: int) -> Legend:
     handles = [_handle(label) for label in labels]
     title = "how many: (A | B)" if n_maps > 1 else None
     return axes.legend(
-        handles=handles, labels=list(labels), loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False,
-        labelcolor=INK, borderaxespad=0, handlelength=1.7, fontsize=10.0, title=title,
-        title_fontsize=10.0, alignment="left",
+        handles=handles, labels=list(labels), handlelength=1.7, fontsize=10.0, title=title, title_fontsize=10.0,
+        alignment="left", **LEGEND_STYLE,
     )  # fmt: skip
 
 
@@ -77,34 +85,14 @@ def show_counts(legend: Legend, labels: Sequence[str], counts: Sequence[Mapping[
 def _handle(label: str) -> Any:
     """Return the mark of a label as it is on the map."""
     from matplotlib.lines import Line2D
-
-    def mark(rgb: colors.Rgb, shape: Any = "s", size: float = 9.0, *, edge: str = INK) -> Line2D:
-        style: dict[str, Any] = {"markerfacecolor": hexadecimal(rgb), "markeredgecolor": edge, "markersize": size}
-        return Line2D([], [], linestyle="", marker=shape, **style)
-
-    if label in _CODES:
-        return mark(colors.FIERYNESS_RGB[_CODES.index(label)])
-    if label in _CIVILIAN:
-        dead = label == "civilian dead"
-        return mark(HEALTH[label.removeprefix("civilian ")], "X" if dead else "o", 6.0, edge="white" if dead else INK)
-    if label in _DOING:
-        return mark(colors.ACTIVITY_RGB[_DOING.index(label)], "o", 10.0)
-    if label == _JET:
-        return _outlined(hexadecimal(colors.WATER_RGB), JET_EDGE)
-    if label == _WAY:
-        return Line2D([], [], color=INK, linewidth=1.1, linestyle=(0, (3, 2)))
-    upright = [(-0.25, -1.0), (0.25, -1.0), (0.25, 1.0), (-0.25, 1.0), (-0.25, -1.0)]
-    return {
-        "refuge": mark(colors.REFUGE_RGB),
-        "hydrant": mark(colors.HYDRANT_RGB, size=5.0),
-        _BRIGADE: mark(colors.ACTIVITY_RGB[2], "o", 10.0),
-        _TANK: mark(colors.WATER_RGB, upright, 11.0),
-    }[label]
-
-
-def _outlined(color: str, edge: str) -> Any:
-    """Return a thick line with an edge."""
-    from matplotlib.lines import Line2D
     from matplotlib.patheffects import Normal, Stroke
 
-    return Line2D([], [], color=color, linewidth=2.6, path_effects=[Stroke(linewidth=4.2, foreground=edge), Normal()])
+    if label == _WAY:
+        return Line2D([], [], color=INK, linewidth=1.1, linestyle=(0, (3, 2)))
+    if label == _JET:
+        edged = [Stroke(linewidth=4.2, foreground=JET_EDGE), Normal()]
+        return Line2D([], [], color=hexadecimal(colors.WATER_RGB), linewidth=2.6, path_effects=edged)
+    rgb, shape, size = _MARKS[label]
+    edge = "white" if label == "civilian dead" else INK
+    style: dict[str, Any] = {"markerfacecolor": hexadecimal(rgb), "markeredgecolor": edge, "markersize": size}
+    return Line2D([], [], linestyle="", marker=shape, **style)

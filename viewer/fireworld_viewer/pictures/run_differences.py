@@ -9,8 +9,9 @@ import numpy as np
 
 from fireworld.records import Array, CityRecord, StepRecord
 from fireworld_viewer import colors
-from fireworld_viewer.pictures.city_map import hexadecimal
+from fireworld_viewer.pictures.city_map import hexadecimal, outlines_m
 from fireworld_viewer.pictures.figure_files import INK, PAIR_COLORS, new_figure, open_frame
+from fireworld_viewer.pictures.map_legend import LEGEND_STYLE
 from fireworld_viewer.pictures.maps import draw_map
 from fireworld_viewer.story.two_runs import compare_damage
 
@@ -45,8 +46,8 @@ def draw_difference_map(city: CityRecord, a: StepRecord, b: StepRecord, differin
     axes = figure.axes[0]
     chosen = np.flatnonzero(differing["building"])
     damage = compare_damage(a.buildings.fieryness, b.buildings.fieryness)[chosen].tolist()
-    corners = np.column_stack([city.outline_x_m, city.outline_y_m])
-    outlines = [corners[city.outline_ptr[index] : city.outline_ptr[index + 1]] for index in chosen]
+    every = outlines_m(city)
+    outlines = [every[index] for index in chosen]
     faces = [_KINDS[sign][1] for sign in damage]
     axes.add_collection(PolyCollection(outlines, facecolors=faces, edgecolors=INK, linewidths=0.35, zorder=3))
     moved = np.flatnonzero(differing["brigade"])
@@ -75,9 +76,7 @@ def _draw_legend(axes: Axes, damage: Sequence[int], *, n_brigades: int, n_civili
     if n_civilians:
         handles.append(mark("civilian", n_civilians, "none", shape="o", edge=_VIOLET))
     handles.append(Line2D([], [], linestyle="", label="grey: the same"))
-    axes.legend(
-        handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False, labelcolor=INK, borderaxespad=0
-    )
+    axes.legend(handles=handles, **LEGEND_STYLE)
 
 
 def draw_difference_curves(
@@ -102,10 +101,11 @@ def draw_difference_curves(
     panels = figure.subplots(2, 2, sharex=True).ravel()
     for axes, (title, both) in zip(panels, curves.items(), strict=False):
         for name, curve, color, style in zip("AB", both, PAIR_COLORS, ("-", "--"), strict=True):
-            axes.plot(steps, _with_gaps(curve), color=color, linestyle=style, linewidth=1.8, label=name)
+            numbers = np.array(curve, dtype=np.float64)  # None becomes NaN: a gap
+            axes.plot(steps, numbers, color=color, linestyle=style, linewidth=1.8, label=name)
         axes.set_title(title, fontsize=11, loc="left")
     for (label, counts), color in zip(n_buildings.items(), (INK, _VIOLET), strict=True):
-        panels[3].plot(steps, _with_gaps(counts), color=color, label=label)
+        panels[3].plot(steps, np.array(counts, dtype=np.float64), color=color, label=label)
     panels[3].set_title("buildings that differ", fontsize=11, loc="left")
     for axes in panels[[0, 3]]:
         axes.legend(fontsize=9, frameon=False)
@@ -117,8 +117,3 @@ def draw_difference_curves(
         open_frame(axes)
     figure.supxlabel("step; dotted: the first difference", fontsize=10)
     return figure
-
-
-def _with_gaps(curve: Gaps) -> Array:
-    """(k,) float64: NaN where a run does not have the step."""
-    return np.array(curve, dtype=np.float64)

@@ -56,10 +56,8 @@ def entries(*, comparing: bool) -> list[list[tuple[str, colors.Rgb]]]:
         [*brigades[:3], ("water", colors.WATER_RGB)],
         [*brigades[3:], ("fire can spread", colors.FREE_SIDE_RGB)],
         [
-            ("civilian, well", colors.HEALTHY_RGB),
-            ("civilian, hurt", colors.HURT_RGB),
-            ("civilian, dying", colors.DYING_RGB),
-            ("civilian, dead", colors.DEAD_RGB),
+            (f"civilian, {name}", rgb)
+            for name, rgb in zip(("well", "hurt", "dying", "dead"), colors.HEALTH_RGB, strict=True)
         ],
     ]
     if comparing:
