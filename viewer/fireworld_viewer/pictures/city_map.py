@@ -17,7 +17,6 @@ from fireworld_viewer.pictures.figure_files import INK
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.collections import PolyCollection
 
 STREET: Final = "#ffffff"
 GROUND: Final = "#dedad2"
@@ -101,14 +100,17 @@ class CityMap:
         self._ways = LineCollection([], colors=INK, linewidths=1.1 * self._scale, linestyles=(0, (3, 2)), zorder=5)
         self._jet_casing = LineCollection([], colors=JET_EDGE, linewidths=4.2 * self._scale, **line)
         self._jets = LineCollection([], colors=hexadecimal(colors.WATER_RGB), linewidths=2.6 * self._scale, **line)
-        self._buildings = self._draw_buildings()
+        self._buildings = PolyCollection(outlines_m(city), edgecolors=INK, linewidths=0.35 * self._scale, zorder=2)
         bold: dict[str, Any] = {"ha": "center", "weight": "bold", "fontsize": 8 * self._scale}
         self._centers = np.column_stack([city.center_x_m, city.center_y_m])
         self._refuges = [
             axes.annotate("R", tuple(self._centers[index]), va="center", color="white", zorder=5, **bold)
             for index in np.asarray(city.refuge_building)
         ]
-        self._civilians = self._draw_civilians()
+        apart_m = self._m_per_point * np.array([7.0, 7.0])
+        xy = _side_by_side(np.column_stack([city.civilian_x_m, city.civilian_y_m]), apart_m)
+        edge: dict[str, Any] = {"edgecolors": INK, "linewidths": 0.8 * self._scale}
+        self._civilians = axes.scatter(xy[:, 0], xy[:, 1], s=34 * self._scale, zorder=6, **edge)
         self._balls = axes.scatter(
             [], [], s=(_BALL_POINTS * self._scale) ** 2, edgecolors=INK, linewidths=0.8, zorder=7
         )
@@ -117,7 +119,8 @@ class CityMap:
         self._numbers = [
             axes.text(0.0, 0.0, str(index), va="center_baseline", zorder=7.2, **bold) for index in range(n_brigades)
         ]
-        for item in (self._way_casing, self._ways, self._jet_casing, self._jets, self._gauges, self._water):
+        lines = self._way_casing, self._ways, self._jet_casing, self._jets
+        for item in (self._buildings, *lines, self._gauges, self._water):
             axes.add_collection(item, autolim=False)
 
     @property
@@ -189,19 +192,6 @@ class CityMap:
             f"{length} m", (x + length, y), xytext=(4, 0), textcoords="offset points", va="center", color=INK,
             fontsize=10 * max(self._scale, 0.75),
         )  # fmt: skip
-
-    def _draw_buildings(self) -> PolyCollection:
-        from matplotlib.collections import PolyCollection
-
-        drawn = PolyCollection(outlines_m(self.city), edgecolors=INK, linewidths=0.35 * self._scale, zorder=2)
-        self.axes.add_collection(drawn, autolim=False)
-        return drawn
-
-    def _draw_civilians(self) -> Any:
-        xy = np.column_stack([self.city.civilian_x_m, self.city.civilian_y_m])
-        xy = _side_by_side(xy, self._m_per_point * np.array([7.0, 7.0]))
-        style: dict[str, Any] = {"edgecolors": INK, "linewidths": 0.8 * self._scale, "zorder": 6}
-        return self.axes.scatter(xy[:, 0], xy[:, 1], s=34 * self._scale, **style)
 
 
 def outlines_m(city: CityRecord) -> list[NDArray[np.float64]]:

@@ -33,7 +33,7 @@ def draw_timeline(recordings: Sequence[Recording]) -> Figure:
     Raises:
         ViewError: matplotlib is not installed.
     """
-    heights = [_MARGIN_INCHES + _ROW_INCHES * max(1, _n_brigades(one)) for one in recordings]
+    heights = [_MARGIN_INCHES + _ROW_INCHES * max(1, len(one.city.brigade_tank_litres)) for one in recordings]
     total = sum(heights) + _LEGEND_INCHES
     figure = new_figure(_WIDTH_INCHES, total)
     span = min(int(one.steps[0]) for one in recordings), max(int(one.steps[-1]) for one in recordings)
@@ -48,10 +48,6 @@ def draw_timeline(recordings: Sequence[Recording]) -> Figure:
     return figure
 
 
-def _n_brigades(recording: Recording) -> int:
-    return len(recording.city.brigade_tank_litres)
-
-
 def _tables(recording: Recording) -> tuple[Array, Array]:
     """Return what was chosen and what was done, (k, n_brigades) each; -1 is no choice."""
     action = per_brigade(recording, "action", missing=-1)
@@ -59,7 +55,7 @@ def _tables(recording: Recording) -> tuple[Array, Array]:
 
 
 def _draw_panel(axes: Axes, recording: Recording, span: tuple[int, int]) -> None:
-    n, steps = _n_brigades(recording), np.asarray(recording.steps)
+    n, steps = len(recording.city.brigade_tank_litres), np.asarray(recording.steps)
     palettes = colors.ACTION_RGB, colors.ACTIVITY_RGB
     for table, palette, (top, height) in zip(_tables(recording), palettes, _BANDS, strict=True):
         for brigade in range(n):

@@ -15,8 +15,7 @@ from fireworld.records import Recording
 from fireworld_viewer import colors
 from fireworld_viewer.pictures.city_map import GROUND, STREET
 from fireworld_viewer.pictures.figure_files import INK, PAPER, import_library
-from fireworld_viewer.pictures.map_grid import MapGrid
-from fireworld_viewer.pictures.map_legend import LABELS, count_marks
+from fireworld_viewer.pictures.map_grid import MapGrid, labels_on
 from fireworld_viewer.pictures.maps import cells_of
 from fireworld_viewer.story.steps import ShownStep
 
@@ -82,9 +81,7 @@ class FilmFrames:
     def __init__(self, recordings: Sequence[Recording], steps: Sequence[ShownStep]) -> None:
         self._recordings, self._steps = recordings, steps
         inches = _MAP_INCHES if len(recordings) == 1 else _PAIR_INCHES
-        there = {label for step in steps for cell in cells_of(recordings, step)
-                 for label in count_marks(cell.city, cell.state)}  # fmt: skip
-        labels = [label for label in LABELS if label in there]
+        labels = labels_on(cell for step in steps for cell in cells_of(recordings, step))
         first = cells_of(recordings, steps[0])
         self._grid = MapGrid(first, columns=len(recordings), map_inches=inches, labels=labels, dpi=_DPI)
         self._canvas = cast("Any", self._grid.figure.canvas)  # matplotlib has no type for it

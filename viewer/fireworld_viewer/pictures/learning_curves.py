@@ -24,8 +24,7 @@ class LearningPanel:
     title: str
     curves: Mapping[str, Sequence[Array]]
     """By team, one or two: (episodes,) numbers of each repetition; repetitions may differ in length."""
-    marked_episode: float
-    """Where a dotted line stands."""
+    marked_episode: float  # where a dotted line stands
 
 
 def draw_learning_curves(panels: Sequence[LearningPanel], *, label: str, mark: str) -> Figure:

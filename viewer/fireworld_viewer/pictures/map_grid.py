@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -25,15 +25,14 @@ _MAPS_COUNTED: Final = 2
 """Above this many maps, and in strips, the legend has no counts."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class MapCell:
     """One map of a grid."""
 
     city: CityRecord
     state: MapState
     title: str
-    facts: str = ""
-    """A second line of the heading."""
+    facts: str = ""  # a second line of the heading
 
 
 class MapGrid:
@@ -64,7 +63,7 @@ class MapGrid:
         west, east, south, north = extent_m(cells[0].city)
         self._map_inches = map_inches
         map_height = min(max(map_inches * (north - south) / (east - west), 0.4 * map_inches), 2.0 * map_inches)
-        self._labels = list(labels) or _labels_of(cells)
+        self._labels = list(labels) or labels_on(cells)
         rows = -(-len(cells) // columns)
         n_lines = 1 + any(cell.facts for cell in cells)
         row_height = map_height + n_lines * _LINE_INCHES + _GAP_INCHES
@@ -130,7 +129,8 @@ class MapGrid:
         return self.figure.text(*place, text, fontsize=min(points, max(fitting, 6.0)), **style)
 
 
-def _labels_of(cells: Sequence[MapCell]) -> list[str]:
+def labels_on(cells: Iterable[MapCell]) -> list[str]:
+    """Return the entries of a legend: what is on any of the maps."""
     there: set[str] = set().union(*(count_marks(cell.city, cell.state) for cell in cells))
     return [label for label in LABELS if label in there]
 

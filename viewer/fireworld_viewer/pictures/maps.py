@@ -54,7 +54,7 @@ def draw_map(
         civilian_hp=np.asarray(city.civilian_hp) if civilian_hp is None else np.asarray(civilian_hp),
         brigades=brigades,
     )
-    return MapGrid([MapCell(city=city, state=state, title=one_line(title or city.name))]).figure
+    return MapGrid([MapCell(city, state, one_line(title or city.name))]).figure
 
 
 def draw_record(city: CityRecord, record: StepRecord, *, title: str) -> Figure:
@@ -83,14 +83,10 @@ def draw_steps(recordings: Sequence[Recording], steps: Sequence[int]) -> Figure:
         inches = WIDTH_INCHES if len(recordings) == 1 else PAIR_INCHES
         return MapGrid(cells_of(recordings, shown[0]), columns=len(recordings), map_inches=inches).figure
     cells = [
-        MapCell(
-            city=recording.city,
-            state=state_of(recording.city, step.records[row]),
-            title=letter + _when(step.records[row], step.step),
-            facts=_facts(step.records[row], apart=", "),
-        )
-        for row, (recording, letter) in enumerate(zip(recordings, _letters(recordings), strict=True))
+        MapCell(one.city, state_of(one.city, record), letter + _when(record, step.step), _facts(record, apart=", "))
+        for row, (one, letter) in enumerate(zip(recordings, _letters(recordings), strict=True))
         for step in shown
+        for record in [step.records[row]]
     ]
     columns = len(shown)
     if len(recordings) == 1:
@@ -104,10 +100,7 @@ def cells_of(recordings: Sequence[Recording], shown: ShownStep) -> list[MapCell]
     """Return the maps of a step, one for each recording, headed by what it is a recording of."""
     return [
         MapCell(
-            city=one.city,
-            state=state_of(one.city, record),
-            title=name,
-            facts=f"{_when(record, shown.step)}   {_facts(record, apart='   ')}",
+            one.city, state_of(one.city, record), name, f"{_when(record, shown.step)}   {_facts(record, apart='   ')}"
         )
         for one, record, name in zip(recordings, shown.records, _names(recordings), strict=True)
     ]

@@ -32,8 +32,7 @@ class DifferencePanel:
 
     label: str
     unit: str
-    higher_is_better: bool | None
-    """None: neither is better."""
+    higher_is_better: bool | None  # None: neither is better
     lines: Mapping[str, tuple[Array, tuple[float, float, float]]]
     """By scenario, the last over all if there are several: (seeds,) B - A; its mean, and the ends of its interval."""
 
@@ -65,7 +64,12 @@ def _draw_panel(axes: Axes, panel: DifferencePanel) -> None:
     sign, direction = _DIRECTIONS[panel.higher_is_better]
     axes.axvline(0.0, color=_INK, linewidth=0.8)
     for place, (differences, (mean, low, high)) in enumerate(panel.lines.values()):
-        _draw_points(axes, differences, sign * differences, height=place)
+        # One point a seed, spread evenly over the height of the line in the order of the seeds.
+        heights = place + _SPREAD * (2.0 * (np.arange(len(differences)) * _GOLDEN % 1.0) - 1.0)
+        gain = sign * differences
+        for chosen, color, mark in ((gain > 0, BETTER, "^"), (gain < 0, WORSE, "v"), (gain == 0, EQUAL, "o")):
+            x, y = differences[chosen], heights[chosen]
+            axes.scatter(x, y, s=14, color=color, marker=mark, linewidths=0, alpha=0.6)
         axes.plot([low, high], [place, place], color=_INK, linewidth=2.4, solid_capstyle="butt", zorder=4)
         axes.plot([mean], [place], marker="o", color="white", markeredgecolor=_INK, markersize=7, zorder=5)
     n = len(panel.lines)
@@ -79,10 +83,3 @@ def _draw_panel(axes: Axes, panel: DifferencePanel) -> None:
     axes.set_xlabel(panel.unit, fontsize=8)
     open_frame(axes)
     axes.tick_params(axis="x", labelsize=8)
-
-
-def _draw_points(axes: Axes, differences: Array, gain: Array, *, height: int) -> None:
-    """Draw one point a seed, spread evenly over the height of the line in the order of the seeds."""
-    heights = height + _SPREAD * (2.0 * (np.arange(len(differences)) * _GOLDEN % 1.0) - 1.0)
-    for chosen, color, mark in ((gain > 0, BETTER, "^"), (gain < 0, WORSE, "v"), (gain == 0, EQUAL, "o")):
-        axes.scatter(differences[chosen], heights[chosen], s=14, color=color, marker=mark, linewidths=0, alpha=0.6)
