@@ -8,7 +8,7 @@ from pathlib import Path
 from fireworld_recorder.diff import compare
 from fireworld_recorder.totals import totals_of
 from fireworld_viewer.rerun_view import app
-from fireworld_viewer.rerun_view.outcome_page import OutcomePage
+from fireworld_viewer.rerun_view.pages import OutcomePage
 from fireworld_viewer.story.steps import select_steps
 from fireworld_viewer.story.two_runs import check_same_city
 

@@ -110,7 +110,7 @@ class CityMap:
         apart_m = self._m_per_point * np.array([7.0, 7.0])
         xy = _side_by_side(np.column_stack([city.civilian_x_m, city.civilian_y_m]), apart_m)
         edge: dict[str, Any] = {"edgecolors": INK, "linewidths": 0.8 * self._scale}
-        self._civilians = axes.scatter(xy[:, 0], xy[:, 1], s=34 * self._scale, zorder=6, **edge)
+        self._civilians: Any = axes.scatter(xy[:, 0], xy[:, 1], s=34 * self._scale, zorder=6, **edge)
         self._balls = axes.scatter(
             [], [], s=(_BALL_POINTS * self._scale) ** 2, edgecolors=INK, linewidths=0.8, zorder=7
         )

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Final
 from fireworld.errors import ViewError, expected
 from fireworld.files import check_output, write_file
 from fireworld.records import Recording
-from fireworld_viewer.rerun_view.outcome_page import OutcomePage
+from fireworld_viewer.rerun_view.pages import OutcomePage
 
 if TYPE_CHECKING:
     import rerun
@@ -87,8 +87,10 @@ def serve(
         ViewError: the port is taken, or there is no viewer.
     """
     _import_rerun()
-    if not _is_free(port):
-        raise ViewError(expected("view", "--port", "a free port", port, "try another one"))
+    try:
+        free_port(port)
+    except OSError:
+        raise ViewError(expected("view", "--port", "a free port", port, "try another one")) from None
     data_port = free_port()
     announce(f"http://{LOCALHOST}:{port}?url=rerun%2Bhttp%3A%2F%2F{LOCALHOST}%3A{data_port}%2Fproxy")
     ports = ["--web-viewer-port", str(port), "--port", str(data_port)]
@@ -121,10 +123,15 @@ def viewer_environment(environment: Mapping[str, str]) -> dict[str, str]:
     return {**others, "CI": "1", "RUST_LOG": environment.get("RUST_LOG", "error")}
 
 
-def free_port() -> int:
-    """Return a port of this machine that nobody listens on at the moment."""
+def free_port(wanted: int = 0) -> int:
+    """Return a port of this machine that nobody listens on at the moment: the one wanted, any for 0.
+
+    Raises:
+        OSError: it is taken.
+    """
     with socket.socket() as probe:
-        probe.bind((LOCALHOST, 0))
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        probe.bind((LOCALHOST, wanted))
         port: int = probe.getsockname()[1]
         return port
 
@@ -198,7 +205,7 @@ def _run_viewer(
         path = Path(folder) / "view.rrd"
         save(recordings, path, focus=focus, outcome=outcome)
         command = [str(viewer_executable()), "--bind", LOCALHOST, *options, str(path)]
-        before = signal.signal(signal.SIGTERM, _stop)
+        before = signal.signal(signal.SIGTERM, signal.default_int_handler)
         with (Path(folder) / "errors").open("w+", encoding="utf-8", errors="replace") as errors:
             viewer = subprocess.Popen(command, env=viewer_environment(os.environ), stderr=errors)  # noqa: S603 - our own
             try:
@@ -215,21 +222,6 @@ def _run_viewer(
         why = f": {reason.rpartition(': ')[2][-120:]}" if reason else ""
         hint = "try --save FILE.rrd, --web, or `fireworld render`"
         raise ViewError(f"view: Rerun's viewer ended with code {status}{why}; {hint}")
-
-
-def _stop(number: int, frame: object) -> None:
-    del number, frame
-    raise KeyboardInterrupt
-
-
-def _is_free(port: int) -> bool:
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((LOCALHOST, port))
-        except OSError:
-            return False
-    return True
 
 
 def _import_rerun() -> ModuleType:

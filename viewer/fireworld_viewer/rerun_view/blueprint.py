@@ -14,8 +14,7 @@ from fireworld_viewer.city_mesh import city_box_m
 from fireworld_viewer.rerun_view.camera import Camera, frame_fire, frame_from_above
 from fireworld_viewer.rerun_view.comparison import MARK_PATH
 from fireworld_viewer.rerun_view.layers import TIMELINE
-from fireworld_viewer.rerun_view.outcome_page import OutcomePage
-from fireworld_viewer.rerun_view.pages import HELP_PATH, LEGEND_PATH, OUTCOME_PATH, bounds
+from fireworld_viewer.rerun_view.pages import HELP_PATH, LEGEND_PATH, OUTCOME_PATH, OutcomePage, bounds
 from fireworld_viewer.rerun_view.plots import has_choice_values
 
 STEPS_PER_SECOND: Final = 8.0

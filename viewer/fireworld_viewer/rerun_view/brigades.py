@@ -1,4 +1,4 @@
-"""Brigades in Rerun: balls with a gauge of their tanks, jets of water, and arcs to where they drive."""
+"""Brigades in Rerun: balls with a gauge of their tanks, jets of water, arcs to where they drive, and their states."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import rerun
 from numpy.typing import NDArray
 
-from fireworld.records import ACTIONS, ACTIVITIES, Recording
+from fireworld.records import ACTION_NAMES, ACTIONS, ACTIVITIES, Recording
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import CityMesh
 from fireworld_viewer.rerun_view.layers import Layers, number_columns
@@ -86,6 +86,16 @@ def log_water(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
     ):
         arcs = _arcs(position[shown], mesh.roof_xyz_m[target[shown]], rise_m)
         layers.strips(path, arcs, shown.sum(axis=1), radius_m=radius_m, rgb=rgb)
+
+
+def log_states(layers: Layers, recording: Recording) -> None:
+    """Send two timelines for each brigade: its activity, and the action that it chose."""
+    activity = recording.column("/brigades", "activity")
+    action = per_brigade(recording, "action", missing=-1)  # -1 is the last of the names: refilling, dead, or no fire
+    actions, rgb = (*ACTION_NAMES, "no choice"), (*colors.ACTION_RGB, colors.NO_CHOICE_RGB)
+    for brigade in range(activity.shape[1]):
+        layers.states(f"activity/brigade_{brigade}", activity[:, brigade], ACTIVITIES, colors.ACTIVITY_RGB)
+        layers.states(f"action/brigade_{brigade}", action[:, brigade], actions, rgb)
 
 
 def positions_m(recording: Recording) -> NDArray[np.float32]:

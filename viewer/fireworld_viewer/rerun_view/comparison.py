@@ -14,11 +14,9 @@ from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh
 from fireworld_viewer.rerun_view import city_layers
 from fireworld_viewer.rerun_view.layers import Layers
-from fireworld_viewer.rerun_view.outcome_page import OutcomePage
+from fireworld_viewer.rerun_view.pages import OutcomePage
 from fireworld_viewer.rerun_view.plots import log_plot
 from fireworld_viewer.rerun_view.run_layers import RunLayers
-from fireworld_viewer.rerun_view.state_timelines import log_state_timeline
-from fireworld_viewer.rerun_view.text_logs import log_lines
 from fireworld_viewer.story.narration import LogLine
 from fireworld_viewer.story.two_runs import check_same_city, common_steps, compare_damage
 
@@ -72,7 +70,7 @@ def _mark_first_difference(layers: Layers, outcome: OutcomePage, buildings_diffe
     if first is not None:
         states[layers.steps >= first] = 1
         states[buildings_differ] = 2
-    log_state_timeline(layers, "agreement", states, AGREEMENT, _AGREEMENT_RGB)
+    layers.states("agreement", states, AGREEMENT, _AGREEMENT_RGB)
     if first is None:
         return
     style = rerun.SeriesPoints(
@@ -84,4 +82,4 @@ def _mark_first_difference(layers: Layers, outcome: OutcomePage, buildings_diffe
     layers.static("plots/first_difference", style)
     layers.rows("plots/first_difference", rerun.Scalars.columns(scalars=[0.0]), steps=[first])
     line = LogLine(first, "ERROR", f"first difference: {outcome.first_sentence}", colors.MARK_RGB)
-    log_lines(layers, "log/first_difference", [line])
+    layers.text("log/first_difference", [line])

@@ -15,8 +15,8 @@ from fireworld_viewer.rerun_view.air import log_air
 from fireworld_viewer.rerun_view.fire_sites import log_sites
 from fireworld_viewer.rerun_view.layers import Layers
 from fireworld_viewer.rerun_view.plots import log_plots
-from fireworld_viewer.rerun_view.state_timelines import log_brigade_states
-from fireworld_viewer.rerun_view.text_logs import log_text
+from fireworld_viewer.story.narration import decision_lines, event_lines
+from fireworld_viewer.story.series import choices_of
 
 
 class RunLayers:
@@ -60,8 +60,20 @@ class RunLayers:
         city_layers.log_civilians(layers, recording, mesh)
         log_sites(layers, recording)
         log_plots(layers, recording, self._focus_index)
-        log_brigade_states(layers, recording)
-        log_text(layers, recording)
+        brigades.log_states(layers, recording)
+        _log_text(layers, recording)
+
+
+def _log_text(layers: Layers, recording: Recording) -> None:
+    """Send a line for every event, and one for every choice that is new or explores."""
+    layers.text("log/events", event_lines(recording))
+    choices = choices_of(recording)
+    new = choices.explored.copy()
+    for brigade in range(new.shape[1]):
+        pairs = np.column_stack([choices.action[:, brigade], choices.target[:, brigade]])
+        new[layers.changed(f"log/decisions/{brigade}", pairs), brigade] = True
+    new[[len(row) == 0 for row in recording.ragged("/decisions", "action")]] = False  # nobody was asked
+    layers.text("log/decisions", decision_lines(recording, choices, new))
 
 
 def building_indices(city: CityRecord, ids: Sequence[int]) -> list[int]:
