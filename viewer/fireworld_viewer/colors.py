@@ -79,8 +79,7 @@ BRIGADE_RGB: Final[tuple[Rgb, ...]] = (
 """Colors of the brigades in plots and logs, readable on black and on white; repeated when there are more."""
 
 TOTAL_RGB: Final[Rgb] = (140, 110, 200)
-GREY_RGB: Final[Rgb] = (128, 124, 120)
-"""What is burnt out, and what comes second, in plots and logs."""
+GREY_RGB: Final[Rgb] = (128, 124, 120)  # what is burnt out, and what comes second, in plots and logs
 
 HEALTHY_RGB: Final[Rgb] = (96, 240, 120)
 HURT_RGB: Final[Rgb] = (250, 250, 250)

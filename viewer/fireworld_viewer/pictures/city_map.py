@@ -27,8 +27,7 @@ WIDTH_INCHES: Final = 7.6
 
 _SMALLEST_SCALE: Final = 0.7
 _BALL_POINTS: Final = 14.0
-_GAUGE_POINTS: Final = (3.6, 15.0)
-"""Width and height of the gauge of a full tank."""
+_GAUGE_POINTS: Final = (3.6, 15.0)  # width and height of the gauge of a full tank
 _DRIVING: Final = ACTIVITIES.index("driving")
 _SPRAYING: Final = ACTIVITIES.index("spraying")
 

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 _WIDTH_INCHES: Final = 12.0
 _ROW_INCHES: Final = 0.42
-_MARGIN_INCHES: Final = 0.75
-"""Of a panel: its title above the rows and the steps below them."""
+_MARGIN_INCHES: Final = 0.75  # of a panel: its title above the rows and the steps below them
 _LEGEND_INCHES: Final = 0.75
 _LEFT: Final = 0.085
 _BANDS: Final = ((-0.38, 0.44), (0.12, 0.22))

@@ -26,8 +26,7 @@ FPS: Final = 10.0
 _DPI: Final = 100
 _MAP_INCHES: Final = 6.0
 _PAIR_INCHES: Final = 4.6
-_HOLD_SECONDS: Final = 2.0
-"""How long the last frame stays."""
+_HOLD_SECONDS: Final = 2.0  # how long the last frame stays
 _TRANSPARENT: Final = 255
 """Number of the color that shows the frame before; it comes after all others."""
 _NEAR: Final = 6

@@ -19,10 +19,8 @@ _LEGEND_INCHES: Final = 2.35
 _GAP_INCHES: Final = 0.14
 _LINE_INCHES: Final = 0.24
 _LEGEND_LINE_INCHES: Final = 0.205
-_POINTS_WIDE: Final = 0.56
-"""How wide a letter is on average, of its size."""
-_MAPS_COUNTED: Final = 2
-"""Above this many maps, and in strips, the legend has no counts."""
+_POINTS_WIDE: Final = 0.56  # how wide a letter is on average, of its size
+_MAPS_COUNTED: Final = 2  # above this many maps, and in strips, the legend has no counts
 
 
 @dataclass(frozen=True)

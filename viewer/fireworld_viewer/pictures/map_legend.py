@@ -36,8 +36,7 @@ _MARKS: Final[Mapping[str, tuple[colors.Rgb, Any, float]]] = {
     _TANK: (colors.WATER_RGB, _UPRIGHT, 11.0),
 }
 """Color, shape and size."""
-LABELS: Final = (*_MARKS, _JET, _WAY)
-"""Everything that can be on a map, in the order of the legend."""
+LABELS: Final = (*_MARKS, _JET, _WAY)  # everything that can be on a map, in the order of the legend
 LEGEND_STYLE: Final[Mapping[str, Any]] = {
     "loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "frameon": False, "labelcolor": INK, "borderaxespad": 0,
 }  # fmt: skip

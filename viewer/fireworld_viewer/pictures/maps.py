@@ -17,10 +17,8 @@ from fireworld_viewer.story.steps import ShownStep, read_steps
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PAIR_INCHES: Final = 5.4
-"""Width of each of two maps side by side."""
-_STRIP_INCHES: Final = (3.0, 4.4)
-"""Least and greatest width of a map in a strip."""
+PAIR_INCHES: Final = 5.4  # width of each of two maps side by side
+_STRIP_INCHES: Final = (3.0, 4.4)  # least and greatest width of a map in a strip
 _STRIP_WIDTH_INCHES: Final = 12.0
 _STRIP_COLUMNS: Final = 5
 _NAME_LETTERS: Final = 48

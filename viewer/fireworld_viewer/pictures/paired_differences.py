@@ -21,8 +21,7 @@ EQUAL: Final = "#8a8a8a"
 """Blue, vermilion and grey: every eye tells them apart; side and mark say the same."""
 _INK: Final = "#222222"
 _GOLDEN: Final = 0.6180339887498949
-_SPREAD: Final = 0.3
-"""Points lie that far above and below their line."""
+_SPREAD: Final = 0.3  # points lie that far above and below their line
 _DIRECTIONS: Final = {True: (1, " (more is better)"), False: (-1, " (less is better)"), None: (0, "")}
 
 

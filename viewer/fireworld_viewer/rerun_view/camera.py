@@ -28,8 +28,7 @@ class Camera:
 
     eye_m: tuple[float, float, float]
     target_m: tuple[float, float, float]
-    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    """What is up in the picture."""
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)  # what is up in the picture
 
 
 def frame_fire(recordings: Sequence[Recording], *, aspect: float) -> Camera:

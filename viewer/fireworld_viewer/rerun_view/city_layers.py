@@ -13,8 +13,7 @@ from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import SHADES_PERCENT, STOREY_M, CityMesh, city_box_m
 from fireworld_viewer.rerun_view.layers import Layers, number_columns
 
-_REFUGE: Final = len(colors.FIERYNESS_RGB)
-"""Row of a refuge in the table of building colors."""
+_REFUGE: Final = len(colors.FIERYNESS_RGB)  # row of a refuge in the table of building colors
 _BUILDING_COLORS: Final = colors.shaded_table((*colors.FIERYNESS_RGB, colors.REFUGE_RGB), SHADES_PERCENT)
 _GROUND_M: Final = -0.4
 _GROUND_MARGIN_M: Final = 15.0

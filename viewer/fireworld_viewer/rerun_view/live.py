@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import socket
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from threading import Lock
 from typing import Any, Final
 from urllib.parse import urlsplit
 
@@ -102,7 +102,8 @@ class RunEncoder:
             log_legend(self._stream, comparing=False)
             self._layers = RunLayers(self._stream, self._city)
         self._layers.add(recording)
-        return _drained(self._bytes)
+        content: bytes = self._bytes.read(flush_timeout_sec=_ENCODE_SECONDS) or b""
+        return content
 
 
 class RunView(BackgroundSender[StepRecord]):
@@ -115,10 +116,9 @@ class RunView(BackgroundSender[StepRecord]):
     """
 
     def __init__(self, screen: Screen, header: RunHeader, city: CityRecord, *, warn: Callable[[str], None]) -> None:
-        n_most = _WAITING_BYTES_MAX // (_BYTES_PER_BUILDING * max(1, len(city.building_id)))
-        n_most = min(_WAITING_MAX, max(16, n_most))
-        encoder = RunEncoder(header, city)
-        super().__init__(encoder.encode, screen.open(), n_waiting_max=n_most, warn=warn)
+        n_fit = _WAITING_BYTES_MAX // (_BYTES_PER_BUILDING * max(1, len(city.building_id)))
+        n_most = min(_WAITING_MAX, max(16, n_fit))
+        super().__init__(RunEncoder(header, city).encode, screen.open(), n_waiting_max=n_most, warn=warn)
 
     def add(self, record: StepRecord) -> None:
         """Hand over a step."""
@@ -143,28 +143,19 @@ class TrainingView(BackgroundSender[TrainingPoint]):
         stream = app.new_stream(f"{app.APPLICATION_ID}-{layout.title}")
         self._bytes = stream.binary_stream()
         self._curves = CurveWriter(stream, layout)
-        self._due: PlayRun | None = None
-        self._lock = Lock()
+        self._due: deque[PlayRun] = deque(maxlen=1)
         super().__init__(self._encode_points, screen.open(), n_waiting_max=_POINTS_WAITING_MAX, warn=warn)
 
     def add(self, point: TrainingPoint, *, play: PlayRun | None = None) -> None:
         """Hand over a point, and a run to play after it, which replaces one that has not begun."""
         if play is not None:
-            with self._lock:
-                self._due = play
+            self._due.append(play)
         self.put(point)
 
     def _encode_points(self, points: Sequence[TrainingPoint]) -> bytes:
         self._curves.write(points)
-        content = _drained(self._bytes)
-        with self._lock:
-            due, self._due = self._due, None
-        if due is not None:
-            title, header, city, records = due()
+        content: bytes = self._bytes.read(flush_timeout_sec=_ENCODE_SECONDS) or b""
+        if self._due:
+            title, header, city, records = self._due.pop()()
             content += RunEncoder(header, city, title=title).encode(records)
         return content
-
-
-def _drained(source: Any) -> bytes:
-    content: bytes | None = source.read(flush_timeout_sec=_ENCODE_SECONDS)
-    return content or b""

@@ -14,8 +14,7 @@ Item = TypeVar("Item")
 BATCH_SECONDS: Final = 0.2
 """Time between batches: a viewer redraws some times a second, and fewer, larger batches cost the run less."""
 BATCH_MAX: Final = 200
-PATIENCE_SECONDS: Final = 5.0
-"""How long the end waits for a viewer that takes nothing."""
+PATIENCE_SECONDS: Final = 5.0  # how long the end waits for a viewer that takes nothing
 _PIECE_BYTES: Final = 1 << 16
 
 

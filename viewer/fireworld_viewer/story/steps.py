@@ -13,8 +13,7 @@ from fireworld.errors import ViewError, expected
 from fireworld.records import MemoryRecording, Recording, StepRecord
 from fireworld_viewer.story.two_runs import check_same_city, common_steps
 
-LAST: Final = -1
-"""In place of a step: the last one."""
+LAST: Final = -1  # in place of a step: the last one
 
 
 @dataclass(frozen=True)
@@ -96,14 +95,11 @@ def _between(doing: str, steps: NDArray[np.int64], first: int | None, last: int 
 
 
 def _read(recordings: Sequence[Recording], steps: Sequence[int]) -> list[ShownStep]:
-    """Read every recording once; only what is shown stays in memory. `steps` rise."""
-    found = [_records_at(recording, steps) for recording in recordings]
-    return [ShownStep(step, records) for step, records in zip(steps, zip(*found, strict=True), strict=True)]
-
-
-def _records_at(recording: Recording, steps: Sequence[int]) -> list[StepRecord]:
-    """Return the record of each step, or the last one before it; none of the steps is before the first."""
-    own = recording.steps
-    wanted = own[np.searchsorted(own, steps, side="right") - 1].tolist()
-    found = {record.step: record for record in recording if record.step in set(wanted)}
-    return [found[step] for step in wanted]
+    """Read every recording once; only what is shown stays in memory. `steps` rise; none is before any recording."""
+    columns = []
+    for recording in recordings:
+        own = recording.steps
+        wanted = own[np.searchsorted(own, steps, side="right") - 1].tolist()  # the step, or the last one before it
+        found = {record.step: record for record in recording if record.step in set(wanted)}
+        columns.append([found[step] for step in wanted])
+    return [ShownStep(step, tuple(records)) for step, *records in zip(steps, *columns, strict=True)]

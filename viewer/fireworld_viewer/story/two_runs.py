@@ -13,8 +13,7 @@ from fireworld.records import CityRecord
 DAMAGE_ORDER: Final = (0, 4, 5, 1, 6, 2, 7, 3, 8)
 """Fieryness codes from the least damage to the most: by the official score's factors; 8 comes after 3, both count 0."""
 
-_DAMAGE: Final = np.argsort(np.array(DAMAGE_ORDER)).astype(np.int8)
-"""(9,) place of each code in that order."""
+_DAMAGE: Final = np.argsort(np.array(DAMAGE_ORDER)).astype(np.int8)  # (9,) place of each code in that order
 
 
 def compare_damage(fieryness_a: NDArray[np.uint8], fieryness_b: NDArray[np.uint8]) -> NDArray[np.int8]:
