@@ -71,11 +71,7 @@ PANELS: Final = (
 
 
 def draw_curves(recordings: Sequence[Recording]) -> Figure:
-    """Draw all panels: those of two recordings beside each other, on the same scales.
-
-    Raises:
-        ViewError: matplotlib is not installed.
-    """
+    """Draw all panels: those of two recordings beside each other, on the same scales."""
     pair = len(recordings) > 1
     n_rows = len(PANELS) if pair else -(-len(PANELS) // 2)
     high = n_rows * _ROW_INCHES

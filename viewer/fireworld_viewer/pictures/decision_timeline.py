@@ -27,11 +27,7 @@ _BANDS: Final = ((-0.38, 0.44), (0.12, 0.22))
 
 
 def draw_timeline(recordings: Sequence[Recording]) -> Figure:
-    """Draw a panel for each recording, in it two bands for each brigade.
-
-    Raises:
-        ViewError: matplotlib is not installed.
-    """
+    """Draw a panel for each recording, in it two bands for each brigade."""
     heights = [_MARGIN_INCHES + _ROW_INCHES * max(1, len(one.city.brigade_tank_litres)) for one in recordings]
     total = sum(heights) + _LEGEND_INCHES
     figure = new_figure(_WIDTH_INCHES, total)

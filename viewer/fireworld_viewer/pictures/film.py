@@ -67,15 +67,7 @@ def save_film(
 
 
 class FilmFrames:
-    """The frames of a film, drawn when asked for; the city is drawn once.
-
-    Args:
-        recordings: one, or two of the same city.
-        steps: one for each frame.
-
-    Raises:
-        ViewError: matplotlib is not installed.
-    """
+    """The frames of a film, drawn when asked for; the city is drawn once. Arguments as in `save_film`."""
 
     def __init__(self, recordings: Sequence[Recording], steps: Sequence[ShownStep]) -> None:
         self._recordings, self._steps = recordings, steps

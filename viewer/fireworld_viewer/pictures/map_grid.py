@@ -43,9 +43,6 @@ class MapGrid:
         heading: above everything; empty for none.
         labels: entries of the legend; what is on these maps if left out.
         dpi: pixels an inch.
-
-    Raises:
-        ViewError: matplotlib is not installed.
     """
 
     def __init__(

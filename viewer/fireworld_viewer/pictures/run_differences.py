@@ -13,7 +13,7 @@ from fireworld_viewer.pictures.city_map import hexadecimal, outlines_m
 from fireworld_viewer.pictures.figure_files import INK, PAIR_COLORS, new_figure, open_frame
 from fireworld_viewer.pictures.map_legend import LEGEND_STYLE
 from fireworld_viewer.pictures.maps import draw_map
-from fireworld_viewer.story.two_runs import compare_damage
+from fireworld_viewer.story.steps import compare_damage
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,9 +36,6 @@ def draw_difference_map(city: CityRecord, a: StepRecord, b: StepRecord, differin
     """Draw which buildings, brigades and civilians differ; brigades where they are in the second run.
 
     `a` and `b` are one step of both runs; `differing`: "building", "brigade" and "civilian", (n,) bool which differ.
-
-    Raises:
-        ViewError: matplotlib is not installed.
     """
     from matplotlib.collections import LineCollection, PolyCollection
 
@@ -93,9 +90,6 @@ def draw_difference_curves(
         curves: by title: of A and of B; those after the first are counts.
         n_buildings: by label: how many buildings differ, in anything and in fieryness.
         first_step: of the first difference; None for none.
-
-    Raises:
-        ViewError: matplotlib is not installed.
     """
     figure = new_figure(12.0, 6.4, dpi=110, paper="white", layout="constrained")
     panels = figure.subplots(2, 2, sharex=True).ravel()

@@ -162,7 +162,7 @@ def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome
     from fireworld_viewer.rerun_view.pages import log_legend, log_outcome
     from fireworld_viewer.rerun_view.plots import first_burning
     from fireworld_viewer.rerun_view.run_layers import RunLayers
-    from fireworld_viewer.story.two_runs import check_same_city
+    from fireworld_viewer.story.steps import check_same_city
 
     comparing = len(recordings) > 1
     if comparing:

@@ -1,8 +1,8 @@
-"""The city in Rerun: ground, streets, and what changes its color: buildings and civilians."""
+"""The city in Rerun: ground, streets, what changes its color, buildings and civilians, and the fire sites in it."""
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import rerun
@@ -106,3 +106,37 @@ def log_civilians(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
     health = colors.packed_array(colors.health_rgb(hp, np.asarray(city.civilian_hp)))
     dots = rerun.Points3D.columns(colors=health.reshape(-1)).partition(np.full(len(hp), n))
     layers.rows("civilians", dots, number_columns("Civilian", {"hp": hp}))
+
+
+def log_sites(layers: Layers, recording: Recording) -> None:
+    """Draw a box around each fire site and thick lines along the sides over which its fire can spread."""
+    count = np.array([len(row) for row in recording.ragged("/observations", "site_id")])
+    if not count.any() and not layers.has("fire/sites"):
+        return
+
+    def joined(name: str) -> NDArray[Any]:
+        """Return a field of the sites of all steps, one after another: (sites,)."""
+        return np.concatenate(recording.ragged("/observations", f"site_{name}"))
+
+    west, south, east, north = (joined(f"{side}_m").astype(np.float32) for side in ("west", "south", "east", "north"))
+    labels = [f"fire {site}: {n} burning" for site, n in zip(joined("id"), joined("n_burning"), strict=True)]
+    height = np.ones_like(west)
+    boxes = rerun.Boxes3D.columns(
+        centers=np.column_stack([(west + east) / 2, (south + north) / 2, height]),
+        half_sizes=np.column_stack([(east - west) / 2, (north - south) / 2, height]),
+        labels=labels,
+    )
+    style = rerun.Boxes3D.from_fields(colors=colors.single(colors.CLOSED_SIDE_RGB), radii=[0.2], show_labels=[False])
+    layers.static("fire/sites", style)
+    layers.rows("fire/sites", boxes.partition(count))
+
+    # (sites, 4): N, E, S, W as in records.SIDES
+    free = (joined("free_sides").astype(np.uint8)[:, np.newaxis] >> np.arange(4, dtype=np.uint8)) & 1
+    nw, ne, se, sw = (
+        np.column_stack([x, y, height]) for x, y in ((west, north), (east, north), (east, south), (west, south))
+    )
+    ends = ((nw, ne), (ne, se), (se, sw), (sw, nw))
+    strips = np.stack([np.stack(pair, axis=1) for pair in ends], axis=1)
+    per_step = np.bincount(np.repeat(np.arange(len(count)), count), weights=free.sum(axis=1), minlength=len(count))
+    chosen = strips[free.astype(bool)]
+    layers.strips("fire/free_sides", chosen, per_step.astype(int), radius_m=0.9, rgb=colors.FREE_SIDE_RGB)

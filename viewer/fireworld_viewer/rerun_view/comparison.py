@@ -18,7 +18,7 @@ from fireworld_viewer.rerun_view.pages import OutcomePage
 from fireworld_viewer.rerun_view.plots import log_plot
 from fireworld_viewer.rerun_view.run_layers import RunLayers
 from fireworld_viewer.story.narration import LogLine
-from fireworld_viewer.story.two_runs import check_same_city, common_steps, compare_damage
+from fireworld_viewer.story.steps import check_same_city, common_steps, compare_damage
 
 MARK_PATH: Final = "/diff/plots/first_difference"
 AGREEMENT: Final = ("the same", "buildings the same, something else not", "buildings differ")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import socket
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from typing import Any, Final
 from urllib.parse import urlsplit
 
@@ -22,21 +22,8 @@ _WAITING_MAX: Final = 2_000
 _POINTS_WAITING_MAX: Final = 100_000
 _ENCODE_SECONDS: Final = 60.0
 
-
-@dataclass(frozen=True)
-class Screen:
-    """Where a live view goes: a window of its own, or a viewer that runs already."""
-
-    command: tuple[str, ...]
-    stays: bool
-
-    def open(self) -> ViewerProcess:
-        """Start the process.
-
-        Raises:
-            ViewError: it cannot be started.
-        """
-        return ViewerProcess(self.command, app.viewer_environment(os.environ), stays=self.stays)
+Screen = Callable[[], ViewerProcess]
+"""Where a live view goes, a window of its own or a viewer that runs already: starts the process that shows it."""
 
 
 def own_window() -> Screen:
@@ -48,7 +35,7 @@ def own_window() -> Screen:
     program = str(app.viewer_executable())
     app.check_display("--view", "--view-url of a viewer that runs, or --record and `fireworld view`")
     options = ("--bind", app.LOCALHOST, "--port", str(app.free_port()), "--hide-welcome-screen", "--expect-data-soon")
-    return Screen((program, "-", *options), stays=True)
+    return partial(ViewerProcess, (program, "-", *options), stays=True)
 
 
 def running_viewer(url: str) -> Screen:
@@ -73,7 +60,7 @@ def running_viewer(url: str) -> Screen:
         socket.create_connection((app.LOCALHOST, port), timeout=2.0).close()
     except OSError:
         raise ViewError(expected("--view-url", "", "a viewer that listens", url, f"try rerun --port {port}")) from None
-    return Screen((program, "-", "--bind", app.LOCALHOST, "--port", str(port)), stays=False)
+    return partial(ViewerProcess, (program, "-", "--bind", app.LOCALHOST, "--port", str(port)), stays=False)
 
 
 class RunEncoder:
@@ -118,7 +105,7 @@ class RunView(BackgroundSender[StepRecord]):
     def __init__(self, screen: Screen, header: RunHeader, city: CityRecord, *, warn: Callable[[str], None]) -> None:
         n_fit = _WAITING_BYTES_MAX // (_BYTES_PER_BUILDING * max(1, len(city.building_id)))
         n_most = min(_WAITING_MAX, max(16, n_fit))
-        super().__init__(RunEncoder(header, city).encode, screen.open(), n_waiting_max=n_most, warn=warn)
+        super().__init__(RunEncoder(header, city).encode, screen(), n_waiting_max=n_most, warn=warn)
 
     def add(self, record: StepRecord) -> None:
         """Hand over a step."""
@@ -144,7 +131,7 @@ class TrainingView(BackgroundSender[TrainingPoint]):
         self._bytes = stream.binary_stream()
         self._curves = CurveWriter(stream, layout)
         self._due: deque[PlayRun] = deque(maxlen=1)
-        super().__init__(self._encode_points, screen.open(), n_waiting_max=_POINTS_WAITING_MAX, warn=warn)
+        super().__init__(self._encode_points, screen(), n_waiting_max=_POINTS_WAITING_MAX, warn=warn)
 
     def add(self, point: TrainingPoint, *, play: PlayRun | None = None) -> None:
         """Hand over a point, and a run to play after it, which replaces one that has not begun."""

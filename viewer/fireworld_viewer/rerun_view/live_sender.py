@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from threading import Condition, Thread
 from typing import Final, Generic, TypeVar
 
 from fireworld.errors import ViewError
+from fireworld_viewer.rerun_view.app import viewer_environment
 
 Item = TypeVar("Item")
 
@@ -23,19 +25,18 @@ class ViewerProcess:
 
     Args:
         command: the program and its arguments.
-        environment: of the process.
         stays: whether it stays when the input ends, as a window does that somebody still looks at.
 
     Raises:
         ViewError: it cannot be started.
     """
 
-    def __init__(self, command: Sequence[str], environment: Mapping[str, str], *, stays: bool) -> None:
+    def __init__(self, command: Sequence[str], *, stays: bool) -> None:
         self._stays = stays
         try:
             self._process = subprocess.Popen(  # noqa: S603 - our own command
                 command,
-                env=environment,
+                env=viewer_environment(os.environ),
                 bufsize=0,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,

@@ -12,7 +12,6 @@ from fireworld.records import CityRecord, Recording
 from fireworld_viewer.city_mesh import build_mesh
 from fireworld_viewer.rerun_view import brigades, city_layers
 from fireworld_viewer.rerun_view.air import log_air
-from fireworld_viewer.rerun_view.fire_sites import log_sites
 from fireworld_viewer.rerun_view.layers import Layers
 from fireworld_viewer.rerun_view.plots import log_plots
 from fireworld_viewer.story.narration import decision_lines, event_lines
@@ -58,7 +57,7 @@ class RunLayers:
         brigades.log_brigades(layers, recording)
         brigades.log_water(layers, recording, mesh)
         city_layers.log_civilians(layers, recording, mesh)
-        log_sites(layers, recording)
+        city_layers.log_sites(layers, recording)
         log_plots(layers, recording, self._focus_index)
         brigades.log_states(layers, recording)
         _log_text(layers, recording)

@@ -1,4 +1,4 @@
-"""Two policies compared seed by seed: every paired difference, and the interval of their mean."""
+"""Figures of policies: two compared seed by seed, and how teams learned."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from fireworld.records import Array
-from fireworld_viewer.pictures.figure_files import new_figure, open_frame
+from fireworld_viewer.pictures.figure_files import PAIR_COLORS, new_figure, open_frame
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,6 +22,7 @@ EQUAL: Final = "#8a8a8a"
 _INK: Final = "#222222"
 _GOLDEN: Final = 0.6180339887498949
 _SPREAD: Final = 0.3  # points lie that far above and below their line
+_PANELS_ACROSS: Final = 4  # of learning curves
 _DIRECTIONS: Final = {True: (1, " (more is better)"), False: (-1, " (less is better)"), None: (0, "")}
 
 
@@ -37,11 +38,7 @@ class DifferencePanel:
 
 
 def draw_paired_differences(panels: Sequence[DifferencePanel], *, title: str) -> Figure:
-    """Draw a panel for each quantity, two in a row: a point for every seed, and the mean with its 95 % interval.
-
-    Raises:
-        ViewError: matplotlib is not installed.
-    """
+    """Draw a panel for each quantity, two in a row: a point for every seed, and the mean with its 95 % interval."""
     n_rows = -(-len(panels) // 2)
     height = n_rows * (1.4 + 0.5 * len(panels[0].lines))
     figure = new_figure(11.0, height, paper="white", layout="constrained")
@@ -82,3 +79,41 @@ def _draw_panel(axes: Axes, panel: DifferencePanel) -> None:
     axes.set_xlabel(panel.unit, fontsize=8)
     open_frame(axes)
     axes.tick_params(axis="x", labelsize=8)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LearningPanel:
+    """What one panel shows."""
+
+    title: str
+    curves: Mapping[str, Sequence[Array]]
+    """By team, one or two: (episodes,) numbers of each repetition; repetitions may differ in length."""
+    marked_episode: float  # where a dotted line stands
+
+
+def draw_learning_curves(panels: Sequence[LearningPanel], *, label: str, mark: str) -> Figure:
+    """Draw the panels in rows of four; the label is that of the numbers, the mark that of the dotted lines."""
+    figure = new_figure(12.0, 5.6, dpi=110, paper="white", layout="constrained")
+    grid = figure.subplots(-(-len(panels) // _PANELS_ACROSS), _PANELS_ACROSS, sharex=True, squeeze=False).ravel()
+    for axes, panel in zip(grid, panels, strict=False):
+        for (team, repetitions), color in zip(panel.curves.items(), PAIR_COLORS, strict=False):
+            for curve in repetitions:
+                axes.plot(curve, color=color, linewidth=0.5, alpha=0.25)
+            axes.plot(_mean_curve(repetitions), color=color, linewidth=1.8, label=team)
+        axes.axvline(panel.marked_episode, color="#555555", linewidth=1.0, linestyle=":", label=mark)
+        axes.set_title(panel.title, fontsize=10, loc="left")
+        open_frame(axes)
+        axes.tick_params(labelsize=8)
+    grid[0].legend(fontsize=8, frameon=False)
+    figure.supxlabel("episode", fontsize=10)
+    figure.supylabel(label, fontsize=10)
+    return figure
+
+
+def _mean_curve(repetitions: Sequence[Array]) -> Array:
+    """Return the mean over the repetitions that last as long: (longest,)."""
+    padded = np.full((len(repetitions), max(map(len, repetitions))), np.nan)
+    for row, curve in zip(padded, repetitions, strict=True):
+        row[: len(curve)] = curve
+    means: Array = np.nanmean(padded, axis=0)
+    return means
