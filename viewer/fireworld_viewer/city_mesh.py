@@ -75,14 +75,9 @@ def build_mesh(city: CityRecord) -> CityMesh:
 
 
 def triangulate(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Cut a simple polygon into triangles: a fan if it is convex, ears if it is not.
+    """Cut a simple polygon into triangles, (c - 2, 3) indices of corners: a fan if it is convex, ears if it is not.
 
-    Args:
-        x: (c,) corners in either sense of rotation; the closing corner is not repeated.
-        y: (c,)
-
-    Returns:
-        (c - 2, 3) indices of corners.
+    x and y, (c,): corners in either sense of rotation; the closing corner is not repeated.
     """
     n, xy = len(x), np.column_stack([x, y])
     turns = _turn(np.roll(xy, 1, axis=0), xy, np.roll(xy, -1, axis=0))

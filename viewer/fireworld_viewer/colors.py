@@ -128,12 +128,7 @@ def paler(rgb: Rgb) -> Rgb:
 def health_rgb(hp: NDArray[Any], hp_start: NDArray[Any]) -> NDArray[np.uint8]:
     """Color people by the share of their health left: green well, white half, magenta dying, black dead.
 
-    Args:
-        hp: (..., n) health points now.
-        hp_start: (n,) health points at the start.
-
-    Returns:
-        (..., n, 3) sRGB.
+    (..., n) health points now and (n,) at the start to (..., n, 3) sRGB.
     """
     start = np.maximum(hp_start, 1).astype(np.int64)
     share = np.clip(hp.astype(np.int64), 0, start) * 512 // start  # 0..512

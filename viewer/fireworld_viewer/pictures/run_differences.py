@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from fireworld.records import Array, CityRecord, StepRecord
 from fireworld_viewer import colors
 from fireworld_viewer.pictures.city_map import hexadecimal, outlines_m
 from fireworld_viewer.pictures.figure_files import INK, PAIR_COLORS, new_figure, open_frame
-from fireworld_viewer.pictures.map_legend import LEGEND_STYLE
+from fireworld_viewer.pictures.map_grid import LEGEND_STYLE, mark
 from fireworld_viewer.pictures.maps import draw_map
 from fireworld_viewer.story.steps import compare_damage
 
@@ -61,18 +61,14 @@ def draw_difference_map(city: CityRecord, a: StepRecord, b: StepRecord, differin
 
 def _draw_legend(axes: Axes, damage: Sequence[int], *, n_brigades: int, n_civilians: int) -> None:
     """Name what differs, in place of the map's own legend."""
-    from matplotlib.lines import Line2D
-
-    def mark(label: str, count: int, face: str, *, shape: str = "s", edge: str = INK) -> Line2D:
-        style: dict[str, Any] = {"markerfacecolor": face, "markeredgecolor": edge, "markersize": 9}
-        return Line2D([], [], linestyle="", marker=shape, label=f"{label} ({count})", **style)
-
-    handles = [mark(label, damage.count(sign), face) for sign, (label, face) in _KINDS.items() if sign in damage]
+    handles = [
+        mark(face, label=f"{label} ({damage.count(sign)})") for sign, (label, face) in _KINDS.items() if sign in damage
+    ]
     if n_brigades:
-        handles.append(mark("brigade, from A to B", n_brigades, _BRIGADE, shape="o"))
+        handles.append(mark(_BRIGADE, "o", label=f"brigade, from A to B ({n_brigades})"))
     if n_civilians:
-        handles.append(mark("civilian", n_civilians, "none", shape="o", edge=_VIOLET))
-    handles.append(Line2D([], [], linestyle="", label="grey: the same"))
+        handles.append(mark("none", "o", edge=_VIOLET, label=f"civilian ({n_civilians})"))
+    handles.append(mark("none", "", label="grey: the same"))
     axes.legend(handles=handles, **LEGEND_STYLE)
 
 

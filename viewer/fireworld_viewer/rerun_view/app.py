@@ -76,12 +76,7 @@ def serve(
 ) -> None:
     """Serve Rerun with the recordings to browsers on this machine until interrupted; arguments as in `save`.
 
-    Args:
-        recordings: one, or two of the same city.
-        focus: ids of buildings.
-        outcome: how the runs came out.
-        port: of the page.
-        announce: called with the address of the page.
+    `port` is that of the page, and `announce` is called with its address.
 
     Raises:
         ViewError: the port is taken, or there is no viewer.

@@ -33,20 +33,14 @@ def log_brigades(layers: Layers, recording: Recording) -> None:
     if n == 0:
         return
     width = np.full(k, n)
-    tank = recording.column("/brigades", "tank_litres")
-    activity = recording.column("/brigades", "activity")
     choices = choices_of(recording)
     numbers: dict[str, NDArray[Any]] = {
-        "tank_litres": tank,
-        "sprayed_litres": recording.column("/brigades", "sprayed_litres"),
-        "hp": recording.column("/brigades", "hp"),
-        "activity": activity,
-        "action": choices.action,
-        "target": choices.target,
-        "value": choices.value,
+        **{name: recording.column("/brigades", name) for name in ("tank_litres", "sprayed_litres", "hp", "activity")},
+        **{name: getattr(choices, name) for name in ("action", "target", "value")},
         **{f"value_{name.replace('-', '_')}": choices.action_values[..., index] for index, name in enumerate(ACTIONS)},
     }
-    rgb = colors.packed_table(colors.ACTIVITY_RGB)[activity].reshape(-1)
+    tank = numbers["tank_litres"]
+    rgb = colors.packed_table(colors.ACTIVITY_RGB)[numbers["activity"]].reshape(-1)
     balls = rerun.Points3D.columns(positions=position.reshape(-1, 3), colors=rgb)
     layers.static("team/brigades", rerun.Points3D.from_fields(radii=[_BALL_RADIUS_M]))
     layers.rows("team/brigades", balls.partition(width), number_columns("Brigade", numbers))

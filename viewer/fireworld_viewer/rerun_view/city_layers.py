@@ -132,11 +132,9 @@ def log_sites(layers: Layers, recording: Recording) -> None:
 
     # (sites, 4): N, E, S, W as in records.SIDES
     free = (joined("free_sides").astype(np.uint8)[:, np.newaxis] >> np.arange(4, dtype=np.uint8)) & 1
-    nw, ne, se, sw = (
-        np.column_stack([x, y, height]) for x, y in ((west, north), (east, north), (east, south), (west, south))
-    )
-    ends = ((nw, ne), (ne, se), (se, sw), (sw, nw))
-    strips = np.stack([np.stack(pair, axis=1) for pair in ends], axis=1)
+    corners = ((west, north), (east, north), (east, south), (west, south), (west, north))
+    ring = np.stack([np.column_stack([x, y, height]) for x, y in corners], axis=1)
+    strips = np.stack([ring[:, :-1], ring[:, 1:]], axis=2)  # (sites, 4, 2, 3)
     per_step = np.bincount(np.repeat(np.arange(len(count)), count), weights=free.sum(axis=1), minlength=len(count))
     chosen = strips[free.astype(bool)]
     layers.strips("fire/free_sides", chosen, per_step.astype(int), radius_m=0.9, rgb=colors.FREE_SIDE_RGB)

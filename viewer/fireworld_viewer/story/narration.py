@@ -53,10 +53,7 @@ def event_lines(recording: Recording) -> Iterator[LogLine]:
 def decision_lines(recording: Recording, choices: ChoiceTables, new: NDArray[np.bool_]) -> Iterator[LogLine]:
     """Write choices in words: the action, its target and value, and what the brigade observed.
 
-    Args:
-        recording: the steps.
-        choices: their choices.
-        new: (k, n_brigades) which of the choices to write.
+    `new`: (k, n_brigades), which of the choices of the recording to write.
     """
     building_id = np.asarray(recording.city.building_id).tolist()
     observed = {name: per_brigade(recording, name, missing=-1, topic="/observations") for name in OBSERVED}
