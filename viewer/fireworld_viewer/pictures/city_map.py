@@ -41,11 +41,12 @@ class BrigadeMarks:
     tank_share: NDArray[np.float64] | None = None  # (n,) share of the tank that is full, 0..1; unknown if left out
     target: NDArray[Any] | None = None  # (n,) index of the target's building, -1 none; unknown if left out
 
-    def with_target(self, activity: int) -> NDArray[np.intp]:
-        """Return the indices of the brigades that do this and have a target: (k,)."""
+    def with_target(self, activity: int) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Return the indices of the brigades that do this and have a target, and those of their targets: (k,) each."""
         if self.activity is None or self.target is None:
-            return np.zeros(0, dtype=np.intp)
-        return np.flatnonzero((self.activity == activity) & (self.target >= 0))
+            return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
+        chosen = np.flatnonzero((self.activity == activity) & (self.target >= 0))
+        return chosen, self.target[chosen]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,9 +157,8 @@ class CityMap:
                 number.set_color(contrasting(colors.ACTIVITY_RGB[activity[index]]))
         casings = (self._way_casing, self._ways, _DRIVING), (self._jet_casing, self._jets, _SPRAYING)
         for casing, line, doing in casings:
-            chosen = brigades.with_target(doing)
-            aim = self._centers[np.zeros(0, dtype=np.intp) if brigades.target is None else brigades.target[chosen]]
-            segments = list(np.stack([xy[chosen], aim], axis=1))
+            chosen, target = brigades.with_target(doing)
+            segments = list(np.stack([xy[chosen], self._centers[target]], axis=1))
             casing.set_segments(segments)
             line.set_segments(segments)
 

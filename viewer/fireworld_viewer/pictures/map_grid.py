@@ -175,8 +175,8 @@ def count_marks(city: CityRecord, state: MapState) -> dict[str, int]:
         doing = np.bincount(np.asarray(brigades.activity, dtype=np.int64), minlength=len(_DOING)).tolist()
         counts |= dict(zip(_DOING, doing, strict=True))
         counts[_TANK] = len(brigades.xy_m)
-        counts[_JET] = len(brigades.with_target(ACTIVITIES.index("spraying")))
-        counts[_WAY] = len(brigades.with_target(ACTIVITIES.index("driving")))
+        counts[_JET] = len(brigades.with_target(ACTIVITIES.index("spraying"))[0])
+        counts[_WAY] = len(brigades.with_target(ACTIVITIES.index("driving"))[0])
     return {label: count for label, count in counts.items() if count}
 
 

@@ -154,7 +154,7 @@ def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome
     rerun = _import_rerun()
     from fireworld_viewer.rerun_view import blueprint
     from fireworld_viewer.rerun_view.comparison import log_comparison
-    from fireworld_viewer.rerun_view.pages import log_legend, log_outcome
+    from fireworld_viewer.rerun_view.pages import OUTCOME_PATH, log_legend, log_page
     from fireworld_viewer.rerun_view.plots import first_burning
     from fireworld_viewer.rerun_view.run_layers import RunLayers
     from fireworld_viewer.story.steps import check_same_city
@@ -173,7 +173,7 @@ def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome
         stream.send_recording_name(" | ".join(map(blueprint.title, recordings)))
         log_legend(stream, comparing=comparing)
         if outcome is not None:
-            log_outcome(stream, outcome)
+            log_page(stream, OUTCOME_PATH, outcome.markdown)
         if comparing:
             log_comparison(stream, *recordings, focus=plotted, outcome=outcome)
         else:
@@ -220,11 +220,7 @@ def _run_viewer(
 
 
 def _import_rerun() -> ModuleType:
-    """Import Rerun, quietly: its own log would stand between the user and our one line.
-
-    Raises:
-        ViewError: it is not installed, or is of another minor version.
-    """
+    """Import Rerun, quietly, or raise ViewError: its own log would stand between the user and our one line."""
     level = os.environ.get("RUST_LOG")
     os.environ["RUST_LOG"] = level or "off"  # read once, when Rerun is first imported
     try:

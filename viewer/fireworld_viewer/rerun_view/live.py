@@ -96,10 +96,7 @@ class RunEncoder:
 class RunView(BackgroundSender[StepRecord]):
     """A live view of a run: add every record, and close it at the end; neither waits for a viewer at work.
 
-    `warn` is called with one line if the view has to end before the run.
-
-    Raises:
-        ViewError: the viewer cannot be started.
+    `warn` is called with one line if the view has to end before the run. Errors as in `ViewerProcess`.
     """
 
     def __init__(self, screen: Screen, header: RunHeader, city: CityRecord, *, warn: Callable[[str], None]) -> None:
@@ -120,10 +117,7 @@ PlayRun = Callable[[], tuple[str, RunHeader, CityRecord, Sequence[StepRecord]]]
 class TrainingView(BackgroundSender[TrainingPoint]):
     """A live view of a training: curves of all that it reports, and now and then a run played for the viewer.
 
-    `warn` is called with one line if the view has to end before the training.
-
-    Raises:
-        ViewError: the viewer cannot be started.
+    `warn` is called with one line if the view has to end before the training. Errors as in `ViewerProcess`.
     """
 
     def __init__(self, screen: Screen, layout: TrainingLayout, *, warn: Callable[[str], None]) -> None:

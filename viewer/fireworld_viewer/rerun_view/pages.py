@@ -92,15 +92,11 @@ def log_legend(stream: rerun.RecordingStream, *, comparing: bool) -> None:
     )
     stream.log(f"{LEGEND_PATH}/dots", dots, static=True)
     stream.log(f"{LEGEND_PATH}/names", names, static=True)
-    _log_page(stream, HELP_PATH, HELP)
+    log_page(stream, HELP_PATH, HELP)
 
 
-def log_outcome(stream: rerun.RecordingStream, page: OutcomePage) -> None:
-    """Send the page of the outcome."""
-    _log_page(stream, OUTCOME_PATH, page.markdown)
-
-
-def _log_page(stream: rerun.RecordingStream, path: str, text: str) -> None:
+def log_page(stream: rerun.RecordingStream, path: str, text: str) -> None:
+    """Send a page of text in Markdown."""
     import rerun
 
     stream.log(path, rerun.TextDocument(text, media_type=rerun.MediaType.MARKDOWN), static=True)

@@ -41,7 +41,7 @@ class RunLayers:
         name: str = "",
         focus: Sequence[int] = (),
     ) -> None:
-        self._focus_index = building_indices(city, focus)
+        self._focus_index = _building_indices(city, focus)
         self._layers = Layers(stream, prefix, np.zeros(0, dtype=np.int64), name=name)
         self._mesh = build_mesh(city)
         self._layers.static("", rerun.ViewCoordinates.RIGHT_HAND_Z_UP)
@@ -75,12 +75,8 @@ def _log_text(layers: Layers, recording: Recording) -> None:
     layers.text("log/decisions", decision_lines(recording, choices, new))
 
 
-def building_indices(city: CityRecord, ids: Sequence[int]) -> list[int]:
-    """Return the indices of buildings.
-
-    Raises:
-        ViewError: the city has no building of such an id.
-    """
+def _building_indices(city: CityRecord, ids: Sequence[int]) -> list[int]:
+    """Return the indices of buildings, or raise ViewError where the city has no building of such an id."""
     index_of = {int(identifier): index for index, identifier in enumerate(city.building_id)}
     for identifier in ids:
         if identifier not in index_of:
