@@ -10,8 +10,8 @@ import pytest
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh
 from fireworld_viewer.rerun_view import app
-from fireworld_viewer.rerun_view.comparison import AGREEMENT
 from fireworld_viewer.rerun_view.pages import OutcomePage
+from fireworld_viewer.rerun_view.run_layers import AGREEMENT
 from fireworld_viewer.story.steps import DAMAGE_ORDER, common_steps, compare_damage
 
 from fireworld.errors import ViewError

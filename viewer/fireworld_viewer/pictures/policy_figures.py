@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -112,8 +113,6 @@ def draw_learning_curves(panels: Sequence[LearningPanel], *, label: str, mark: s
 
 def _mean_curve(repetitions: Sequence[Array]) -> Array:
     """Return the mean over the repetitions that last as long: (longest,)."""
-    padded = np.full((len(repetitions), max(map(len, repetitions))), np.nan)
-    for row, curve in zip(padded, repetitions, strict=True):
-        row[: len(curve)] = curve
-    means: Array = np.nanmean(padded, axis=0)
+    longest = np.array([*zip_longest(*repetitions, fillvalue=np.nan)], order="F").T
+    means: Array = np.nanmean(longest, axis=0)
     return means

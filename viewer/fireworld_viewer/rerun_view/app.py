@@ -153,10 +153,9 @@ def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome
     """
     rerun = _import_rerun()
     from fireworld_viewer.rerun_view import blueprint
-    from fireworld_viewer.rerun_view.comparison import log_comparison
     from fireworld_viewer.rerun_view.pages import OUTCOME_PATH, log_legend, log_page
     from fireworld_viewer.rerun_view.plots import first_burning
-    from fireworld_viewer.rerun_view.run_layers import RunLayers
+    from fireworld_viewer.rerun_view.run_layers import RunLayers, log_comparison
     from fireworld_viewer.story.steps import check_same_city
 
     comparing = len(recordings) > 1

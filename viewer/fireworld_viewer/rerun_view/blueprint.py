@@ -12,10 +12,10 @@ from fireworld.records import SNAPSHOT_EVERY_STEPS, Recording
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import city_box_m
 from fireworld_viewer.rerun_view.camera import Camera, frame_fire, frame_from_above
-from fireworld_viewer.rerun_view.comparison import MARK_PATH
 from fireworld_viewer.rerun_view.layers import TIMELINE
 from fireworld_viewer.rerun_view.pages import HELP_PATH, LEGEND_PATH, OUTCOME_PATH, OutcomePage, bounds
 from fireworld_viewer.rerun_view.plots import has_choice_values
+from fireworld_viewer.rerun_view.run_layers import MARK_PATH
 
 STEPS_PER_SECOND: Final = 8.0  # a pace that can be followed
 LAYERS: Final = ("city", "team", "civilians", "fire")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fireworld.records import MATERIALS, CityRecord, Recording
 from fireworld_viewer import colors
-from fireworld_viewer.city_mesh import SHADES_PERCENT, STOREY_M, CityMesh, city_box_m
+from fireworld_viewer.city_mesh import SHADES_PERCENT, CityMesh, city_box_m
 from fireworld_viewer.rerun_view.layers import Layers, number_columns
 
 _REFUGE: Final = len(colors.FIERYNESS_RGB)  # row of a refuge in the table of building colors
@@ -19,8 +19,8 @@ _GROUND_M: Final = -0.4
 _GROUND_MARGIN_M: Final = 15.0
 
 
-def log_city(layers: Layers, city: CityRecord) -> None:
-    """Draw the ground, streets, refuges and hydrants; none of them changes."""
+def log_city(layers: Layers, city: CityRecord, mesh: CityMesh) -> None:
+    """Draw what never changes: the ground, streets, refuges, hydrants, and a dot on every roof that can be clicked."""
     (west, south), (east, north) = city_box_m(city, margin_m=_GROUND_MARGIN_M)
     ground = rerun.Mesh3D(
         vertex_positions=[(x, y, _GROUND_M) for x, y in ((west, south), (east, south), (east, north), (west, north))],
@@ -33,10 +33,8 @@ def log_city(layers: Layers, city: CityRecord) -> None:
         strips = np.stack([node[city.street_from], node[city.street_to]], axis=1)
         layers.static("city/streets", rerun.LineStrips3D(strips, colors=colors.single(colors.STREET_RGB), radii=[0.8]))
     if len(city.refuge_building):
-        refuge = np.asarray(city.refuge_building)
-        above_m = STOREY_M * np.asarray(city.floors) + 3.0
-        roof = np.column_stack([city.center_x_m, city.center_y_m, above_m])[refuge]
-        labels = [f"refuge {city.building_id[index]}" for index in refuge]
+        roof = mesh.roof_xyz_m[city.refuge_building] + np.array([0, 0, 3], dtype=np.float32)
+        labels = [f"refuge {city.building_id[index]}" for index in city.refuge_building]
         rgb = colors.single(colors.REFUGE_RGB)
         marks = rerun.Points3D(roof, colors=rgb, radii=[3.0], labels=labels, show_labels=True)
         layers.static("city/refuges", marks)
@@ -44,22 +42,6 @@ def log_city(layers: Layers, city: CityRecord) -> None:
         position = np.column_stack([city.hydrant_x_m, city.hydrant_y_m, np.full(len(city.hydrant_x_m), 1.0)])
         hydrants = rerun.Points3D(position, colors=colors.single(colors.HYDRANT_RGB), radii=[1.2])
         layers.static("city/hydrants", hydrants)
-
-
-def log_buildings(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
-    """Color the city by fieryness, and give the handle on every roof the numbers of its building."""
-    columns = {
-        name: recording.column("/buildings", name)
-        for name in ("temperature", "fuel_share", "water_litres", "fieryness")
-    }
-    shown = columns["fieryness"].copy()
-    shown[:, np.asarray(recording.city.refuge_building, dtype=np.intp)] = _REFUGE
-    log_mesh(layers, mesh, shown, _BUILDING_COLORS)
-    layers.numbers("city/handles", "Building", columns)
-
-
-def log_handles(layers: Layers, city: CityRecord, mesh: CityMesh) -> None:
-    """Put a dot on every roof that can be clicked, with the facts of its building; one batch, never one by one."""
     handles = mesh.roof_xyz_m + np.array([0, 0, 0.3], dtype=np.float32)
     points = rerun.Points3D(handles, colors=colors.single(colors.HANDLE_RGB), radii=[0.9])
     facts = rerun.DynamicArchetype(
@@ -73,6 +55,18 @@ def log_handles(layers: Layers, city: CityRecord, mesh: CityMesh) -> None:
         },
     )
     layers.static("city/handles", points, facts)
+
+
+def log_buildings(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
+    """Color the city by fieryness, and give the handle on every roof the numbers of its building."""
+    columns = {
+        name: recording.column("/buildings", name)
+        for name in ("temperature", "fuel_share", "water_litres", "fieryness")
+    }
+    shown = columns["fieryness"].copy()
+    shown[:, np.asarray(recording.city.refuge_building, dtype=np.intp)] = _REFUGE
+    log_mesh(layers, mesh, shown, _BUILDING_COLORS)
+    layers.numbers("city/handles", "Building", columns)
 
 
 def log_mesh(layers: Layers, mesh: CityMesh, codes: NDArray[np.uint8], table: NDArray[np.uint32]) -> None:
