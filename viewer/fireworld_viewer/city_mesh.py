@@ -64,13 +64,13 @@ def build_mesh(city: CityRecord) -> CityMesh:
         shade[wall + corner] = facing
     walls = np.concatenate([np.column_stack([wall, wall + 1, wall + 2]), np.column_stack([wall, wall + 2, wall + 3])])
     roofs = [roof[a + triangulate(x[a:b], y[a:b])] for a, b in itertools.pairwise(ptr.tolist())]
-    roof_xyz_m = np.column_stack([city.center_x_m, city.center_y_m, np.asarray(city.floors) * STOREY_M])
+    middles = np.column_stack([city.center_x_m, city.center_y_m, np.asarray(city.floors) * STOREY_M])
     return CityMesh(
         vertex_xyz_m=xyz,
         triangle=np.concatenate([*roofs, walls]).astype(np.uint32),
         vertex_building=np.repeat(np.arange(len(n_corners), dtype=np.int32), 5 * n_corners),
         vertex_shade=shade,
-        roof_xyz_m=roof_xyz_m.astype(np.float32),
+        roof_xyz_m=middles.astype(np.float32),
     )
 
 

@@ -88,9 +88,8 @@ DEAD_RGB: Final[Rgb] = (10, 10, 10)
 HEALTH_RGB: Final[tuple[Rgb, ...]] = (HEALTHY_RGB, HURT_RGB, DYING_RGB, DEAD_RGB)
 
 BETTER_RGB: Final[Rgb] = (64, 132, 230)
-SAME_RGB: Final[Rgb] = (188, 184, 176)
 WORSE_RGB: Final[Rgb] = (214, 60, 52)
-DIFFERENCE_RGB: Final[tuple[Rgb, ...]] = (BETTER_RGB, SAME_RGB, WORSE_RGB)
+DIFFERENCE_RGB: Final[tuple[Rgb, ...]] = (BETTER_RGB, FIERYNESS_RGB[0], WORSE_RGB)
 """By difference + 1: -1 less damage in the second run, 0 the same, +1 more."""
 
 

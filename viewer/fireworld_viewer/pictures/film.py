@@ -150,10 +150,9 @@ def _palette(samples: Sequence[Frame]) -> Image:
 
     exact = [*colors.FIERYNESS_RGB, *colors.ACTIVITY_RGB, colors.REFUGE_RGB, colors.WATER_RGB, colors.HYDRANT_RGB]
     exact += [ImageColor.getrgb(color)[:3] for color in (PAPER, GROUND, STREET, INK)]
-    mixed = Image.fromarray(np.concatenate(samples)).quantize(
-        _TRANSPARENT - len(exact), method=Image.Quantize.MEDIANCUT
-    )
-    others = np.array(mixed.getpalette(), dtype=np.int64).reshape(-1, 3)[: _TRANSPARENT - len(exact)]
+    n = _TRANSPARENT - len(exact)
+    mixed = Image.fromarray(np.concatenate(samples)).quantize(n, method=Image.Quantize.MEDIANCUT)
+    others = np.array(mixed.getpalette(), dtype=np.int64).reshape(-1, 3)[:n]
     # Pillow takes a color for another that is very near: none may be very near to an exact one.
     apart = np.abs(others[:, np.newaxis] - np.array(exact)).max(axis=2).min(axis=1) > _NEAR
     palette = Image.new("P", (1, 1))

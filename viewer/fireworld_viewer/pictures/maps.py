@@ -104,10 +104,9 @@ def cells_of(recordings: Sequence[Recording], shown: ShownStep) -> list[MapCell]
 
 def _names(recordings: Sequence[Recording]) -> list[str]:
     """Return scenario, policy and seed of each run."""
-    headers = [one.header for one in recordings]
     return [
-        f"{letter}{_shortened(header.scenario)}, {_shortened(header.policy)}, seed {header.seed}"
-        for header, letter in zip(headers, _letters(recordings), strict=True)
+        f"{letter}{_shortened(one.header.scenario)}, {_shortened(one.header.policy)}, seed {one.header.seed}"
+        for one, letter in zip(recordings, _letters(recordings), strict=True)
     ]
 
 

@@ -16,7 +16,6 @@ from fireworld_viewer.pictures.maps import draw_map
 from fireworld_viewer.story.steps import compare_damage
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Gaps = Sequence[float | None]
@@ -55,21 +54,16 @@ def draw_difference_map(city: CityRecord, a: StepRecord, b: StepRecord, differin
     hurt = np.flatnonzero(differing["civilian"])
     x, y = city.civilian_x_m[hurt], city.civilian_y_m[hurt]
     axes.scatter(x, y, s=120, facecolors="none", edgecolors=_VIOLET, linewidths=1.8, zorder=8)
-    _draw_legend(axes, damage, n_brigades=len(moved), n_civilians=len(hurt))
-    return figure
-
-
-def _draw_legend(axes: Axes, damage: Sequence[int], *, n_brigades: int, n_civilians: int) -> None:
-    """Name what differs, in place of the map's own legend."""
-    handles = [
+    entries = [
         mark(face, label=f"{label} ({damage.count(sign)})") for sign, (label, face) in _KINDS.items() if sign in damage
     ]
-    if n_brigades:
-        handles.append(mark(_BRIGADE, "o", label=f"brigade, from A to B ({n_brigades})"))
-    if n_civilians:
-        handles.append(mark("none", "o", edge=_VIOLET, label=f"civilian ({n_civilians})"))
-    handles.append(mark("none", "", label="grey: the same"))
-    axes.legend(handles=handles, **LEGEND_STYLE)
+    if len(moved):
+        entries.append(mark(_BRIGADE, "o", label=f"brigade, from A to B ({len(moved)})"))
+    if len(hurt):
+        entries.append(mark("none", "o", edge=_VIOLET, label=f"civilian ({len(hurt)})"))
+    entries.append(mark("none", "", label="grey: the same"))
+    axes.legend(handles=entries, **LEGEND_STYLE)
+    return figure
 
 
 def draw_difference_curves(

@@ -57,12 +57,10 @@ def log_brigades(layers: Layers, recording: Recording) -> None:
     full = np.maximum(np.asarray(recording.city.brigade_tank_litres, dtype=np.float32), 1.0)
     half_height = np.clip(tank / full, 0.0, 1.0).astype(np.float32) * (_GAUGE_HEIGHT_M / 2)
     half_width = np.full_like(half_height, _GAUGE_HALF_WIDTH_M)
+    half_sizes = np.stack([half_width, half_width, half_height], axis=-1)
     middle = position.copy()
     middle[..., 2] = position[..., 2] + _BALL_RADIUS_M + half_height
-    gauges = rerun.Boxes3D.columns(
-        centers=middle.reshape(-1, 3),
-        half_sizes=np.stack([half_width, half_width, half_height], axis=-1).reshape(-1, 3),
-    )
+    gauges = rerun.Boxes3D.columns(centers=middle.reshape(-1, 3), half_sizes=half_sizes.reshape(-1, 3))
     style = rerun.Boxes3D.from_fields(colors=colors.single(colors.WATER_RGB), fill_mode=rerun.components.FillMode.Solid)
     layers.static("team/tanks", style)
     layers.rows("team/tanks", gauges.partition(width))
@@ -70,8 +68,7 @@ def log_brigades(layers: Layers, recording: Recording) -> None:
 
 def log_water(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
     """Draw a jet from each brigade that sprays, and a thin arc from each that drives, to the target."""
-    activity = recording.column("/brigades", "activity")
-    sprayed = recording.column("/brigades", "sprayed_litres")
+    activity, sprayed = (recording.column("/brigades", name) for name in ("activity", "sprayed_litres"))
     target = per_brigade(recording, "target", missing=-1)
     position = positions_m(recording)
     for path, shown, radius_m, rgb, rise_m in (
@@ -101,10 +98,8 @@ def positions_m(recording: Recording) -> NDArray[np.float32]:
 
 def crowding(x: NDArray[Any], y: NDArray[Any], *, within_m: float) -> NDArray[np.int64]:
     """Count for each brigade those of lower numbers within a distance in x and in y: (k, n) and (k, n) to (k, n)."""
-    near = (np.abs(x[:, :, np.newaxis] - x[:, np.newaxis, :]) <= within_m) & (
-        np.abs(y[:, :, np.newaxis] - y[:, np.newaxis, :]) <= within_m
-    )
-    counts: NDArray[np.int64] = np.tril(near, k=-1).sum(axis=2)
+    near_x, near_y = (np.abs(one[:, :, np.newaxis] - one[:, np.newaxis, :]) <= within_m for one in (x, y))
+    counts: NDArray[np.int64] = np.tril(near_x & near_y, k=-1).sum(axis=2)
     return counts
 
 

@@ -49,9 +49,7 @@ def log_city(layers: Layers, city: CityRecord, mesh: CityMesh) -> None:
         components={
             "id": np.asarray(city.building_id),
             "material": [MATERIALS[code] for code in city.material],
-            "floors": np.asarray(city.floors),
-            "volume_m3": np.asarray(city.volume_m3),
-            "initial_fuel": np.asarray(city.initial_fuel),
+            **{name: np.asarray(getattr(city, name)) for name in ("floors", "volume_m3", "initial_fuel")},
         },
     )
     layers.static("city/handles", points, facts)
@@ -59,10 +57,8 @@ def log_city(layers: Layers, city: CityRecord, mesh: CityMesh) -> None:
 
 def log_buildings(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
     """Color the city by fieryness, and give the handle on every roof the numbers of its building."""
-    columns = {
-        name: recording.column("/buildings", name)
-        for name in ("temperature", "fuel_share", "water_litres", "fieryness")
-    }
+    names = ("temperature", "fuel_share", "water_litres", "fieryness")
+    columns = {name: recording.column("/buildings", name) for name in names}
     shown = columns["fieryness"].copy()
     shown[:, np.asarray(recording.city.refuge_building, dtype=np.intp)] = _REFUGE
     log_mesh(layers, mesh, shown, _BUILDING_COLORS)

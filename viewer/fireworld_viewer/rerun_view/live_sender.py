@@ -57,10 +57,9 @@ class ViewerProcess:
         return self._input.write(content[:_PIECE_BYTES]) or 0
 
     def close(self, *, finished: bool) -> bool:
-        """End the input; a relay is given the time to send the rest. Return whether it has.
+        """End the input, and abandon the rest unless all was written (`finished`); return whether all has been sent.
 
-        Args:
-            finished: whether all was written; if not, the rest is abandoned.
+        A relay is given the time to send it.
         """
         if finished:
             self._input.close()

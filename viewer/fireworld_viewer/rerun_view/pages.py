@@ -17,6 +17,7 @@ LEGEND_PATH: Final = "/legend"
 HELP_PATH: Final = "/help"
 OUTCOME_PATH: Final = "/outcome"
 
+HEALTH: Final = ("well", "hurt", "dying", "dead")
 _COLUMN_WIDTH: Final = 3.9
 """Width of a name in rows; a row is as high as a dot with its name."""
 
@@ -55,10 +56,7 @@ def entries(*, comparing: bool) -> list[list[tuple[str, colors.Rgb]]]:
         [buildings[8], ("refuge", colors.REFUGE_RGB), ("hydrant", colors.HYDRANT_RGB), ("hot air", colors.AIR_RGB[1])],
         [*brigades[:3], ("water", colors.WATER_RGB)],
         [*brigades[3:], ("fire can spread", colors.FREE_SIDE_RGB)],
-        [
-            (f"civilian, {name}", rgb)
-            for name, rgb in zip(("well", "hurt", "dying", "dead"), colors.HEALTH_RGB, strict=True)
-        ],
+        list(zip([f"civilian, {name}" for name in HEALTH], colors.HEALTH_RGB, strict=True)),
     ]
     if comparing:
         rows.append(list(zip(("B is better", "the same", "B is worse"), colors.DIFFERENCE_RGB, strict=True)))

@@ -79,17 +79,14 @@ class CurveWriter:
                 self._stream.log(f"{plot}/{curve}", style, static=True)
             numbers, values = zip(*row, strict=True)
             self._send(f"{plot}/{curve}", numbers, rerun.Scalars.columns(scalars=values))
-        noted = [point for point in points if point.note]
-        if noted:
-            texts = rerun.TextLog.columns(text=[point.note for point in noted])
-            self._send(LOG_PATH, [point.number for point in noted], texts)
         for point in points:
+            if point.note:
+                self._send(LOG_PATH, [point.number], rerun.TextLog.columns(text=[point.note]))
             for name, text in point.pages.items():
                 page = rerun.TextDocument.columns(text=[text], media_type=[rerun.MediaType.MARKDOWN])
                 self._send(name, [point.number], page)
 
     def _send(self, path: str, numbers: Sequence[int], columns: Any) -> None:
-        """Send what belongs to some places of the timeline."""
         import rerun
 
         times = rerun.TimeColumn(self._layout.timeline, sequence=numbers)

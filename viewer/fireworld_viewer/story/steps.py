@@ -117,10 +117,9 @@ def compare_damage(fieryness_a: NDArray[np.uint8], fieryness_b: NDArray[np.uint8
 def common_steps(
     steps_a: NDArray[np.int64], steps_b: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.intp], NDArray[np.intp]]:
-    """Align two runs: every step of either once both have begun; a run that has ended stays in its last state.
+    """Align two runs: every step of either once both have begun, (k,), and the row of each run with its state there.
 
-    Returns:
-        steps, (k,), and the row of each run that holds the state of that step.
+    A run that has ended stays in its last state.
 
     Raises:
         ViewError: a run has no steps.
@@ -141,7 +140,7 @@ def check_same_city(first: CityRecord, second: CityRecord) -> None:
     """
     for name in ("building_id", "outline_ptr", "outline_x_m", "outline_y_m", "floors"):
         if not np.array_equal(getattr(first, name), getattr(second, name)):
-            cities = f"{first.name!r} with {len(first.building_id)} buildings"
-            others = f"{second.name!r} with {len(second.building_id)}"
+            n, m = len(first.building_id), len(second.building_id)
+            cities = f"{first.name!r} with {n} buildings and {second.name!r} with {m}"
             hint = f"{name} differs; try to view them one by one"
-            raise ViewError(expected("view", "", "two recordings of one city", f"{cities} and {others}", hint))
+            raise ViewError(expected("view", "", "two recordings of one city", cities, hint))
