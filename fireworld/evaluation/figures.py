@@ -23,7 +23,7 @@ def draw_differences(pairings: Sequence[Pairing], *, title: str) -> Figure:
     Raises:
         ViewError: matplotlib is not installed.
     """
-    from fireworld_viewer.pictures.paired_differences import DifferencePanel, draw_paired_differences
+    from fireworld_viewer.pictures.policy_figures import DifferencePanel, draw_paired_differences
 
     panels = [
         DifferencePanel(

@@ -24,7 +24,7 @@ def draw_policy_changes(study: Study) -> Figure:
 
 
 def _draw(study: Study, label: str, of: Callable[[LearningCurve], Array]) -> Figure:
-    from fireworld_viewer.pictures.learning_curves import LearningPanel, draw_learning_curves
+    from fireworld_viewer.pictures.policy_figures import LearningPanel, draw_learning_curves
 
     panels = [
         LearningPanel(

@@ -15,7 +15,7 @@ import rerun
 from fireworld_viewer.rerun_view import app
 from fireworld_viewer.rerun_view.blueprint import title
 from fireworld_viewer.rerun_view.camera import frame_fire, frame_from_above
-from fireworld_viewer.rerun_view.outcome_page import OutcomePage
+from fireworld_viewer.rerun_view.pages import OutcomePage
 
 from fireworld.errors import OutputError, ViewError
 from tests.viewer import rrd

@@ -10,9 +10,9 @@ import pytest
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh
 from fireworld_viewer.rerun_view import app
-from fireworld_viewer.rerun_view.comparison import AGREEMENT
-from fireworld_viewer.rerun_view.outcome_page import OutcomePage
-from fireworld_viewer.story.two_runs import DAMAGE_ORDER, common_steps, compare_damage
+from fireworld_viewer.rerun_view.pages import OutcomePage
+from fireworld_viewer.rerun_view.run_layers import AGREEMENT
+from fireworld_viewer.story.steps import DAMAGE_ORDER, common_steps, compare_damage
 
 from fireworld.errors import ViewError
 from fireworld.records import MemoryRecording

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from threading import Event
 
@@ -36,7 +37,7 @@ def window(monkeypatch, tmp_path):
 
 
 def to_file(path: Path) -> live.Screen:
-    return live.Screen((str(app.viewer_executable()), "-", "--save", str(path)), stays=False)
+    return partial(live_sender.ViewerProcess, (str(app.viewer_executable()), "-", "--save", str(path)), stays=False)
 
 
 class Pipe:
@@ -134,7 +135,7 @@ def test_step_by_step_shows_what_a_recording_shows(small, tmp_path: Path):
     encoder = live.RunEncoder(small.header, small.city)
     records = list(small)
     content = b"".join(encoder.encode(batch) for batch in ([records[0]], [records[1]], records[2:7], records[7:]))
-    pipe = to_file(tmp_path / "live.rrd").open()
+    pipe = to_file(tmp_path / "live.rrd")()
     while content:
         content = content[pipe.write(content) :]
     pipe.close(finished=True)
@@ -168,7 +169,7 @@ def test_a_watched_run_is_the_same_run(here, fireworld, window):
 
 def test_a_viewer_closed_in_mid_run(here, fireworld, monkeypatch):
     alone = json.loads(fireworld(*SHORT).out)
-    monkeypatch.setattr(live, "own_window", lambda: live.Screen(DYING, stays=True))
+    monkeypatch.setattr(live, "own_window", lambda: partial(live_sender.ViewerProcess, DYING, stays=True))
     done = fireworld(*SHORT, "--view", "--record", "a.mcap")
     assert (done.code, done.err) == (0, NOTE)
     assert json.loads(done.out)["digest"] == alone["digest"]
@@ -328,7 +329,7 @@ def test_only_weights_that_are_searched_for_are_drawn(here, fireworld, window):
 def test_a_viewer_closed_in_mid_search(here, fireworld, monkeypatch):
     (here / "tiny.yaml").write_text(TINY)
     assert fireworld(*SEARCH, "-o", "alone.npz").code == 0
-    monkeypatch.setattr(live, "own_window", lambda: live.Screen(DYING, stays=True))
+    monkeypatch.setattr(live, "own_window", lambda: partial(live_sender.ViewerProcess, DYING, stays=True))
     done = fireworld(*SEARCH, "-o", "seen.npz", "--view")
     assert (done.code, NOTE in done.err) == (0, True)
     assert (here / "seen.npz").read_bytes() == (here / "alone.npz").read_bytes()

@@ -12,7 +12,7 @@ from fireworld_viewer import colors
 from fireworld_viewer.pictures import maps
 from fireworld_viewer.pictures.city_map import BrigadeMarks, MapState, contrasting, state_of
 from fireworld_viewer.pictures.figure_files import plain_style, save_figure
-from fireworld_viewer.pictures.map_legend import LABELS, count_marks
+from fireworld_viewer.pictures.map_grid import LABELS, count_marks
 from fireworld_viewer.story.steps import LAST, evenly_spaced, read_steps, read_steps_between
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgba

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from fireworld_viewer import colors
 from fireworld_viewer.rerun_view import app
-from fireworld_viewer.rerun_view.outcome_page import OutcomePage
+from fireworld_viewer.rerun_view.pages import OutcomePage
 
 from tests import command_line
 from tests.viewer.conftest import make_recording

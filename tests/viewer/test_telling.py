@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fireworld_viewer.story.choices import choices_of
 from fireworld_viewer.story.narration import decision_lines
+from fireworld_viewer.story.series import choices_of
 
 from fireworld.records import ACTION_NAMES, MemoryRecording
 from tests.viewer.conftest import make_recording

@@ -64,25 +64,20 @@ def build_mesh(city: CityRecord) -> CityMesh:
         shade[wall + corner] = facing
     walls = np.concatenate([np.column_stack([wall, wall + 1, wall + 2]), np.column_stack([wall, wall + 2, wall + 3])])
     roofs = [roof[a + triangulate(x[a:b], y[a:b])] for a, b in itertools.pairwise(ptr.tolist())]
-    roof_xyz_m = np.column_stack([city.center_x_m, city.center_y_m, np.asarray(city.floors) * STOREY_M])
+    middles = np.column_stack([city.center_x_m, city.center_y_m, np.asarray(city.floors) * STOREY_M])
     return CityMesh(
         vertex_xyz_m=xyz,
         triangle=np.concatenate([*roofs, walls]).astype(np.uint32),
         vertex_building=np.repeat(np.arange(len(n_corners), dtype=np.int32), 5 * n_corners),
         vertex_shade=shade,
-        roof_xyz_m=roof_xyz_m.astype(np.float32),
+        roof_xyz_m=middles.astype(np.float32),
     )
 
 
 def triangulate(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Cut a simple polygon into triangles: a fan if it is convex, ears if it is not.
+    """Cut a simple polygon into triangles, (c - 2, 3) indices of corners: a fan if it is convex, ears if it is not.
 
-    Args:
-        x: (c,) corners in either sense of rotation; the closing corner is not repeated.
-        y: (c,)
-
-    Returns:
-        (c - 2, 3) indices of corners.
+    x and y, (c,): corners in either sense of rotation; the closing corner is not repeated.
     """
     n, xy = len(x), np.column_stack([x, y])
     turns = _turn(np.roll(xy, 1, axis=0), xy, np.roll(xy, -1, axis=0))

@@ -79,18 +79,17 @@ BRIGADE_RGB: Final[tuple[Rgb, ...]] = (
 """Colors of the brigades in plots and logs, readable on black and on white; repeated when there are more."""
 
 TOTAL_RGB: Final[Rgb] = (140, 110, 200)
-GREY_RGB: Final[Rgb] = (128, 124, 120)
-"""What is burnt out, and what comes second, in plots and logs."""
+GREY_RGB: Final[Rgb] = (128, 124, 120)  # what is burnt out, and what comes second, in plots and logs
 
 HEALTHY_RGB: Final[Rgb] = (96, 240, 120)
 HURT_RGB: Final[Rgb] = (250, 250, 250)
 DYING_RGB: Final[Rgb] = (225, 60, 235)
 DEAD_RGB: Final[Rgb] = (10, 10, 10)
+HEALTH_RGB: Final[tuple[Rgb, ...]] = (HEALTHY_RGB, HURT_RGB, DYING_RGB, DEAD_RGB)
 
 BETTER_RGB: Final[Rgb] = (64, 132, 230)
-SAME_RGB: Final[Rgb] = (188, 184, 176)
 WORSE_RGB: Final[Rgb] = (214, 60, 52)
-DIFFERENCE_RGB: Final[tuple[Rgb, ...]] = (BETTER_RGB, SAME_RGB, WORSE_RGB)
+DIFFERENCE_RGB: Final[tuple[Rgb, ...]] = (BETTER_RGB, FIERYNESS_RGB[0], WORSE_RGB)
 """By difference + 1: -1 less damage in the second run, 0 the same, +1 more."""
 
 
@@ -128,12 +127,7 @@ def paler(rgb: Rgb) -> Rgb:
 def health_rgb(hp: NDArray[Any], hp_start: NDArray[Any]) -> NDArray[np.uint8]:
     """Color people by the share of their health left: green well, white half, magenta dying, black dead.
 
-    Args:
-        hp: (..., n) health points now.
-        hp_start: (n,) health points at the start.
-
-    Returns:
-        (..., n, 3) sRGB.
+    (..., n) health points now and (n,) at the start to (..., n, 3) sRGB.
     """
     start = np.maximum(hp_start, 1).astype(np.int64)
     share = np.clip(hp.astype(np.int64), 0, start) * 512 // start  # 0..512

@@ -27,6 +27,8 @@ _STYLE: Final = """
 .maps { grid-template-columns: repeat(2, 1fr); } .first { font-size: 1.25rem; margin: .8rem 0 1.2rem; }
 td.text { overflow-wrap: anywhere; }
 """
+_CURVES: Final = "Score, burning and burnt-out buildings of both, and buildings that differ."
+_CAPTIONS: Final = {"a": "A", "b": "B", "difference": "What differs between the two maps, and out of sight"}
 _HEADER: Final = ("scenario", "scenario_digest", "seed", "policy", "policy_digest", "fireworld_version", "forked_from")
 
 
@@ -54,7 +56,7 @@ def difference_body(compared: Difference, images: Mapping[str, bytes]) -> list[s
         _header(compared),
         *_maps("The first difference", "first", images),
         *_spread(difference),
-        *_curves(images),
+        *(["<h2>Curves</h2>", html_figure(images["curves"], _CURVES)] if "curves" in images else []),
         *_maps("The last step of both", "last", images),
         *_topics(difference),
     ]  # fmt: skip
@@ -77,12 +79,8 @@ def _header(compared: Difference) -> str:
 
 
 def _maps(title: str, moment: str, images: Mapping[str, bytes]) -> Iterator[str]:
-    captions = {"a": "A", "b": "B", "difference": "What differs between the two maps, and out of sight"}
-    shown = [
-        html_figure(images[f"{moment}-{name}"], caption)
-        for name, caption in captions.items()
-        if f"{moment}-{name}" in images
-    ]
+    named = {f"{moment}-{name}": caption for name, caption in _CAPTIONS.items()}
+    shown = [html_figure(images[name], caption) for name, caption in named.items() if name in images]
     if shown:
         yield f"<h2>{title}</h2>"
         yield f'<div class="maps">{"".join(shown)}</div>'
@@ -94,14 +92,6 @@ def _spread(difference: RunComparison) -> Iterator[str]:
         yield "".join(f"<p>{escape(sentence)}</p>" for sentence in spread_sentences(difference))
         yield html_table(SPREAD_HEADS, [spread_cells(row) for row in difference.spread.rows], n_text=0)
         yield f"<p>{escape(SPREAD_NOTE[0].upper() + SPREAD_NOTE[1:])}.</p>"
-
-
-def _curves(images: Mapping[str, bytes]) -> Iterator[str]:
-    if "curves" in images:
-        yield "<h2>Curves</h2>"
-        yield html_figure(
-            images["curves"], "Score, burning and burnt-out buildings of both, and buildings that differ."
-        )
 
 
 def _topics(difference: RunComparison) -> Iterator[str]:

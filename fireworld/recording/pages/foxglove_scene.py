@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 from typing import Any, Final
 
@@ -11,7 +10,7 @@ from fireworld_recorder import foxglove
 from fireworld_recorder.chain import SCENE_PREFIX
 from fireworld_recorder.writer import Channel
 from fireworld_viewer import colors
-from fireworld_viewer.city_mesh import STOREY_M, build_mesh, triangulate
+from fireworld_viewer.city_mesh import build_mesh
 from fireworld_viewer.story.narration import event_lines
 from numpy.typing import NDArray
 
@@ -30,7 +29,6 @@ _POINT: Final = np.dtype(
     + [(channel, "u1") for channel in ("red", "green", "blue", "alpha")]
     + [("temperature", "<f4"), ("fuel_share", "<f4"), ("water_litres", "<i4"), ("fieryness", "u1")]
 )
-_BURNING_OR_DONE: Final = range(1, len(colors.FIERYNESS_RGB))
 
 
 class FoxgloveScene:
@@ -44,7 +42,12 @@ class FoxgloveScene:
         self._header = header
         self._city = city
         self._mesh = build_mesh(city)
-        self._roofs = _Roofs(city)
+        roof = self._mesh.vertex_shade == 0
+        triangle = self._mesh.triangle[roof[self._mesh.triangle[:, 0]]]
+        self._roof_building = self._mesh.vertex_building[triangle[:, 0]]
+        self._roof_triangle = (np.cumsum(roof) - 1)[triangle]
+        height = self._mesh.vertex_xyz_m[roof, 2].astype(np.float64) + _ABOVE_ROOF_M
+        self._roof_xyz_m = np.column_stack([city.outline_x_m, city.outline_y_m, height])
         self._refuges = np.asarray(city.refuge_building, dtype=np.intp)
         self._shown: NDArray[np.uint8] | None = None
 
@@ -77,13 +80,10 @@ class FoxgloveScene:
         of_refuge = np.isin(mesh.vertex_building[mesh.triangle[:, 0]], self._refuges)
         houses = _triangles(mesh.vertex_xyz_m, mesh.triangle[~of_refuge], grey)
         refuges = _triangles(mesh.vertex_xyz_m, mesh.triangle[of_refuge], green)
-        names = [
-            foxglove.label(
-                mesh.roof_xyz_m[index] + (0, 0, 8), f"refuge {city.building_id[index]}", height_m=8, rgb=green
-            )
-            for index in self._refuges
-        ]
-        yield foxglove.entity(step, "buildings", houses, refuges, *names)
+        names = [f"refuge {city.building_id[index]}" for index in self._refuges]
+        above = mesh.roof_xyz_m[self._refuges] + (0, 0, 8)
+        labels = [foxglove.label(*one, height_m=8, rgb=green) for one in zip(above, names, strict=True)]
+        yield foxglove.entity(step, "buildings", houses, refuges, *labels)
         node = np.column_stack([city.node_x_m, city.node_y_m, np.zeros(len(city.node_x_m))])
         streets = np.stack([node[np.asarray(city.street_from)], node[np.asarray(city.street_to)]], axis=1)
         yield foxglove.entity(step, "streets", foxglove.lines(streets, colors.STREET_RGB, thickness_m=1.6))
@@ -104,16 +104,14 @@ class FoxgloveScene:
             points[channel] = rgb[:, place]
         points["z"] += 2 * _ABOVE_ROOF_M
         points["alpha"] = 255
-        for name in ("temperature", "fuel_share", "water_litres"):
+        for name in ("temperature", "fuel_share", "water_litres", "fieryness"):
             points[name] = getattr(buildings, name)
-        points["fieryness"] = code
         return points
 
     def _fire(self, codes: NDArray[np.uint8]) -> Iterator[bytes]:
         """The roofs of all buildings that are not untouched any more, in the colors of their codes."""
-        for code in _BURNING_OR_DONE:
-            corners, indices = self._roofs.of(codes == code)
-            yield foxglove.triangles(corners, indices, colors.FIERYNESS_RGB[code])
+        for code, rgb in enumerate(colors.FIERYNESS_RGB[1:], start=1):
+            yield _triangles(self._roof_xyz_m, self._roof_triangle[(codes == code)[self._roof_building]], rgb)
 
     def _team(self, record: StepRecord) -> Iterator[bytes]:
         """Brigades with their tanks, water on its way, civilians."""
@@ -139,26 +137,6 @@ class FoxgloveScene:
         """A line for each event."""
         for step, level, text, _ in event_lines(MemoryRecording(self._header, self._city, [record])):
             yield foxglove.log_line(step, level=_LEVELS[level], text=text, name="fireworld")
-
-
-class _Roofs:
-    """The roofs of a city, cut into triangles once; a step takes those it needs."""
-
-    def __init__(self, city: CityRecord) -> None:
-        ptr = np.asarray(city.outline_ptr, dtype=np.int64)
-        x, y = np.asarray(city.outline_x_m), np.asarray(city.outline_y_m)
-        self._n_corners = np.diff(ptr)
-        height = np.repeat(np.asarray(city.floors) * STOREY_M + _ABOVE_ROOF_M, self._n_corners)
-        self._corners = np.column_stack([x, y, height])
-        parts = [triangulate(x[a:b], y[a:b]) + a for a, b in itertools.pairwise(ptr.tolist())]
-        self._triangles = np.concatenate(parts) if parts else np.zeros((0, 3), dtype=np.int64)
-        self._building = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
-
-    def of(self, chosen: NDArray[np.bool_]) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Corners (v, 3) and triangles (t, 3) of some buildings. (n,) whether it is chosen."""
-        used = np.repeat(chosen, self._n_corners)
-        number = np.cumsum(used) - 1
-        return self._corners[used], number[self._triangles[chosen[self._building]]]
 
 
 def _triangles(xyz_m: NDArray[Any], triangle: NDArray[Any], rgb: colors.Rgb) -> bytes:

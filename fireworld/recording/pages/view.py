@@ -8,9 +8,8 @@ from pathlib import Path
 from fireworld_recorder.diff import compare
 from fireworld_recorder.totals import totals_of
 from fireworld_viewer.rerun_view import app
-from fireworld_viewer.rerun_view.outcome_page import OutcomePage
-from fireworld_viewer.story.steps import select_steps
-from fireworld_viewer.story.two_runs import check_same_city
+from fireworld_viewer.rerun_view.pages import OutcomePage
+from fireworld_viewer.story.steps import check_same_city, select_steps
 
 from fireworld.recording.difference_text import totals_rows
 from fireworld.recording.inputs import AnyRecording, open_to_show, run_name

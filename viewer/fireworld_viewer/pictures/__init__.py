@@ -1,1 +1,1 @@
-"""Pictures and films with matplotlib."""
+"""Pictures and films with matplotlib; whatever draws raises ViewError where matplotlib is not installed."""

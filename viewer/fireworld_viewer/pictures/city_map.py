@@ -17,7 +17,6 @@ from fireworld_viewer.pictures.figure_files import INK
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.collections import PolyCollection
 
 STREET: Final = "#ffffff"
 GROUND: Final = "#dedad2"
@@ -28,8 +27,7 @@ WIDTH_INCHES: Final = 7.6
 
 _SMALLEST_SCALE: Final = 0.7
 _BALL_POINTS: Final = 14.0
-_GAUGE_POINTS: Final = (3.6, 15.0)
-"""Width and height of the gauge of a full tank."""
+_GAUGE_POINTS: Final = (3.6, 15.0)  # width and height of the gauge of a full tank
 _DRIVING: Final = ACTIVITIES.index("driving")
 _SPRAYING: Final = ACTIVITIES.index("spraying")
 
@@ -38,32 +36,26 @@ _SPRAYING: Final = ACTIVITIES.index("spraying")
 class BrigadeMarks:
     """The brigades on a map; n of them."""
 
-    xy_m: NDArray[np.float64]
-    """(n, 2) positions."""
-    activity: NDArray[Any] | None = None
-    """(n,) index into ACTIVITIES; unknown if left out."""
-    tank_share: NDArray[np.float64] | None = None
-    """(n,) share of the tank that is full, 0..1; unknown if left out."""
-    target: NDArray[Any] | None = None
-    """(n,) index of the building that each has as its target, -1 none; unknown if left out."""
+    xy_m: NDArray[np.float64]  # (n, 2) positions
+    activity: NDArray[Any] | None = None  # (n,) index into ACTIVITIES; unknown if left out
+    tank_share: NDArray[np.float64] | None = None  # (n,) share of the tank that is full, 0..1; unknown if left out
+    target: NDArray[Any] | None = None  # (n,) index of the target's building, -1 none; unknown if left out
 
-    def with_target(self, activity: int) -> NDArray[np.intp]:
-        """Return the indices of the brigades that do this and have a target: (k,)."""
+    def with_target(self, activity: int) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Return the indices of the brigades that do this and have a target, and those of their targets: (k,) each."""
         if self.activity is None or self.target is None:
-            return np.zeros(0, dtype=np.intp)
-        return np.flatnonzero((self.activity == activity) & (self.target >= 0))
+            return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
+        chosen = np.flatnonzero((self.activity == activity) & (self.target >= 0))
+        return chosen, self.target[chosen]
 
 
 @dataclass(frozen=True, kw_only=True)
 class MapState:
     """What a map shows of a step."""
 
-    fieryness: NDArray[Any]
-    """(n,) official codes 0..8."""
-    civilian_hp: NDArray[Any]
-    """(n_civilians,) health points."""
-    brigades: BrigadeMarks | None = None
-    """None are drawn if left out."""
+    fieryness: NDArray[Any]  # (n,) official codes 0..8
+    civilian_hp: NDArray[Any]  # (n_civilians,) health points
+    brigades: BrigadeMarks | None = None  # none are drawn if left out
 
 
 def state_of(city: CityRecord, record: StepRecord) -> MapState:
@@ -108,16 +100,27 @@ class CityMap:
         self._ways = LineCollection([], colors=INK, linewidths=1.1 * self._scale, linestyles=(0, (3, 2)), zorder=5)
         self._jet_casing = LineCollection([], colors=JET_EDGE, linewidths=4.2 * self._scale, **line)
         self._jets = LineCollection([], colors=hexadecimal(colors.WATER_RGB), linewidths=2.6 * self._scale, **line)
-        self._buildings = self._draw_buildings()
-        self._refuges = [self._letter(index, "R") for index in np.asarray(city.refuge_building).tolist()]
-        self._civilians = self._draw_civilians()
+        self._buildings = PolyCollection(outlines_m(city), edgecolors=INK, linewidths=0.35 * self._scale, zorder=2)
+        bold: dict[str, Any] = {"ha": "center", "weight": "bold", "fontsize": 8 * self._scale}
+        self._centers = np.column_stack([city.center_x_m, city.center_y_m])
+        self._refuges = [
+            axes.annotate("R", tuple(self._centers[index]), va="center", color="white", zorder=5, **bold)
+            for index in np.asarray(city.refuge_building)
+        ]
+        apart_m = self._m_per_point * np.array([7.0, 7.0])
+        xy = _side_by_side(np.column_stack([city.civilian_x_m, city.civilian_y_m]), apart_m)
+        edge: dict[str, Any] = {"edgecolors": INK, "linewidths": 0.8 * self._scale}
+        self._civilians: Any = axes.scatter(xy[:, 0], xy[:, 1], s=34 * self._scale, zorder=6, **edge)
         self._balls = axes.scatter(
             [], [], s=(_BALL_POINTS * self._scale) ** 2, edgecolors=INK, linewidths=0.8, zorder=7
         )
         self._gauges = PolyCollection([], facecolors="white", edgecolors=INK, linewidths=0.8, zorder=7)
         self._water = PolyCollection([], facecolors=hexadecimal(colors.WATER_RGB), edgecolors="none", zorder=7.1)
-        self._numbers = [self._number(index) for index in range(n_brigades)]
-        for item in (self._way_casing, self._ways, self._jet_casing, self._jets, self._gauges, self._water):
+        self._numbers = [
+            axes.text(0.0, 0.0, str(index), va="center_baseline", zorder=7.2, **bold) for index in range(n_brigades)
+        ]
+        lines = self._way_casing, self._ways, self._jet_casing, self._jets
+        for item in (self._buildings, *lines, self._gauges, self._water):
             axes.add_collection(item, autolim=False)
 
     @property
@@ -152,15 +155,12 @@ class CityMap:
             if index < n:
                 number.set_position(tuple(xy[index]))
                 number.set_color(contrasting(colors.ACTIVITY_RGB[activity[index]]))
-        aim = np.column_stack([self.city.center_x_m, self.city.center_y_m])
-        for lines, what in (
-            ((self._way_casing, self._ways), _DRIVING),
-            ((self._jet_casing, self._jets), _SPRAYING),
-        ):
-            chosen = brigades.with_target(what)
-            target = aim[brigades.target[chosen]] if brigades.target is not None else np.zeros((0, 2))
-            for line in lines:
-                line.set_segments(list(np.stack([xy[chosen], target], axis=1)))
+        casings = (self._way_casing, self._ways, _DRIVING), (self._jet_casing, self._jets, _SPRAYING)
+        for casing, line, doing in casings:
+            chosen, target = brigades.with_target(doing)
+            segments = list(np.stack([xy[chosen], self._centers[target]], axis=1))
+            casing.set_segments(segments)
+            line.set_segments(segments)
 
     def _bars(self, xy: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:
         """Corners of upright bars to the right of the balls, as high as the shares: (n, 4, 2)."""
@@ -192,36 +192,15 @@ class CityMap:
             fontsize=10 * max(self._scale, 0.75),
         )  # fmt: skip
 
-    def _draw_buildings(self) -> PolyCollection:
-        from matplotlib.collections import PolyCollection
 
-        ptr = np.asarray(self.city.outline_ptr)
-        corners = np.column_stack([self.city.outline_x_m, self.city.outline_y_m])
-        outlines = [corners[ptr[index] : ptr[index + 1]] for index in range(len(ptr) - 1)]
-        drawn = PolyCollection(outlines, edgecolors=INK, linewidths=0.35 * self._scale, zorder=2)
-        self.axes.add_collection(drawn, autolim=False)
-        return drawn
-
-    def _draw_civilians(self) -> Any:
-        xy = np.column_stack([self.city.civilian_x_m, self.city.civilian_y_m]).astype(np.float64)
-        xy = _side_by_side(xy, self._m_per_point * np.array([7.0, 7.0]))
-        return self.axes.scatter(
-            xy[:, 0], xy[:, 1], s=34 * self._scale, edgecolors=INK, linewidths=0.8 * self._scale, zorder=6
-        )
-
-    def _letter(self, index: int, letter: str) -> Artist:
-        at = (self.city.center_x_m[index], self.city.center_y_m[index])
-        style: dict[str, Any] = {"ha": "center", "va": "center", "color": "white", "weight": "bold", "zorder": 5}
-        return self.axes.annotate(letter, at, fontsize=8 * self._scale, **style)
-
-    def _number(self, index: int) -> Any:
-        style: dict[str, Any] = {"ha": "center", "va": "center_baseline", "weight": "bold", "zorder": 7.2}
-        return self.axes.text(0.0, 0.0, str(index), fontsize=8 * self._scale, **style)
+def outlines_m(city: CityRecord) -> list[NDArray[np.float64]]:
+    """Return the corners of each building, (corners, 2) each."""
+    return np.split(np.column_stack([city.outline_x_m, city.outline_y_m]), city.outline_ptr[1:-1])
 
 
 def hexadecimal(rgb: Sequence[int]) -> str:
     """Write a color as #rrggbb."""
-    return "#" + "".join(f"{part:02x}" for part in rgb)
+    return "#" + bytes(rgb).hex()
 
 
 def contrasting(rgb: Sequence[int]) -> str:

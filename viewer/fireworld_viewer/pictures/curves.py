@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -16,25 +16,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-BURNING: Final = "#d9600c"
-BURNT_OUT: Final = "#161414"
-WATER_DAMAGED: Final = "#4f6fc4"
-PEOPLE: Final = "#1e8f45"
 TANKS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#161414", "#8a8a8a")
 """Repeated, dashed, when there are more brigades."""
 _WIDTH_INCHES: Final = 12.0
 _ROW_INCHES: Final = 2.3
-
-
-@dataclass(frozen=True)
-class Curve:
-    """A curve of a panel."""
-
-    label: str
-    numbers: Array
-    color: str
-    style: Any = "-"
-    width: float = 1.7
+_BURNING: Final = ("#d9600c", "-")
+_BURNT_OUT: Final = ("#161414", "--")
+_WATER_DAMAGED: Final = ("#4f6fc4", "-.")
 
 
 @dataclass(frozen=True)
@@ -42,17 +30,48 @@ class Panel:
     """What one panel shows."""
 
     title: str
-    curves: Callable[[Recording], list[Curve]]
+    styles: Mapping[str, tuple[str, str]] | None  # color and style of each field; None for the tanks
     from_zero: bool = False
     counts: bool = False
 
+    def curves(self, recording: Recording) -> list[tuple[Array, str, str, str, float]]:
+        """Return the numbers of each curve, its label, color, line and width."""
+        if self.styles is not None:
+            return [(series(recording, field), LABELS[field], *look, 1.7) for field, look in self.styles.items()]
+        n, tanks = len(TANKS), series(recording, "brigades.tank_litres").T
+        return [  # thinner and thinner: of brigades that refill together, all can be seen
+            (litres, f"brigade {k}", TANKS[k % n], "-" if k < n else "--", 2.8 - 0.6 * (k % 4))
+            for k, litres in enumerate(tanks)
+        ]
+
+
+PANELS: Final = (
+    Panel(
+        "score",
+        {"score.score_max": ("#9a9a9a", ":"), "score.score": (INK, "-"), "score.score_now": ("#8a6fb0", "--")},
+        from_zero=True,
+    ),
+    Panel(
+        "buildings",
+        {"score.n_burning": _BURNING, "score.n_burnt_out": _BURNT_OUT, "score.n_water_damaged": _WATER_DAMAGED},
+        from_zero=True,
+        counts=True,
+    ),
+    Panel(
+        "reward of the step: buildings",
+        {"rewards.burning": _BURNING, "rewards.burnt_out": _BURNT_OUT, "rewards.water_damaged": _WATER_DAMAGED},
+    ),
+    Panel(
+        "reward of the step: civilians, and in all",
+        {"rewards.civilians": ("#1e8f45", "-"), "rewards.total": (INK, "--")},
+    ),
+    Panel("reward so far (return)", {"rewards.sum_so_far": (INK, "-")}),
+    Panel("water in the tanks, litres", None, from_zero=True),
+)
+
 
 def draw_curves(recordings: Sequence[Recording]) -> Figure:
-    """Draw all panels: those of two recordings beside each other, on the same scales.
-
-    Raises:
-        ViewError: matplotlib is not installed.
-    """
+    """Draw all panels: those of two recordings beside each other, on the same scales."""
     pair = len(recordings) > 1
     n_rows = len(PANELS) if pair else -(-len(PANELS) // 2)
     high = n_rows * _ROW_INCHES
@@ -65,14 +84,13 @@ def draw_curves(recordings: Sequence[Recording]) -> Figure:
     for index, panel in enumerate(PANELS):
         places = grid[index] if pair else [grid[divmod(index, 2)]]
         shown = [panel.curves(one) for one in recordings]
-        alike = len({tuple(curve.label for curve in curves) for curves in shown}) == 1
+        alike = len({tuple(label for _, label, *_ in curves) for curves in shown}) == 1
         for axes, recording, curves, letter in zip(places, recordings, shown, "AB", strict=False):
-            for curve in curves:
-                style: dict[str, Any] = {"color": curve.color, "linestyle": curve.style, "linewidth": curve.width}
-                axes.plot(np.asarray(recording.steps), curve.numbers, label=curve.label, **style)
+            for numbers, label, color, line, width in curves:
+                axes.plot(recording.steps, numbers, label=label, color=color, linestyle=line, linewidth=width)
             named = bool(curves) and (axes is places[-1] or not alike)
             _dress_panel(axes, f"{letter}: {panel.title}" if pair else panel.title, counts=panel.counts, named=named)
-        limits = _limits([curve.numbers for curves in shown for curve in curves], from_zero=panel.from_zero)
+        limits = _limits([numbers for curves in shown for numbers, *_ in curves], from_zero=panel.from_zero)
         for axes in places:
             axes.set_ylim(limits)
     figure.text(0.475, 0.18 / high, "step (a simulated minute)", fontsize=10, color=INK, ha="center", va="center")
@@ -101,49 +119,3 @@ def _limits(numbers: Sequence[Array], *, from_zero: bool) -> tuple[float, float]
     every = np.concatenate([np.zeros(1), *(np.asarray(row, dtype=np.float64) for row in numbers)])
     low, high = float(every.min()), float(every.max())
     return (0.0, 1.05 * max(1.0, high)) if from_zero else (1.05 * min(-1.0, low), 1.05 * high)
-
-
-def _fields(styles: Mapping[str, tuple[str, str]]) -> Callable[[Recording], list[Curve]]:
-    """Draw fields of a recording: color and style by field."""
-    return lambda recording: [
-        Curve(LABELS[field], series(recording, field), color, style) for field, (color, style) in styles.items()
-    ]
-
-
-def _tanks(recording: Recording) -> list[Curve]:
-    """Draw curves thinner and thinner: of brigades that refill together, all can be seen."""
-    n = len(TANKS)
-    return [
-        Curve(f"brigade {k}", litres, TANKS[k % n], "-" if k < n else "--", 2.8 - 0.6 * (k % 4))
-        for k, litres in enumerate(series(recording, "brigades.tank_litres").T)
-    ]
-
-
-_BUILDING_STYLES: Final = {
-    "n_burning": (BURNING, "-"),
-    "n_burnt_out": (BURNT_OUT, "--"),
-    "n_water_damaged": (WATER_DAMAGED, "-."),
-}
-PANELS: Final = (
-    Panel(
-        "score",
-        _fields({"score.score_max": ("#9a9a9a", ":"), "score.score": (INK, "-"), "score.score_now": ("#8a6fb0", "--")}),
-        from_zero=True,
-    ),
-    Panel(
-        "buildings",
-        _fields({f"score.{name}": style for name, style in _BUILDING_STYLES.items()}),
-        from_zero=True,
-        counts=True,
-    ),
-    Panel(
-        "reward of the step: buildings",
-        _fields({f"rewards.{name.removeprefix('n_')}": style for name, style in _BUILDING_STYLES.items()}),
-    ),
-    Panel(
-        "reward of the step: civilians, and in all",
-        _fields({"rewards.civilians": (PEOPLE, "-"), "rewards.total": (INK, "--")}),
-    ),
-    Panel("reward so far (return)", _fields({"rewards.sum_so_far": (INK, "-")})),
-    Panel("water in the tanks, litres", _tanks, from_zero=True),
-)

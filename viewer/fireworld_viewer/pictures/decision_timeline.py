@@ -11,7 +11,7 @@ from fireworld.records import ACTION_NAMES, ACTIVITIES, Array, Recording
 from fireworld_viewer import colors
 from fireworld_viewer.pictures.city_map import hexadecimal
 from fireworld_viewer.pictures.figure_files import INK, new_figure
-from fireworld_viewer.story.choices import per_brigade
+from fireworld_viewer.story.series import per_brigade
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 _WIDTH_INCHES: Final = 12.0
 _ROW_INCHES: Final = 0.42
-_MARGIN_INCHES: Final = 0.75
-"""Of a panel: its title above the rows and the steps below them."""
+_MARGIN_INCHES: Final = 0.75  # of a panel: its title above the rows and the steps below them
 _LEGEND_INCHES: Final = 0.75
 _LEFT: Final = 0.085
 _BANDS: Final = ((-0.38, 0.44), (0.12, 0.22))
@@ -28,12 +27,8 @@ _BANDS: Final = ((-0.38, 0.44), (0.12, 0.22))
 
 
 def draw_timeline(recordings: Sequence[Recording]) -> Figure:
-    """Draw a panel for each recording, in it two bands for each brigade.
-
-    Raises:
-        ViewError: matplotlib is not installed.
-    """
-    heights = [_MARGIN_INCHES + _ROW_INCHES * max(1, _n_brigades(one)) for one in recordings]
+    """Draw a panel for each recording, in it two bands for each brigade."""
+    heights = [_MARGIN_INCHES + _ROW_INCHES * max(1, len(one.city.brigade_tank_litres)) for one in recordings]
     total = sum(heights) + _LEGEND_INCHES
     figure = new_figure(_WIDTH_INCHES, total)
     span = min(int(one.steps[0]) for one in recordings), max(int(one.steps[-1]) for one in recordings)
@@ -48,10 +43,6 @@ def draw_timeline(recordings: Sequence[Recording]) -> Figure:
     return figure
 
 
-def _n_brigades(recording: Recording) -> int:
-    return len(recording.city.brigade_tank_litres)
-
-
 def _tables(recording: Recording) -> tuple[Array, Array]:
     """Return what was chosen and what was done, (k, n_brigades) each; -1 is no choice."""
     action = per_brigade(recording, "action", missing=-1)
@@ -59,7 +50,7 @@ def _tables(recording: Recording) -> tuple[Array, Array]:
 
 
 def _draw_panel(axes: Axes, recording: Recording, span: tuple[int, int]) -> None:
-    n, steps = _n_brigades(recording), np.asarray(recording.steps)
+    n, steps = len(recording.city.brigade_tank_litres), np.asarray(recording.steps)
     palettes = colors.ACTION_RGB, colors.ACTIVITY_RGB
     for table, palette, (top, height) in zip(_tables(recording), palettes, _BANDS, strict=True):
         for brigade in range(n):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import io
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -29,6 +30,18 @@ STILLS: Final[Mapping[str, Mapping[str, Any]]] = {
 _MISSING: Final = "pictures: matplotlib is not installed; try pip install 'fireworld[figures]'"
 
 
+def import_library(name: str, hint: str) -> Any:
+    """Import a library that need not be installed.
+
+    Raises:
+        ViewError: it is not; the message is the hint.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        raise ViewError(hint) from None
+
+
 def new_figure(
     width_inches: float, height_inches: float, *, dpi: int = DPI, paper: str = PAPER, layout: Any = None
 ) -> Figure:
@@ -37,11 +50,10 @@ def new_figure(
     Raises:
         ViewError: matplotlib is not installed.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise ViewError(_MISSING) from None
+    import_library("matplotlib", _MISSING)
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(width_inches, height_inches), dpi=dpi, facecolor=paper, layout=layout)
     FigureCanvasAgg(figure)
     return figure
@@ -59,11 +71,9 @@ def plain_style() -> Iterator[None]:
     Raises:
         ViewError: matplotlib is not installed.
     """
-    try:
-        import matplotlib as mpl
-        from matplotlib import style
-    except ImportError:
-        raise ViewError(_MISSING) from None
+    mpl = import_library("matplotlib", _MISSING)
+    from matplotlib import style
+
     with style.context("default"), mpl.rc_context({"svg.hashsalt": "fireworld"}):
         yield
 

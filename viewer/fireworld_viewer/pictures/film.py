@@ -5,20 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fireworld.errors import ViewError
 from fireworld.files import written_beside
 from fireworld.records import Recording
 from fireworld_viewer import colors
 from fireworld_viewer.pictures.city_map import GROUND, STREET
-from fireworld_viewer.pictures.figure_files import INK, PAPER
-from fireworld_viewer.pictures.map_grid import MapGrid
-from fireworld_viewer.pictures.map_legend import LABELS, count_marks
+from fireworld_viewer.pictures.figure_files import INK, PAPER, import_library
+from fireworld_viewer.pictures.map_grid import MapGrid, labels_on
 from fireworld_viewer.pictures.maps import cells_of
 from fireworld_viewer.story.steps import ShownStep
 
@@ -29,11 +26,13 @@ FPS: Final = 10.0
 _DPI: Final = 100
 _MAP_INCHES: Final = 6.0
 _PAIR_INCHES: Final = 4.6
-_HOLD_SECONDS: Final = 2.0
-"""How long the last frame stays."""
+_HOLD_SECONDS: Final = 2.0  # how long the last frame stays
 _TRANSPARENT: Final = 255
 """Number of the color that shows the frame before; it comes after all others."""
 _NEAR: Final = 6
+_NO_AV: Final = (
+    "film: PyAV, which writes .mp4, is not installed; try pip install 'fireworld[film]', or a film that ends in .gif"
+)
 Frame = NDArray[np.uint8]
 """(height, width, 3) sRGB; both even."""
 
@@ -61,29 +60,19 @@ def save_film(
     """
     write = FILMS[path.suffix.lower()]
     if write is _write_mp4:
-        import_av()
+        import_library("av", _NO_AV)
     frames = FilmFrames(recordings, steps)
     with written_beside(path) as partial:
         write(frames, partial, fps, on_frame)
 
 
 class FilmFrames:
-    """The frames of a film, drawn when asked for; the city is drawn once.
-
-    Args:
-        recordings: one, or two of the same city.
-        steps: one for each frame.
-
-    Raises:
-        ViewError: matplotlib is not installed.
-    """
+    """The frames of a film, drawn when asked for; the city is drawn once. Arguments as in `save_film`."""
 
     def __init__(self, recordings: Sequence[Recording], steps: Sequence[ShownStep]) -> None:
         self._recordings, self._steps = recordings, steps
         inches = _MAP_INCHES if len(recordings) == 1 else _PAIR_INCHES
-        there = {label for step in steps for cell in cells_of(recordings, step)
-                 for label in count_marks(cell.city, cell.state)}  # fmt: skip
-        labels = [label for label in LABELS if label in there]
+        labels = labels_on(cell for step in steps for cell in cells_of(recordings, step))
         first = cells_of(recordings, steps[0])
         self._grid = MapGrid(first, columns=len(recordings), map_inches=inches, labels=labels, dpi=_DPI)
         self._canvas = cast("Any", self._grid.figure.canvas)  # matplotlib has no type for it
@@ -125,21 +114,6 @@ class FilmFrames:
             self._rows[key] = self._canvas.copy_from_bbox(row.get_window_extent().padded(2.0))
 
 
-def import_av() -> ModuleType:
-    """Import PyAV.
-
-    Raises:
-        ViewError: it is not installed.
-    """
-    try:
-        import av
-    except ImportError:
-        hint = "try pip install 'fireworld[film]', or a film that ends in .gif"
-        raise ViewError(f"film: PyAV, which writes .mp4, is not installed; {hint}") from None
-    module: ModuleType = av
-    return module
-
-
 def _write_gif(frames: FilmFrames, path: Path, fps: float, on_frame: Callable[[], object]) -> None:
     """Write a GIF: one palette for all frames, and of each frame what has changed."""
     samples = [frames.frame(place) for place in sorted({round(k * (len(frames) - 1) / 2) for k in range(3)})]
@@ -176,10 +150,9 @@ def _palette(samples: Sequence[Frame]) -> Image:
 
     exact = [*colors.FIERYNESS_RGB, *colors.ACTIVITY_RGB, colors.REFUGE_RGB, colors.WATER_RGB, colors.HYDRANT_RGB]
     exact += [ImageColor.getrgb(color)[:3] for color in (PAPER, GROUND, STREET, INK)]
-    mixed = Image.fromarray(np.concatenate(samples)).quantize(
-        _TRANSPARENT - len(exact), method=Image.Quantize.MEDIANCUT
-    )
-    others = np.array(mixed.getpalette(), dtype=np.int64).reshape(-1, 3)[: _TRANSPARENT - len(exact)]
+    n = _TRANSPARENT - len(exact)
+    mixed = Image.fromarray(np.concatenate(samples)).quantize(n, method=Image.Quantize.MEDIANCUT)
+    others = np.array(mixed.getpalette(), dtype=np.int64).reshape(-1, 3)[:n]
     # Pillow takes a color for another that is very near: none may be very near to an exact one.
     apart = np.abs(others[:, np.newaxis] - np.array(exact)).max(axis=2).min(axis=1) > _NEAR
     palette = Image.new("P", (1, 1))
@@ -189,7 +162,7 @@ def _palette(samples: Sequence[Frame]) -> Image:
 
 def _write_mp4(frames: FilmFrames, path: Path, fps: float, on_frame: Callable[[], object]) -> None:
     """Write H.264 that every browser plays; one thread, so that the bytes are the same on every machine."""
-    av = import_av()
+    av = import_library("av", _NO_AV)
     options = {"crf": "20", "preset": "veryfast", "threads": "1"}
     with av.open(str(path), mode="w", format="mp4", options={"movflags": "+faststart"}) as film:
         stream = film.add_stream("libx264", rate=Fraction(fps).limit_denominator(1000), options=options)

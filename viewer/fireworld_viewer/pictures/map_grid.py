@@ -1,39 +1,66 @@
-"""Maps in rows and columns on one figure, each with its heading, and one legend for all."""
+"""Maps in rows and columns on one figure, each with its heading, and one legend for all: marks and how many of each."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from fireworld.records import CityRecord
-from fireworld_viewer.pictures.city_map import WIDTH_INCHES, CityMap, MapState, extent_m
+import numpy as np
+
+from fireworld.records import ACTIVITIES, FIERYNESS, CityRecord
+from fireworld_viewer import colors
+from fireworld_viewer.pictures.city_map import JET_EDGE, WIDTH_INCHES, CityMap, MapState, extent_m, hexadecimal
 from fireworld_viewer.pictures.figure_files import DPI, INK, new_figure
-from fireworld_viewer.pictures.map_legend import LABELS, count_marks, draw_legend, show_counts
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 _LEGEND_INCHES: Final = 2.35
 _GAP_INCHES: Final = 0.14
 _LINE_INCHES: Final = 0.24
 _LEGEND_LINE_INCHES: Final = 0.205
-_POINTS_WIDE: Final = 0.56
-"""How wide a letter is on average, of its size."""
-_MAPS_COUNTED: Final = 2
-"""Above this many maps, and in strips, the legend has no counts."""
+_POINTS_WIDE: Final = 0.56  # how wide a letter is on average, of its size
+_MAPS_COUNTED: Final = 2  # above this many maps, and in strips, the legend has no counts
+
+_JET: Final = "water jet"
+_WAY: Final = "way to a target"
+_TANK: Final = "water in the tank"
+_BRIGADE: Final = "brigade"
+_DOING: Final = tuple(f"brigade {activity.removeprefix('driving-').replace('-', ' ')}" for activity in ACTIVITIES)
+_CIVILIAN: Final = ("civilian well", "civilian hurt", "civilian dying", "civilian dead")
+"""With more than 3/4 of their health, more than 1/4, less, and none."""
+_CODES: Final = tuple(name.replace("-", " ") for name in FIERYNESS)
+_UPRIGHT: Final = ((-0.25, -1.0), (0.25, -1.0), (0.25, 1.0), (-0.25, 1.0), (-0.25, -1.0))
+_MARKS: Final[Mapping[str, tuple[colors.Rgb, Any, float]]] = {
+    **{label: (rgb, "s", 9.0) for label, rgb in zip(_CODES, colors.FIERYNESS_RGB, strict=True)},
+    "refuge": (colors.REFUGE_RGB, "s", 9.0),
+    "hydrant": (colors.HYDRANT_RGB, "s", 5.0),
+    **{label: (rgb, "o", 6.0) for label, rgb in zip(_CIVILIAN, colors.HEALTH_RGB, strict=True)},
+    "civilian dead": (colors.DEAD_RGB, "X", 6.0),
+    _BRIGADE: (colors.ACTIVITY_RGB[2], "o", 10.0),
+    **{label: (rgb, "o", 10.0) for label, rgb in zip(_DOING, colors.ACTIVITY_RGB, strict=True)},
+    _TANK: (colors.WATER_RGB, _UPRIGHT, 11.0),
+}
+"""Color, shape and size."""
+LABELS: Final = (*_MARKS, _JET, _WAY)  # everything that can be on a map, in the order of the legend
+LEGEND_STYLE: Final[Mapping[str, Any]] = {
+    "loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "frameon": False, "labelcolor": INK, "borderaxespad": 0,
+}  # fmt: skip
+"""To the right of a map."""
+_UNCOUNTED: Final = frozenset({_TANK, _JET, _WAY})
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class MapCell:
     """One map of a grid."""
 
     city: CityRecord
     state: MapState
     title: str
-    facts: str = ""
-    """A second line of the heading."""
+    facts: str = ""  # a second line of the heading
 
 
 class MapGrid:
@@ -46,9 +73,6 @@ class MapGrid:
         heading: above everything; empty for none.
         labels: entries of the legend; what is on these maps if left out.
         dpi: pixels an inch.
-
-    Raises:
-        ViewError: matplotlib is not installed.
     """
 
     def __init__(
@@ -64,7 +88,7 @@ class MapGrid:
         west, east, south, north = extent_m(cells[0].city)
         self._map_inches = map_inches
         map_height = min(max(map_inches * (north - south) / (east - west), 0.4 * map_inches), 2.0 * map_inches)
-        self._labels = list(labels) or _labels_of(cells)
+        self._labels = list(labels) or labels_on(cells)
         rows = -(-len(cells) // columns)
         n_lines = 1 + any(cell.facts for cell in cells)
         row_height = map_height + n_lines * _LINE_INCHES + _GAP_INCHES
@@ -85,7 +109,11 @@ class MapGrid:
             self._add(cell, left, top, map_height, alone=len(cells) == 1 and not heading, n_lines=n_lines)
         corner = self._maps[min(columns, len(self._maps)) - 1]
         self._counted = len(cells) <= _MAPS_COUNTED and not heading
-        self._legend = draw_legend(corner.axes, self._labels, n_maps=len(cells) if self._counted else 0)
+        title = "how many: (A | B)" if self._counted and len(cells) > 1 else None
+        self._legend = corner.axes.legend(
+            handles=[_handle(label) for label in self._labels], labels=self._labels, handlelength=1.7, fontsize=10.0,
+            title=title, title_fontsize=10.0, alignment="left", **LEGEND_STYLE,
+        )  # fmt: skip
         self.show(cells)
 
     @property
@@ -105,7 +133,9 @@ class MapGrid:
             one.show(cell.state)
             facts.set_text(cell.facts)
         counts = [count_marks(cell.city, cell.state) for cell in cells] if self._counted else []
-        show_counts(self._legend, self._labels, counts)
+        for text, label in zip(self._legend.get_texts(), self._labels, strict=True):
+            numbers = " | ".join(str(count.get(label, 0)) for count in counts)
+            text.set_text(label if label in _UNCOUNTED or not counts else f"{label} ({numbers})")
 
     def _add(self, cell: MapCell, left: float, top: float, height: float, *, alone: bool, n_lines: int) -> None:
         """Add a map whose upper left corner is there, in inches from the upper left one of the figure."""
@@ -130,7 +160,28 @@ class MapGrid:
         return self.figure.text(*place, text, fontsize=min(points, max(fitting, 6.0)), **style)
 
 
-def _labels_of(cells: Sequence[MapCell]) -> list[str]:
+def count_marks(city: CityRecord, state: MapState) -> dict[str, int]:
+    """Count what is on a map, by label; what is not there is left out."""
+    outside = np.delete(np.asarray(state.fieryness, dtype=np.int64), np.asarray(city.refuge_building, dtype=np.int64))
+    counts = dict(zip(_CODES, np.bincount(outside, minlength=len(_CODES)).tolist(), strict=True))
+    counts |= {"refuge": len(city.refuge_building), "hydrant": len(city.hydrant_x_m)}
+    hp, start = np.asarray(state.civilian_hp, dtype=np.float64), np.maximum(city.civilian_hp, 1)
+    band = np.digitize(hp / start, [0.0, 0.25, 0.75], right=True)  # 0 dead, 3 well
+    counts |= dict(zip(reversed(_CIVILIAN), np.bincount(band, minlength=4).tolist(), strict=True))
+    brigades = state.brigades
+    if brigades is not None and brigades.activity is None:
+        counts[_BRIGADE] = len(brigades.xy_m)
+    elif brigades is not None:
+        doing = np.bincount(np.asarray(brigades.activity, dtype=np.int64), minlength=len(_DOING)).tolist()
+        counts |= dict(zip(_DOING, doing, strict=True))
+        counts[_TANK] = len(brigades.xy_m)
+        counts[_JET] = len(brigades.with_target(ACTIVITIES.index("spraying"))[0])
+        counts[_WAY] = len(brigades.with_target(ACTIVITIES.index("driving"))[0])
+    return {label: count for label, count in counts.items() if count}
+
+
+def labels_on(cells: Iterable[MapCell]) -> list[str]:
+    """Return the entries of a legend: what is on any of the maps."""
     there: set[str] = set().union(*(count_marks(cell.city, cell.state) for cell in cells))
     return [label for label in LABELS if label in there]
 
@@ -138,3 +189,25 @@ def _labels_of(cells: Sequence[MapCell]) -> list[str]:
 def _even(inches: float, dpi: int) -> float:
     """Return inches that are an even number of pixels, as films want it."""
     return 2 * round(inches * dpi / 2) / dpi
+
+
+def mark(face: str, shape: Any = "s", size: float = 9.0, *, edge: str = INK, label: str = "") -> Line2D:
+    """Return an entry of a legend."""
+    from matplotlib.lines import Line2D
+
+    style: dict[str, Any] = {"markerfacecolor": face, "markeredgecolor": edge, "markersize": size, "label": label}
+    return Line2D([], [], linestyle="", marker=shape, **style)
+
+
+def _handle(label: str) -> Any:
+    """Return the mark of a label as it is on the map."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patheffects import Normal, Stroke
+
+    if label == _WAY:
+        return Line2D([], [], color=INK, linewidth=1.1, linestyle=(0, (3, 2)))
+    if label == _JET:
+        edged = [Stroke(linewidth=4.2, foreground=JET_EDGE), Normal()]
+        return Line2D([], [], color=hexadecimal(colors.WATER_RGB), linewidth=2.6, path_effects=edged)
+    rgb, shape, size = _MARKS[label]
+    return mark(hexadecimal(rgb), shape, size, edge="white" if label == "civilian dead" else INK)

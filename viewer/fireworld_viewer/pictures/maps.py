@@ -17,10 +17,8 @@ from fireworld_viewer.story.steps import ShownStep, read_steps
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PAIR_INCHES: Final = 5.4
-"""Width of each of two maps side by side."""
-_STRIP_INCHES: Final = (3.0, 4.4)
-"""Least and greatest width of a map in a strip."""
+PAIR_INCHES: Final = 5.4  # width of each of two maps side by side
+_STRIP_INCHES: Final = (3.0, 4.4)  # least and greatest width of a map in a strip
 _STRIP_WIDTH_INCHES: Final = 12.0
 _STRIP_COLUMNS: Final = 5
 _NAME_LETTERS: Final = 48
@@ -54,7 +52,7 @@ def draw_map(
         civilian_hp=np.asarray(city.civilian_hp) if civilian_hp is None else np.asarray(civilian_hp),
         brigades=brigades,
     )
-    return MapGrid([MapCell(city=city, state=state, title=one_line(title or city.name))]).figure
+    return MapGrid([MapCell(city, state, one_line(title or city.name))]).figure
 
 
 def draw_record(city: CityRecord, record: StepRecord, *, title: str) -> Figure:
@@ -83,14 +81,10 @@ def draw_steps(recordings: Sequence[Recording], steps: Sequence[int]) -> Figure:
         inches = WIDTH_INCHES if len(recordings) == 1 else PAIR_INCHES
         return MapGrid(cells_of(recordings, shown[0]), columns=len(recordings), map_inches=inches).figure
     cells = [
-        MapCell(
-            city=recording.city,
-            state=state_of(recording.city, step.records[row]),
-            title=letter + _when(step.records[row], step.step),
-            facts=_facts(step.records[row], apart=", "),
-        )
-        for row, (recording, letter) in enumerate(zip(recordings, _letters(recordings), strict=True))
+        MapCell(one.city, state_of(one.city, record), letter + _when(record, step.step), ", ".join(_facts(record)))
+        for row, (one, letter) in enumerate(zip(recordings, _letters(recordings), strict=True))
         for step in shown
+        for record in [step.records[row]]
     ]
     columns = len(shown)
     if len(recordings) == 1:
@@ -103,22 +97,16 @@ def draw_steps(recordings: Sequence[Recording], steps: Sequence[int]) -> Figure:
 def cells_of(recordings: Sequence[Recording], shown: ShownStep) -> list[MapCell]:
     """Return the maps of a step, one for each recording, headed by what it is a recording of."""
     return [
-        MapCell(
-            city=one.city,
-            state=state_of(one.city, record),
-            title=name,
-            facts=f"{_when(record, shown.step)}   {_facts(record, apart='   ')}",
-        )
+        MapCell(one.city, state_of(one.city, record), name, "   ".join([_when(record, shown.step), *_facts(record)]))
         for one, record, name in zip(recordings, shown.records, _names(recordings), strict=True)
     ]
 
 
 def _names(recordings: Sequence[Recording]) -> list[str]:
     """Return scenario, policy and seed of each run."""
-    headers = [one.header for one in recordings]
     return [
-        f"{letter}{_shortened(header.scenario)}, {_shortened(header.policy)}, seed {header.seed}"
-        for header, letter in zip(headers, _letters(recordings), strict=True)
+        f"{letter}{_shortened(one.header.scenario)}, {_shortened(one.header.policy)}, seed {one.header.seed}"
+        for one, letter in zip(recordings, _letters(recordings), strict=True)
     ]
 
 
@@ -127,11 +115,11 @@ def _when(record: StepRecord, step: int) -> str:
     return f"step {step}" if record.step == step else f"step {step} (ended at {record.step})"
 
 
-def _facts(record: StepRecord, *, apart: str) -> str:
+def _facts(record: StepRecord) -> tuple[str, str]:
     """Return the score and the fire after a step in words."""
     score = record.score
     fire = f"{score.n_burning} burning, {score.n_burnt_out} burnt out"
-    return f"score {score.score:.2f} of {score.score_max:.0f}{apart}{fire}"
+    return f"score {score.score:.2f} of {score.score_max:.0f}", fire
 
 
 def _letters(recordings: Sequence[Recording]) -> Sequence[str]:

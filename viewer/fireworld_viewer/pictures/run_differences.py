@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from fireworld.records import Array, CityRecord, StepRecord
 from fireworld_viewer import colors
-from fireworld_viewer.pictures.city_map import hexadecimal
+from fireworld_viewer.pictures.city_map import hexadecimal, outlines_m
 from fireworld_viewer.pictures.figure_files import INK, PAIR_COLORS, new_figure, open_frame
+from fireworld_viewer.pictures.map_grid import LEGEND_STYLE, mark
 from fireworld_viewer.pictures.maps import draw_map
-from fireworld_viewer.story.two_runs import compare_damage
+from fireworld_viewer.story.steps import compare_damage
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Gaps = Sequence[float | None]
@@ -35,9 +35,6 @@ def draw_difference_map(city: CityRecord, a: StepRecord, b: StepRecord, differin
     """Draw which buildings, brigades and civilians differ; brigades where they are in the second run.
 
     `a` and `b` are one step of both runs; `differing`: "building", "brigade" and "civilian", (n,) bool which differ.
-
-    Raises:
-        ViewError: matplotlib is not installed.
     """
     from matplotlib.collections import LineCollection, PolyCollection
 
@@ -45,8 +42,8 @@ def draw_difference_map(city: CityRecord, a: StepRecord, b: StepRecord, differin
     axes = figure.axes[0]
     chosen = np.flatnonzero(differing["building"])
     damage = compare_damage(a.buildings.fieryness, b.buildings.fieryness)[chosen].tolist()
-    corners = np.column_stack([city.outline_x_m, city.outline_y_m])
-    outlines = [corners[city.outline_ptr[index] : city.outline_ptr[index + 1]] for index in chosen]
+    every = outlines_m(city)
+    outlines = [every[index] for index in chosen]
     faces = [_KINDS[sign][1] for sign in damage]
     axes.add_collection(PolyCollection(outlines, facecolors=faces, edgecolors=INK, linewidths=0.35, zorder=3))
     moved = np.flatnonzero(differing["brigade"])
@@ -57,27 +54,16 @@ def draw_difference_map(city: CityRecord, a: StepRecord, b: StepRecord, differin
     hurt = np.flatnonzero(differing["civilian"])
     x, y = city.civilian_x_m[hurt], city.civilian_y_m[hurt]
     axes.scatter(x, y, s=120, facecolors="none", edgecolors=_VIOLET, linewidths=1.8, zorder=8)
-    _draw_legend(axes, damage, n_brigades=len(moved), n_civilians=len(hurt))
+    entries = [
+        mark(face, label=f"{label} ({damage.count(sign)})") for sign, (label, face) in _KINDS.items() if sign in damage
+    ]
+    if len(moved):
+        entries.append(mark(_BRIGADE, "o", label=f"brigade, from A to B ({len(moved)})"))
+    if len(hurt):
+        entries.append(mark("none", "o", edge=_VIOLET, label=f"civilian ({len(hurt)})"))
+    entries.append(mark("none", "", label="grey: the same"))
+    axes.legend(handles=entries, **LEGEND_STYLE)
     return figure
-
-
-def _draw_legend(axes: Axes, damage: Sequence[int], *, n_brigades: int, n_civilians: int) -> None:
-    """Name what differs, in place of the map's own legend."""
-    from matplotlib.lines import Line2D
-
-    def mark(label: str, count: int, face: str, *, shape: str = "s", edge: str = INK) -> Line2D:
-        style: dict[str, Any] = {"markerfacecolor": face, "markeredgecolor": edge, "markersize": 9}
-        return Line2D([], [], linestyle="", marker=shape, label=f"{label} ({count})", **style)
-
-    handles = [mark(label, damage.count(sign), face) for sign, (label, face) in _KINDS.items() if sign in damage]
-    if n_brigades:
-        handles.append(mark("brigade, from A to B", n_brigades, _BRIGADE, shape="o"))
-    if n_civilians:
-        handles.append(mark("civilian", n_civilians, "none", shape="o", edge=_VIOLET))
-    handles.append(Line2D([], [], linestyle="", label="grey: the same"))
-    axes.legend(
-        handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False, labelcolor=INK, borderaxespad=0
-    )
 
 
 def draw_difference_curves(
@@ -94,18 +80,16 @@ def draw_difference_curves(
         curves: by title: of A and of B; those after the first are counts.
         n_buildings: by label: how many buildings differ, in anything and in fieryness.
         first_step: of the first difference; None for none.
-
-    Raises:
-        ViewError: matplotlib is not installed.
     """
     figure = new_figure(12.0, 6.4, dpi=110, paper="white", layout="constrained")
     panels = figure.subplots(2, 2, sharex=True).ravel()
     for axes, (title, both) in zip(panels, curves.items(), strict=False):
         for name, curve, color, style in zip("AB", both, PAIR_COLORS, ("-", "--"), strict=True):
-            axes.plot(steps, _with_gaps(curve), color=color, linestyle=style, linewidth=1.8, label=name)
+            numbers = np.array(curve, dtype=np.float64)  # None becomes NaN: a gap
+            axes.plot(steps, numbers, color=color, linestyle=style, linewidth=1.8, label=name)
         axes.set_title(title, fontsize=11, loc="left")
     for (label, counts), color in zip(n_buildings.items(), (INK, _VIOLET), strict=True):
-        panels[3].plot(steps, _with_gaps(counts), color=color, label=label)
+        panels[3].plot(steps, np.array(counts, dtype=np.float64), color=color, label=label)
     panels[3].set_title("buildings that differ", fontsize=11, loc="left")
     for axes in panels[[0, 3]]:
         axes.legend(fontsize=9, frameon=False)
@@ -117,8 +101,3 @@ def draw_difference_curves(
         open_frame(axes)
     figure.supxlabel("step; dotted: the first difference", fontsize=10)
     return figure
-
-
-def _with_gaps(curve: Gaps) -> Array:
-    """(k,) float64: NaN where a run does not have the step."""
-    return np.array(curve, dtype=np.float64)

@@ -18,11 +18,9 @@ from fireworld_viewer.city_mesh import CityMesh
 from fireworld_viewer.rerun_view.layers import Layers
 
 _ABOVE_ROOFS_M: Final = 4.0
-HOTTEST: Final = 600.0
-"""Degrees above ambient at which the color is at its end."""
+HOTTEST: Final = 600.0  # degrees above ambient at which the color is at its end
 _COLDEST: Final = 1.0
-_OPACITY: Final = 0.999
-"""Below 1, or the viewer takes the layer for opaque."""
+_OPACITY: Final = 0.999  # below 1, or the viewer takes the layer for opaque
 _ALPHA: Final = (70, 215)
 
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Final
 from fireworld.errors import ViewError, expected
 from fireworld.files import check_output, write_file
 from fireworld.records import Recording
-from fireworld_viewer.rerun_view.outcome_page import OutcomePage
+from fireworld_viewer.rerun_view.pages import OutcomePage
 
 if TYPE_CHECKING:
     import rerun
@@ -76,19 +76,16 @@ def serve(
 ) -> None:
     """Serve Rerun with the recordings to browsers on this machine until interrupted; arguments as in `save`.
 
-    Args:
-        recordings: one, or two of the same city.
-        focus: ids of buildings.
-        outcome: how the runs came out.
-        port: of the page.
-        announce: called with the address of the page.
+    `port` is that of the page, and `announce` is called with its address.
 
     Raises:
         ViewError: the port is taken, or there is no viewer.
     """
     _import_rerun()
-    if not _is_free(port):
-        raise ViewError(expected("view", "--port", "a free port", port, "try another one"))
+    try:
+        free_port(port)
+    except OSError:
+        raise ViewError(expected("view", "--port", "a free port", port, "try another one")) from None
     data_port = free_port()
     announce(f"http://{LOCALHOST}:{port}?url=rerun%2Bhttp%3A%2F%2F{LOCALHOST}%3A{data_port}%2Fproxy")
     ports = ["--web-viewer-port", str(port), "--port", str(data_port)]
@@ -121,10 +118,15 @@ def viewer_environment(environment: Mapping[str, str]) -> dict[str, str]:
     return {**others, "CI": "1", "RUST_LOG": environment.get("RUST_LOG", "error")}
 
 
-def free_port() -> int:
-    """Return a port of this machine that nobody listens on at the moment."""
+def free_port(wanted: int = 0) -> int:
+    """Return a port of this machine that nobody listens on at the moment: the one wanted, any for 0.
+
+    Raises:
+        OSError: it is taken.
+    """
     with socket.socket() as probe:
-        probe.bind((LOCALHOST, 0))
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        probe.bind((LOCALHOST, wanted))
         port: int = probe.getsockname()[1]
         return port
 
@@ -151,11 +153,10 @@ def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome
     """
     rerun = _import_rerun()
     from fireworld_viewer.rerun_view import blueprint
-    from fireworld_viewer.rerun_view.comparison import log_comparison
-    from fireworld_viewer.rerun_view.pages import log_legend, log_outcome
+    from fireworld_viewer.rerun_view.pages import OUTCOME_PATH, log_legend, log_page
     from fireworld_viewer.rerun_view.plots import first_burning
-    from fireworld_viewer.rerun_view.run_layers import RunLayers
-    from fireworld_viewer.story.two_runs import check_same_city
+    from fireworld_viewer.rerun_view.run_layers import RunLayers, log_comparison
+    from fireworld_viewer.story.steps import check_same_city
 
     comparing = len(recordings) > 1
     if comparing:
@@ -171,7 +172,7 @@ def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome
         stream.send_recording_name(" | ".join(map(blueprint.title, recordings)))
         log_legend(stream, comparing=comparing)
         if outcome is not None:
-            log_outcome(stream, outcome)
+            log_page(stream, OUTCOME_PATH, outcome.markdown)
         if comparing:
             log_comparison(stream, *recordings, focus=plotted, outcome=outcome)
         else:
@@ -198,7 +199,7 @@ def _run_viewer(
         path = Path(folder) / "view.rrd"
         save(recordings, path, focus=focus, outcome=outcome)
         command = [str(viewer_executable()), "--bind", LOCALHOST, *options, str(path)]
-        before = signal.signal(signal.SIGTERM, _stop)
+        before = signal.signal(signal.SIGTERM, signal.default_int_handler)
         with (Path(folder) / "errors").open("w+", encoding="utf-8", errors="replace") as errors:
             viewer = subprocess.Popen(command, env=viewer_environment(os.environ), stderr=errors)  # noqa: S603 - our own
             try:
@@ -217,27 +218,8 @@ def _run_viewer(
         raise ViewError(f"view: Rerun's viewer ended with code {status}{why}; {hint}")
 
 
-def _stop(number: int, frame: object) -> None:
-    del number, frame
-    raise KeyboardInterrupt
-
-
-def _is_free(port: int) -> bool:
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((LOCALHOST, port))
-        except OSError:
-            return False
-    return True
-
-
 def _import_rerun() -> ModuleType:
-    """Import Rerun, quietly: its own log would stand between the user and our one line.
-
-    Raises:
-        ViewError: it is not installed, or is of another minor version.
-    """
+    """Import Rerun, quietly, or raise ViewError: its own log would stand between the user and our one line."""
     level = os.environ.get("RUST_LOG")
     os.environ["RUST_LOG"] = level or "off"  # read once, when Rerun is first imported
     try:

@@ -12,20 +12,19 @@ from fireworld.records import SNAPSHOT_EVERY_STEPS, Recording
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import city_box_m
 from fireworld_viewer.rerun_view.camera import Camera, frame_fire, frame_from_above
-from fireworld_viewer.rerun_view.comparison import MARK_PATH
 from fireworld_viewer.rerun_view.layers import TIMELINE
-from fireworld_viewer.rerun_view.outcome_page import OutcomePage
-from fireworld_viewer.rerun_view.pages import HELP_PATH, LEGEND_PATH, OUTCOME_PATH, bounds
+from fireworld_viewer.rerun_view.pages import HELP_PATH, LEGEND_PATH, OUTCOME_PATH, OutcomePage, bounds
 from fireworld_viewer.rerun_view.plots import has_choice_values
+from fireworld_viewer.rerun_view.run_layers import MARK_PATH
 
-STEPS_PER_SECOND: Final = 8.0
+STEPS_PER_SECOND: Final = 8.0  # a pace that can be followed
 LAYERS: Final = ("city", "team", "civilians", "fire")
 """Entity paths of what is on a map; the air has a map of its own."""
 
 
 def single(recording: Recording, *, focus: bool, outcome: OutcomePage | None = None) -> Any:
     """Lay out one recording: map, timelines and log on the left; curves, with `focus` temperatures, on the right."""
-    log = rrb.Tabs(text_view("Events and choices", ["+ /log/**"]), *pages(outcome), active_tab=0)
+    log = rrb.Tabs(text_view("Events and choices", "/log/**"), *pages(outcome), active_tab=0)
     left = rrb.Vertical(
         maps("Fire and brigades", "", [recording], aspect=1.8),
         rrb.Horizontal(rrb.Tabs(*state_views("", ""), active_tab=0), log, column_shares=[1, 1.4]),
@@ -51,10 +50,10 @@ def pair(first: Recording, second: Recording, *, focus: bool, outcome: OutcomePa
         *plot_tabs(": A and B", ["/a", "/b"], *both, focus=focus)[:1],
         plot_view("Buildings that differ", ["/diff/plots/buildings", *mark]),
     ]
-    logged = [f"+ {path.replace('plots', 'log')}" for path in mark]
+    logged = [path.replace("plots", "log") for path in mark]
     details = [
         rrb.Tabs(
-            text_view(f"Events and choices: {name}", [f"+ {prefix}/log/**", *logged]),
+            text_view(f"Events and choices: {name}", f"{prefix}/log/**", *logged),
             *state_views(f": {name}", prefix),
             plot_view(f"Water in tanks (l): {name}", [f"{prefix}/plots/tanks"]),
             active_tab=0,
@@ -129,35 +128,35 @@ def title(recording: Recording) -> str:
 
 def blueprint(root: Any, *, marked: tuple[int, int] | None = None) -> Any:
     """Wrap a layout: only the time panel is open; steps from the first to the last of `marked` are marked on it."""
-    time = _time_panel("paused", time_selection=None if marked is None else AbsoluteTimeRange(*marked))
+    time = rrb.TimePanel(
+        state="collapsed",
+        timeline=TIMELINE,
+        fps=STEPS_PER_SECOND,
+        play_state="paused",
+        time_selection=None if marked is None else AbsoluteTimeRange(*marked),
+    )
     others = rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed")
     return rrb.Blueprint(root, time, *others, auto_views=False)
 
 
 def following(layout: Any, *, listed: bool) -> Any:
     """Keep the time cursor of a layout at the newest step; `listed` opens the list of recordings. Return the layout."""
-    layout.time_panel = _time_panel("following")
+    layout.time_panel.play_state = "following"
     if listed:
         layout.blueprint_panel = rrb.BlueprintPanel(state="expanded")
     return layout
 
 
-def _time_panel(play_state: str, **options: Any) -> Any:
-    """Return a panel that plays the steps at a pace that can be followed."""
-    return rrb.TimePanel(state="collapsed", timeline=TIMELINE, fps=STEPS_PER_SECOND, play_state=play_state, **options)
-
-
 def map_view(name: str, prefix: str, camera: Camera, *, layers: Sequence[str] = LAYERS) -> Any:
     """Return a 3D view of one recording's map. The meshes let clicks through to the handles on the roofs."""
     inert = rrb.EntityBehavior(interactive=False)
-    eye = rrb.EyeControls3D(position=camera.eye_m, look_target=camera.target_m, eye_up=camera.up)
     return rrb.Spatial3DView(
         name=name,
         origin=prefix or "/",
         contents=[f"+ {prefix}/{layer}/**" for layer in layers],
         background=colors.BACKGROUND_RGB,
         line_grid=False,
-        eye_controls=eye,
+        eye_controls=rrb.EyeControls3D(position=camera.eye_m, look_target=camera.target_m, eye_up=camera.up),
         overrides={f"{prefix}/city/{mesh}": inert for mesh in ("buildings", "ground", "streets")},
     )
 
@@ -168,10 +167,10 @@ def plot_view(name: str, paths: Sequence[str], *, corner: str = "LeftTop") -> An
     return rrb.TimeSeriesView(name=name, origin="/", contents=[f"+ {path}" for path in paths], plot_legend=legend)
 
 
-def text_view(name: str, contents: list[str]) -> Any:
-    """Return a view of logs: the step and the text."""
+def text_view(name: str, *paths: str) -> Any:
+    """Return a view of the logs at some paths: the step and the text."""
     columns = rrb.TextLogColumns(timeline_columns=[TIMELINE], text_log_columns=["body"])
-    return rrb.TextLogView(name=name, origin="/", contents=contents, columns=columns)
+    return rrb.TextLogView(name=name, origin="/", contents=[f"+ {path}" for path in paths], columns=columns)
 
 
 def legend_view(*, comparing: bool = False) -> Any:

@@ -1,4 +1,4 @@
-"""Brigades in Rerun: balls with a gauge of their tanks, jets of water, and arcs to where they drive."""
+"""Brigades in Rerun: balls with a gauge of their tanks, jets of water, arcs to where they drive, and their states."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 import rerun
 from numpy.typing import NDArray
 
-from fireworld.records import ACTIONS, ACTIVITIES, Recording
+from fireworld.records import ACTION_NAMES, ACTIONS, ACTIVITIES, Recording
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import CityMesh
 from fireworld_viewer.rerun_view.layers import Layers, number_columns
-from fireworld_viewer.story.choices import choices_of, per_brigade
+from fireworld_viewer.story.series import choices_of, per_brigade
 
 _DRIVING: Final = ACTIVITIES.index("driving")
 _BALL_RADIUS_M: Final = 4.0
@@ -33,20 +33,14 @@ def log_brigades(layers: Layers, recording: Recording) -> None:
     if n == 0:
         return
     width = np.full(k, n)
-    tank = recording.column("/brigades", "tank_litres")
-    activity = recording.column("/brigades", "activity")
     choices = choices_of(recording)
     numbers: dict[str, NDArray[Any]] = {
-        "tank_litres": tank,
-        "sprayed_litres": recording.column("/brigades", "sprayed_litres"),
-        "hp": recording.column("/brigades", "hp"),
-        "activity": activity,
-        "action": choices.action,
-        "target": choices.target,
-        "value": choices.value,
+        **{name: recording.column("/brigades", name) for name in ("tank_litres", "sprayed_litres", "hp", "activity")},
+        **{name: getattr(choices, name) for name in ("action", "target", "value")},
         **{f"value_{name.replace('-', '_')}": choices.action_values[..., index] for index, name in enumerate(ACTIONS)},
     }
-    rgb = colors.packed_table(colors.ACTIVITY_RGB)[activity].reshape(-1)
+    tank = numbers["tank_litres"]
+    rgb = colors.packed_table(colors.ACTIVITY_RGB)[numbers["activity"]].reshape(-1)
     balls = rerun.Points3D.columns(positions=position.reshape(-1, 3), colors=rgb)
     layers.static("team/brigades", rerun.Points3D.from_fields(radii=[_BALL_RADIUS_M]))
     layers.rows("team/brigades", balls.partition(width), number_columns("Brigade", numbers))
@@ -63,12 +57,10 @@ def log_brigades(layers: Layers, recording: Recording) -> None:
     full = np.maximum(np.asarray(recording.city.brigade_tank_litres, dtype=np.float32), 1.0)
     half_height = np.clip(tank / full, 0.0, 1.0).astype(np.float32) * (_GAUGE_HEIGHT_M / 2)
     half_width = np.full_like(half_height, _GAUGE_HALF_WIDTH_M)
+    half_sizes = np.stack([half_width, half_width, half_height], axis=-1)
     middle = position.copy()
     middle[..., 2] = position[..., 2] + _BALL_RADIUS_M + half_height
-    gauges = rerun.Boxes3D.columns(
-        centers=middle.reshape(-1, 3),
-        half_sizes=np.stack([half_width, half_width, half_height], axis=-1).reshape(-1, 3),
-    )
+    gauges = rerun.Boxes3D.columns(centers=middle.reshape(-1, 3), half_sizes=half_sizes.reshape(-1, 3))
     style = rerun.Boxes3D.from_fields(colors=colors.single(colors.WATER_RGB), fill_mode=rerun.components.FillMode.Solid)
     layers.static("team/tanks", style)
     layers.rows("team/tanks", gauges.partition(width))
@@ -76,8 +68,7 @@ def log_brigades(layers: Layers, recording: Recording) -> None:
 
 def log_water(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
     """Draw a jet from each brigade that sprays, and a thin arc from each that drives, to the target."""
-    activity = recording.column("/brigades", "activity")
-    sprayed = recording.column("/brigades", "sprayed_litres")
+    activity, sprayed = (recording.column("/brigades", name) for name in ("activity", "sprayed_litres"))
     target = per_brigade(recording, "target", missing=-1)
     position = positions_m(recording)
     for path, shown, radius_m, rgb, rise_m in (
@@ -86,6 +77,16 @@ def log_water(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
     ):
         arcs = _arcs(position[shown], mesh.roof_xyz_m[target[shown]], rise_m)
         layers.strips(path, arcs, shown.sum(axis=1), radius_m=radius_m, rgb=rgb)
+
+
+def log_states(layers: Layers, recording: Recording) -> None:
+    """Send two timelines for each brigade: its activity, and the action that it chose."""
+    activity = recording.column("/brigades", "activity")
+    action = per_brigade(recording, "action", missing=-1)  # -1 is the last of the names: refilling, dead, or no fire
+    actions, rgb = (*ACTION_NAMES, "no choice"), (*colors.ACTION_RGB, colors.NO_CHOICE_RGB)
+    for brigade in range(activity.shape[1]):
+        layers.states(f"activity/brigade_{brigade}", activity[:, brigade], ACTIVITIES, colors.ACTIVITY_RGB)
+        layers.states(f"action/brigade_{brigade}", action[:, brigade], actions, rgb)
 
 
 def positions_m(recording: Recording) -> NDArray[np.float32]:
@@ -97,10 +98,8 @@ def positions_m(recording: Recording) -> NDArray[np.float32]:
 
 def crowding(x: NDArray[Any], y: NDArray[Any], *, within_m: float) -> NDArray[np.int64]:
     """Count for each brigade those of lower numbers within a distance in x and in y: (k, n) and (k, n) to (k, n)."""
-    near = (np.abs(x[:, :, np.newaxis] - x[:, np.newaxis, :]) <= within_m) & (
-        np.abs(y[:, :, np.newaxis] - y[:, np.newaxis, :]) <= within_m
-    )
-    counts: NDArray[np.int64] = np.tril(near, k=-1).sum(axis=2)
+    near_x, near_y = (np.abs(one[:, :, np.newaxis] - one[:, np.newaxis, :]) <= within_m for one in (x, y))
+    counts: NDArray[np.int64] = np.tril(near_x & near_y, k=-1).sum(axis=2)
     return counts
 
 

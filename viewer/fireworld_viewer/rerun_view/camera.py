@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fireworld.records import Recording
 from fireworld_viewer.city_mesh import city_box_m
@@ -28,8 +28,7 @@ class Camera:
 
     eye_m: tuple[float, float, float]
     target_m: tuple[float, float, float]
-    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    """What is up in the picture."""
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)  # what is up in the picture
 
 
 def frame_fire(recordings: Sequence[Recording], *, aspect: float) -> Camera:
@@ -38,14 +37,12 @@ def frame_fire(recordings: Sequence[Recording], *, aspect: float) -> Camera:
     aspect: width of the view by its height.
     """
     city = recordings[0].city
-    low, high = city_box_m(city)
-    fought = np.zeros(len(city.building_id), dtype=bool)
-    for recording in recordings:
-        fought |= _fought_buildings(recording.column("/buildings", "fieryness"))
+    low, high = map(np.array, city_box_m(city))
+    fought = np.any([_fought_buildings(one.column("/buildings", "fieryness")) for one in recordings], axis=0)
     if fought.any():
-        x, y = np.asarray(city.center_x_m)[fought], np.asarray(city.center_y_m)[fought]
-        low = (max(low[0], float(x.min()) - _MARGIN_M), max(low[1], float(y.min()) - _MARGIN_M))
-        high = (min(high[0], float(x.max()) + _MARGIN_M), min(high[1], float(y.max()) + _MARGIN_M))
+        center = np.column_stack([city.center_x_m, city.center_y_m])[fought]
+        low = np.maximum(low, center.min(axis=0) - _MARGIN_M)
+        high = np.minimum(high, center.max(axis=0) + _MARGIN_M)
     (x_m, y_m), (half_width_m, half_depth_m) = _middle_and_halves(low, high)
     # The near edge of the ground is closer to the eye than its middle, and seen larger.
     seen_m = max(half_width_m / (_SLOPE * aspect), half_depth_m * _UP / _SLOPE, _LEAST_DISTANCE_M)
@@ -53,16 +50,16 @@ def frame_fire(recordings: Sequence[Recording], *, aspect: float) -> Camera:
     return Camera(eye_m=(x_m, y_m - far_m * _SOUTH, far_m * _UP), target_m=(x_m, y_m, 0.0))
 
 
-def frame_from_above(low: tuple[float, float], high: tuple[float, float], *, aspect: float) -> Camera:
+def frame_from_above(low: ArrayLike, high: ArrayLike, *, aspect: float) -> Camera:
     """Look straight down, north up, on a box between its south-west and its north-east corner in metres."""
     (x_m, y_m), (half_width_m, half_depth_m) = _middle_and_halves(low, high)
     far_m = 1.08 * max(half_width_m / (_SLOPE * aspect), half_depth_m / _SLOPE, _LEAST_DISTANCE_M)
     return Camera(eye_m=(x_m, y_m, far_m), target_m=(x_m, y_m, 0.0), up=(0.0, 1.0, 0.0))
 
 
-def _middle_and_halves(low: tuple[float, float], high: tuple[float, float]) -> list[tuple[float, float]]:
-    (west, south), (east, north) = low, high
-    return [((west + east) / 2, (south + north) / 2), ((east - west) / 2, (north - south) / 2)]
+def _middle_and_halves(low: ArrayLike, high: ArrayLike) -> list[list[float]]:
+    ends = np.array([low, high])
+    return [(ends.sum(axis=0) / 2).tolist(), ((ends[1] - ends[0]) / 2).tolist()]
 
 
 def _fought_buildings(fieryness: NDArray[np.uint8]) -> NDArray[np.bool_]:

@@ -1,8 +1,8 @@
-"""The city in Rerun: ground, streets, and what changes its color: buildings and civilians."""
+"""The city in Rerun: ground, streets, what changes its color, buildings and civilians, and the fire sites in it."""
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import rerun
@@ -10,18 +10,17 @@ from numpy.typing import NDArray
 
 from fireworld.records import MATERIALS, CityRecord, Recording
 from fireworld_viewer import colors
-from fireworld_viewer.city_mesh import SHADES_PERCENT, STOREY_M, CityMesh, city_box_m
+from fireworld_viewer.city_mesh import SHADES_PERCENT, CityMesh, city_box_m
 from fireworld_viewer.rerun_view.layers import Layers, number_columns
 
-_REFUGE: Final = len(colors.FIERYNESS_RGB)
-"""Row of a refuge in the table of building colors."""
+_REFUGE: Final = len(colors.FIERYNESS_RGB)  # row of a refuge in the table of building colors
 _BUILDING_COLORS: Final = colors.shaded_table((*colors.FIERYNESS_RGB, colors.REFUGE_RGB), SHADES_PERCENT)
 _GROUND_M: Final = -0.4
 _GROUND_MARGIN_M: Final = 15.0
 
 
-def log_city(layers: Layers, city: CityRecord) -> None:
-    """Draw the ground, streets, refuges and hydrants; none of them changes."""
+def log_city(layers: Layers, city: CityRecord, mesh: CityMesh) -> None:
+    """Draw what never changes: the ground, streets, refuges, hydrants, and a dot on every roof that can be clicked."""
     (west, south), (east, north) = city_box_m(city, margin_m=_GROUND_MARGIN_M)
     ground = rerun.Mesh3D(
         vertex_positions=[(x, y, _GROUND_M) for x, y in ((west, south), (east, south), (east, north), (west, north))],
@@ -34,10 +33,8 @@ def log_city(layers: Layers, city: CityRecord) -> None:
         strips = np.stack([node[city.street_from], node[city.street_to]], axis=1)
         layers.static("city/streets", rerun.LineStrips3D(strips, colors=colors.single(colors.STREET_RGB), radii=[0.8]))
     if len(city.refuge_building):
-        refuge = np.asarray(city.refuge_building)
-        above_m = STOREY_M * np.asarray(city.floors) + 3.0
-        roof = np.column_stack([city.center_x_m, city.center_y_m, above_m])[refuge]
-        labels = [f"refuge {city.building_id[index]}" for index in refuge]
+        roof = mesh.roof_xyz_m[city.refuge_building] + np.array([0, 0, 3], dtype=np.float32)
+        labels = [f"refuge {city.building_id[index]}" for index in city.refuge_building]
         rgb = colors.single(colors.REFUGE_RGB)
         marks = rerun.Points3D(roof, colors=rgb, radii=[3.0], labels=labels, show_labels=True)
         layers.static("city/refuges", marks)
@@ -45,22 +42,6 @@ def log_city(layers: Layers, city: CityRecord) -> None:
         position = np.column_stack([city.hydrant_x_m, city.hydrant_y_m, np.full(len(city.hydrant_x_m), 1.0)])
         hydrants = rerun.Points3D(position, colors=colors.single(colors.HYDRANT_RGB), radii=[1.2])
         layers.static("city/hydrants", hydrants)
-
-
-def log_buildings(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
-    """Color the city by fieryness, and give the handle on every roof the numbers of its building."""
-    columns = {
-        name: recording.column("/buildings", name)
-        for name in ("temperature", "fuel_share", "water_litres", "fieryness")
-    }
-    shown = columns["fieryness"].copy()
-    shown[:, np.asarray(recording.city.refuge_building, dtype=np.intp)] = _REFUGE
-    log_mesh(layers, mesh, shown, _BUILDING_COLORS)
-    layers.numbers("city/handles", "Building", columns)
-
-
-def log_handles(layers: Layers, city: CityRecord, mesh: CityMesh) -> None:
-    """Put a dot on every roof that can be clicked, with the facts of its building; one batch, never one by one."""
     handles = mesh.roof_xyz_m + np.array([0, 0, 0.3], dtype=np.float32)
     points = rerun.Points3D(handles, colors=colors.single(colors.HANDLE_RGB), radii=[0.9])
     facts = rerun.DynamicArchetype(
@@ -68,12 +49,20 @@ def log_handles(layers: Layers, city: CityRecord, mesh: CityMesh) -> None:
         components={
             "id": np.asarray(city.building_id),
             "material": [MATERIALS[code] for code in city.material],
-            "floors": np.asarray(city.floors),
-            "volume_m3": np.asarray(city.volume_m3),
-            "initial_fuel": np.asarray(city.initial_fuel),
+            **{name: np.asarray(getattr(city, name)) for name in ("floors", "volume_m3", "initial_fuel")},
         },
     )
     layers.static("city/handles", points, facts)
+
+
+def log_buildings(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
+    """Color the city by fieryness, and give the handle on every roof the numbers of its building."""
+    names = ("temperature", "fuel_share", "water_litres", "fieryness")
+    columns = {name: recording.column("/buildings", name) for name in names}
+    shown = columns["fieryness"].copy()
+    shown[:, np.asarray(recording.city.refuge_building, dtype=np.intp)] = _REFUGE
+    log_mesh(layers, mesh, shown, _BUILDING_COLORS)
+    layers.numbers("city/handles", "Building", columns)
 
 
 def log_mesh(layers: Layers, mesh: CityMesh, codes: NDArray[np.uint8], table: NDArray[np.uint32]) -> None:
@@ -107,3 +96,35 @@ def log_civilians(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
     health = colors.packed_array(colors.health_rgb(hp, np.asarray(city.civilian_hp)))
     dots = rerun.Points3D.columns(colors=health.reshape(-1)).partition(np.full(len(hp), n))
     layers.rows("civilians", dots, number_columns("Civilian", {"hp": hp}))
+
+
+def log_sites(layers: Layers, recording: Recording) -> None:
+    """Draw a box around each fire site and thick lines along the sides over which its fire can spread."""
+    count = np.array([len(row) for row in recording.ragged("/observations", "site_id")])
+    if not count.any() and not layers.has("fire/sites"):
+        return
+
+    def joined(name: str) -> NDArray[Any]:
+        """Return a field of the sites of all steps, one after another: (sites,)."""
+        return np.concatenate(recording.ragged("/observations", f"site_{name}"))
+
+    west, south, east, north = (joined(f"{side}_m").astype(np.float32) for side in ("west", "south", "east", "north"))
+    labels = [f"fire {site}: {n} burning" for site, n in zip(joined("id"), joined("n_burning"), strict=True)]
+    height = np.ones_like(west)
+    boxes = rerun.Boxes3D.columns(
+        centers=np.column_stack([(west + east) / 2, (south + north) / 2, height]),
+        half_sizes=np.column_stack([(east - west) / 2, (north - south) / 2, height]),
+        labels=labels,
+    )
+    style = rerun.Boxes3D.from_fields(colors=colors.single(colors.CLOSED_SIDE_RGB), radii=[0.2], show_labels=[False])
+    layers.static("fire/sites", style)
+    layers.rows("fire/sites", boxes.partition(count))
+
+    # (sites, 4): N, E, S, W as in records.SIDES
+    free = (joined("free_sides").astype(np.uint8)[:, np.newaxis] >> np.arange(4, dtype=np.uint8)) & 1
+    corners = ((west, north), (east, north), (east, south), (west, south), (west, north))
+    ring = np.stack([np.column_stack([x, y, height]) for x, y in corners], axis=1)
+    strips = np.stack([ring[:, :-1], ring[:, 1:]], axis=2)  # (sites, 4, 2, 3)
+    per_step = np.bincount(np.repeat(np.arange(len(count)), count), weights=free.sum(axis=1), minlength=len(count))
+    chosen = strips[free.astype(bool)]
+    layers.strips("fire/free_sides", chosen, per_step.astype(int), radius_m=0.9, rgb=colors.FREE_SIDE_RGB)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -10,6 +10,7 @@ import rerun
 from numpy.typing import NDArray
 
 from fireworld_viewer import colors
+from fireworld_viewer.story.narration import LogLine
 
 TIMELINE: Final = "step"
 CHUNK_BYTES: Final = 1 << 20
@@ -89,6 +90,21 @@ class Layers:
             return
         self.static(path, rerun.LineStrips3D.from_fields(radii=[radius_m], colors=colors.single(rgb)))
         self.rows(path, rerun.LineStrips3D.columns(strips=strips).partition(per_step))
+
+    def states(self, path: str, codes: NDArray[np.integer], names: Sequence[str], rgb: Sequence[colors.Rgb]) -> None:
+        """Send a timeline of states: a row wherever the code, (k,) index into names and colors, changes."""
+        self.static(path, rerun.StateConfiguration(values=list(names), colors=colors.packed_table(rgb)))
+        changed = self.changed(path, codes[:, np.newaxis])
+        if len(changed):
+            columns = rerun.StateChange.columns(state=[names[code] for code in codes[changed]])
+            self.rows(path, columns, steps=self.steps[changed])
+
+    def text(self, path: str, lines: Iterable[LogLine]) -> None:
+        """Send lines of text, each at its step; nothing if there is none."""
+        if table := list(lines):
+            steps, levels, texts, rgb = zip(*table, strict=True)
+            columns = rerun.TextLog.columns(text=texts, level=levels, color=colors.packed_table(rgb))
+            self.rows(path, columns, steps=np.array(steps, dtype=np.int64))
 
 
 def number_columns(archetype: str, columns: Mapping[str, NDArray[Any]]) -> Any:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import socket
+from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from threading import Lock
+from dataclasses import replace
+from functools import partial
 from typing import Any, Final
 from urllib.parse import urlsplit
 
@@ -22,21 +22,8 @@ _WAITING_MAX: Final = 2_000
 _POINTS_WAITING_MAX: Final = 100_000
 _ENCODE_SECONDS: Final = 60.0
 
-
-@dataclass(frozen=True)
-class Screen:
-    """Where a live view goes: a window of its own, or a viewer that runs already."""
-
-    command: tuple[str, ...]
-    stays: bool
-
-    def open(self) -> ViewerProcess:
-        """Start the process.
-
-        Raises:
-            ViewError: it cannot be started.
-        """
-        return ViewerProcess(self.command, app.viewer_environment(os.environ), stays=self.stays)
+Screen = Callable[[], ViewerProcess]
+"""Where a live view goes, a window of its own or a viewer that runs already: starts the process that shows it."""
 
 
 def own_window() -> Screen:
@@ -48,7 +35,7 @@ def own_window() -> Screen:
     program = str(app.viewer_executable())
     app.check_display("--view", "--view-url of a viewer that runs, or --record and `fireworld view`")
     options = ("--bind", app.LOCALHOST, "--port", str(app.free_port()), "--hide-welcome-screen", "--expect-data-soon")
-    return Screen((program, "-", *options), stays=True)
+    return partial(ViewerProcess, (program, "-", *options), stays=True)
 
 
 def running_viewer(url: str) -> Screen:
@@ -73,7 +60,7 @@ def running_viewer(url: str) -> Screen:
         socket.create_connection((app.LOCALHOST, port), timeout=2.0).close()
     except OSError:
         raise ViewError(expected("--view-url", "", "a viewer that listens", url, f"try rerun --port {port}")) from None
-    return Screen((program, "-", "--bind", app.LOCALHOST, "--port", str(port)), stays=False)
+    return partial(ViewerProcess, (program, "-", "--bind", app.LOCALHOST, "--port", str(port)), stays=False)
 
 
 class RunEncoder:
@@ -102,23 +89,20 @@ class RunEncoder:
             log_legend(self._stream, comparing=False)
             self._layers = RunLayers(self._stream, self._city)
         self._layers.add(recording)
-        return _drained(self._bytes)
+        content: bytes = self._bytes.read(flush_timeout_sec=_ENCODE_SECONDS) or b""
+        return content
 
 
 class RunView(BackgroundSender[StepRecord]):
     """A live view of a run: add every record, and close it at the end; neither waits for a viewer at work.
 
-    `warn` is called with one line if the view has to end before the run.
-
-    Raises:
-        ViewError: the viewer cannot be started.
+    `warn` is called with one line if the view has to end before the run. Errors as in `ViewerProcess`.
     """
 
     def __init__(self, screen: Screen, header: RunHeader, city: CityRecord, *, warn: Callable[[str], None]) -> None:
-        n_most = _WAITING_BYTES_MAX // (_BYTES_PER_BUILDING * max(1, len(city.building_id)))
-        n_most = min(_WAITING_MAX, max(16, n_most))
-        encoder = RunEncoder(header, city)
-        super().__init__(encoder.encode, screen.open(), n_waiting_max=n_most, warn=warn)
+        n_fit = _WAITING_BYTES_MAX // (_BYTES_PER_BUILDING * max(1, len(city.building_id)))
+        n_most = min(_WAITING_MAX, max(16, n_fit))
+        super().__init__(RunEncoder(header, city).encode, screen(), n_waiting_max=n_most, warn=warn)
 
     def add(self, record: StepRecord) -> None:
         """Hand over a step."""
@@ -133,38 +117,26 @@ PlayRun = Callable[[], tuple[str, RunHeader, CityRecord, Sequence[StepRecord]]]
 class TrainingView(BackgroundSender[TrainingPoint]):
     """A live view of a training: curves of all that it reports, and now and then a run played for the viewer.
 
-    `warn` is called with one line if the view has to end before the training.
-
-    Raises:
-        ViewError: the viewer cannot be started.
+    `warn` is called with one line if the view has to end before the training. Errors as in `ViewerProcess`.
     """
 
     def __init__(self, screen: Screen, layout: TrainingLayout, *, warn: Callable[[str], None]) -> None:
         stream = app.new_stream(f"{app.APPLICATION_ID}-{layout.title}")
         self._bytes = stream.binary_stream()
         self._curves = CurveWriter(stream, layout)
-        self._due: PlayRun | None = None
-        self._lock = Lock()
-        super().__init__(self._encode_points, screen.open(), n_waiting_max=_POINTS_WAITING_MAX, warn=warn)
+        self._due: deque[PlayRun] = deque(maxlen=1)
+        super().__init__(self._encode_points, screen(), n_waiting_max=_POINTS_WAITING_MAX, warn=warn)
 
     def add(self, point: TrainingPoint, *, play: PlayRun | None = None) -> None:
         """Hand over a point, and a run to play after it, which replaces one that has not begun."""
         if play is not None:
-            with self._lock:
-                self._due = play
+            self._due.append(play)
         self.put(point)
 
     def _encode_points(self, points: Sequence[TrainingPoint]) -> bytes:
         self._curves.write(points)
-        content = _drained(self._bytes)
-        with self._lock:
-            due, self._due = self._due, None
-        if due is not None:
-            title, header, city, records = due()
+        content: bytes = self._bytes.read(flush_timeout_sec=_ENCODE_SECONDS) or b""
+        if self._due:
+            title, header, city, records = self._due.pop()()
             content += RunEncoder(header, city, title=title).encode(records)
         return content
-
-
-def _drained(source: Any) -> bytes:
-    content: bytes | None = source.read(flush_timeout_sec=_ENCODE_SECONDS)
-    return content or b""

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from threading import Condition, Thread
 from typing import Final, Generic, TypeVar
 
 from fireworld.errors import ViewError
+from fireworld_viewer.rerun_view.app import viewer_environment
 
 Item = TypeVar("Item")
 
 BATCH_SECONDS: Final = 0.2
 """Time between batches: a viewer redraws some times a second, and fewer, larger batches cost the run less."""
 BATCH_MAX: Final = 200
-PATIENCE_SECONDS: Final = 5.0
-"""How long the end waits for a viewer that takes nothing."""
+PATIENCE_SECONDS: Final = 5.0  # how long the end waits for a viewer that takes nothing
 _PIECE_BYTES: Final = 1 << 16
 
 
@@ -24,19 +25,18 @@ class ViewerProcess:
 
     Args:
         command: the program and its arguments.
-        environment: of the process.
         stays: whether it stays when the input ends, as a window does that somebody still looks at.
 
     Raises:
         ViewError: it cannot be started.
     """
 
-    def __init__(self, command: Sequence[str], environment: Mapping[str, str], *, stays: bool) -> None:
+    def __init__(self, command: Sequence[str], *, stays: bool) -> None:
         self._stays = stays
         try:
             self._process = subprocess.Popen(  # noqa: S603 - our own command
                 command,
-                env=environment,
+                env=viewer_environment(os.environ),
                 bufsize=0,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
@@ -57,10 +57,9 @@ class ViewerProcess:
         return self._input.write(content[:_PIECE_BYTES]) or 0
 
     def close(self, *, finished: bool) -> bool:
-        """End the input; a relay is given the time to send the rest. Return whether it has.
+        """End the input, and abandon the rest unless all was written (`finished`); return whether all has been sent.
 
-        Args:
-            finished: whether all was written; if not, the rest is abandoned.
+        A relay is given the time to send it.
         """
         if finished:
             self._input.close()

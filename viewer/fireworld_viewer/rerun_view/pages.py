@@ -2,46 +2,47 @@
 
 from __future__ import annotations
 
-from typing import Final
-
-import rerun
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
 from fireworld.records import ACTIVITIES, FIERYNESS
 from fireworld_viewer import colors
-from fireworld_viewer.rerun_view.outcome_page import OutcomePage
+
+if TYPE_CHECKING:
+    import rerun
 
 LEGEND_PATH: Final = "/legend"
 HELP_PATH: Final = "/help"
 OUTCOME_PATH: Final = "/outcome"
 
+HEALTH: Final = ("well", "hurt", "dying", "dead")
 _COLUMN_WIDTH: Final = 3.9
 """Width of a name in rows; a row is as high as a dot with its name."""
 
-HELP: Final = """\
-# How to read this
+HELP: Final = Path(__file__).with_name("help.md").read_text(encoding="utf-8")
 
-**Buildings** stand as they are, 3 m a storey. Grey ones are untouched; yellow, orange and dark red ones burn; blue ones
-were watered or put out; black ones are burnt out; green ones are refuges, where tanks are refilled. Click the dot on a
-roof and open the panel on the right (the button at the top right) to read the building's temperature, fuel, water and
-fieryness at this step.
 
-**Brigades** are balls, colored by what they do. The blue bar above a brigade is the water in its tank; the label is
-its name and the litres. A blue arc is water on its way to the target; a thin white one leads to the target that a
-brigade drives to. Brigades on one spot are drawn side by side. Click a ball to read its choice and all actions' values.
+@dataclass(frozen=True, kw_only=True)
+class OutcomePage:
+    """How one or two runs came out, and where two first differ, as computed elsewhere."""
 
-**Civilians** are small dots above roofs: green when well, white when hurt, magenta when dying, black when dead.
+    heads: Sequence[str]  # what the recordings are called, one or two
+    rows: Sequence[tuple[str, ...]]  # what is counted, then its value in each recording
+    first_step: int | None = None  # of the first difference of two runs, None where there is none
+    first_sentence: str = ""  # the first difference in words
 
-**Fire sites** are thin boxes around what burns, as observed before the step; the fire can still spread over pink sides.
-
-**Air**: a recording holds the heat of the air only every 50 steps. The third tab of the map shows the latest of these,
-with its step; `fireworld view --air` computes every step. The air gets hotter from purple over pink to white.
-
-**The log** lists events, and each choice that is new: the brigade's action and target, its value (Q) beside that of the
-best other action, and the state that the brigade observed. A rule has no values.
-
-The slider below moves through the steps, one simulated minute each; the space bar plays them. With two recordings the
-marked part of the slider begins where they first differ.
-"""
+    @property
+    def markdown(self) -> str:
+        """The first difference, if there are two runs, and a table."""
+        heads, lines = list(self.heads), []
+        if len(heads) > 1:
+            first = f"First difference: {self.first_sentence}." if self.first_sentence else "The runs are the same."
+            lines += [first, ""]
+            heads = [f"{letter}: {head}" for letter, head in zip("AB", heads, strict=True)]
+        lines += [_row(("", *heads)), _row(["---"] * (len(heads) + 1)), *map(_row, self.rows)]
+        return "\n".join(lines) + "\n"
 
 
 def entries(*, comparing: bool) -> list[list[tuple[str, colors.Rgb]]]:
@@ -55,12 +56,7 @@ def entries(*, comparing: bool) -> list[list[tuple[str, colors.Rgb]]]:
         [buildings[8], ("refuge", colors.REFUGE_RGB), ("hydrant", colors.HYDRANT_RGB), ("hot air", colors.AIR_RGB[1])],
         [*brigades[:3], ("water", colors.WATER_RGB)],
         [*brigades[3:], ("fire can spread", colors.FREE_SIDE_RGB)],
-        [
-            ("civilian, well", colors.HEALTHY_RGB),
-            ("civilian, hurt", colors.HURT_RGB),
-            ("civilian, dying", colors.DYING_RGB),
-            ("civilian, dead", colors.DEAD_RGB),
-        ],
+        list(zip([f"civilian, {name}" for name in HEALTH], colors.HEALTH_RGB, strict=True)),
     ]
     if comparing:
         rows.append(list(zip(("B is better", "the same", "B is worse"), colors.DIFFERENCE_RGB, strict=True)))
@@ -76,6 +72,8 @@ def bounds(*, comparing: bool) -> tuple[tuple[float, float], tuple[float, float]
 
 def log_legend(stream: rerun.RecordingStream, *, comparing: bool) -> None:
     """Send the legend, as dots in rows with their names below them, and the page of help."""
+    import rerun
+
     rows = entries(comparing=comparing)
     place = [(_COLUMN_WIDTH * x, float(y)) for y, row in enumerate(rows) for x in range(len(row))]
     named = [entry for row in rows for entry in row]
@@ -92,13 +90,16 @@ def log_legend(stream: rerun.RecordingStream, *, comparing: bool) -> None:
     )
     stream.log(f"{LEGEND_PATH}/dots", dots, static=True)
     stream.log(f"{LEGEND_PATH}/names", names, static=True)
-    _log_page(stream, HELP_PATH, HELP)
+    log_page(stream, HELP_PATH, HELP)
 
 
-def log_outcome(stream: rerun.RecordingStream, page: OutcomePage) -> None:
-    """Send the page of the outcome."""
-    _log_page(stream, OUTCOME_PATH, page.markdown)
+def log_page(stream: rerun.RecordingStream, path: str, text: str) -> None:
+    """Send a page of text in Markdown."""
+    import rerun
 
-
-def _log_page(stream: rerun.RecordingStream, path: str, text: str) -> None:
     stream.log(path, rerun.TextDocument(text, media_type=rerun.MediaType.MARKDOWN), static=True)
+
+
+def _row(cells: Sequence[str]) -> str:
+    """Write a row of a table; a bar would end the cell."""
+    return f"| {' | '.join(cell.replace('|', '/') for cell in cells)} |"

@@ -12,13 +12,11 @@ from numpy.typing import NDArray
 from fireworld.records import Recording
 from fireworld_viewer import colors
 from fireworld_viewer.rerun_view.layers import Layers
-from fireworld_viewer.story.choices import choices_of
-from fireworld_viewer.story.series import LABELS, REWARD_TERMS, series
+from fireworld_viewer.story.series import LABELS, REWARD_TERMS, choices_of, series
 
 SCORES: Final = ("score.score", "score.score_now")
 COUNTS: Final = ("score.n_burning", "score.n_water_damaged", "score.n_burnt_out")
 REWARDS: Final = (*REWARD_TERMS, "rewards.total")
-BURNING: Final = (1, 2, 3)
 N_FOCUS: Final = 4
 
 _FIERYNESS = colors.FIERYNESS_RGB
@@ -49,10 +47,9 @@ def log_plots(layers: Layers, recording: Recording, focus_index: Sequence[int]) 
     names = [f"brigade {index}" for index in range(tanks.shape[1])]
     log_plot(layers, "plots/tanks", tanks, names, _of_run(layers, _cycle(len(names))))
     log_choice_values(layers, recording)
-    if focus_index:
-        temperature = series(recording, "buildings.temperature")[:, list(focus_index)]
-        names = [f"building {recording.city.building_id[index]}" for index in focus_index]
-        log_plot(layers, "plots/focus", temperature, names, _of_run(layers, _cycle(len(names))))
+    temperature = series(recording, "buildings.temperature")[:, list(focus_index)]
+    names = [f"building {recording.city.building_id[index]}" for index in focus_index]
+    log_plot(layers, "plots/focus", temperature, names, _of_run(layers, _cycle(len(names))))
 
 
 def log_choice_values(layers: Layers, recording: Recording) -> None:
@@ -63,10 +60,9 @@ def log_choice_values(layers: Layers, recording: Recording) -> None:
     choices = choices_of(recording)
     best = np.max(choices.action_values, axis=2)
     for brigade, rgb in enumerate(_of_run(layers, _cycle(best.shape[1]))):
-        name = f"brigade {brigade}"
-        log_curve(layers, f"plots/values/brigade_{brigade}", choices.value[:, brigade], name, rgb, width=2.5)
-        path, name = f"plots/values_best/brigade_{brigade}", f"{name}, best action"
-        log_curve(layers, path, best[:, brigade], name, colors.paler(rgb), width=1.0)
+        name, path, pale = f"brigade {brigade}", f"brigade_{brigade}", colors.paler(rgb)
+        log_curve(layers, f"plots/values/{path}", choices.value[:, brigade], name, rgb, width=2.5)
+        log_curve(layers, f"plots/values_best/{path}", best[:, brigade], f"{name}, best action", pale, width=1.0)
 
 
 def has_choice_values(recording: Recording) -> bool:
@@ -76,7 +72,7 @@ def has_choice_values(recording: Recording) -> bool:
 
 def first_burning(recording: Recording, n: int = N_FOCUS) -> list[int]:
     """Return the ids of the `n` buildings that burn first: what to plot where none are named."""
-    burning = np.isin(recording.column("/buildings", "fieryness"), BURNING)
+    burning = np.isin(recording.column("/buildings", "fieryness"), (1, 2, 3))
     touched = np.flatnonzero(burning.any(axis=0))
     order = touched[np.argsort(burning[:, touched].argmax(axis=0), kind="stable")][:n]
     return [int(identifier) for identifier in np.asarray(recording.city.building_id)[np.sort(order)]]

@@ -1,22 +1,33 @@
-"""A recording in Rerun: every layer of a run on the `step` timeline."""
+"""A recording in Rerun, every layer of it on the `step` timeline; or two in one city, and in /diff how they differ."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 import rerun
+from numpy.typing import NDArray
 
 from fireworld.errors import ViewError, expected
 from fireworld.records import CityRecord, Recording
-from fireworld_viewer.city_mesh import build_mesh
+from fireworld_viewer import colors
+from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh
 from fireworld_viewer.rerun_view import brigades, city_layers
 from fireworld_viewer.rerun_view.air import log_air
-from fireworld_viewer.rerun_view.fire_sites import log_sites
 from fireworld_viewer.rerun_view.layers import Layers
-from fireworld_viewer.rerun_view.plots import log_plots
-from fireworld_viewer.rerun_view.state_timelines import log_brigade_states
-from fireworld_viewer.rerun_view.text_logs import log_text
+from fireworld_viewer.rerun_view.pages import OutcomePage
+from fireworld_viewer.rerun_view.plots import log_plot, log_plots
+from fireworld_viewer.story.narration import LogLine, decision_lines, event_lines
+from fireworld_viewer.story.series import choices_of
+from fireworld_viewer.story.steps import check_same_city, common_steps, compare_damage
+
+MARK_PATH: Final = "/diff/plots/first_difference"
+AGREEMENT: Final = ("the same", "buildings the same, something else not", "buildings differ")
+"""States of the timeline of two runs."""
+
+_AGREEMENT_RGB: Final = (colors.HEALTHY_RGB, colors.MARK_RGB, colors.WORSE_RGB)
+_DIFFERENCE_COLORS: Final = colors.shaded_table(colors.DIFFERENCE_RGB, SHADES_PERCENT)
 
 
 class RunLayers:
@@ -42,12 +53,11 @@ class RunLayers:
         name: str = "",
         focus: Sequence[int] = (),
     ) -> None:
-        self._focus_index = building_indices(city, focus)
+        self._focus_index = _building_indices(city, focus)
         self._layers = Layers(stream, prefix, np.zeros(0, dtype=np.int64), name=name)
         self._mesh = build_mesh(city)
         self._layers.static("", rerun.ViewCoordinates.RIGHT_HAND_Z_UP)
-        city_layers.log_city(self._layers, city)
-        city_layers.log_handles(self._layers, city, self._mesh)
+        city_layers.log_city(self._layers, city, self._mesh)
 
     def add(self, recording: Recording) -> None:
         """Send the next steps of the run, which are in a recording of this city: one, all, or any number of them."""
@@ -58,21 +68,85 @@ class RunLayers:
         brigades.log_brigades(layers, recording)
         brigades.log_water(layers, recording, mesh)
         city_layers.log_civilians(layers, recording, mesh)
-        log_sites(layers, recording)
+        city_layers.log_sites(layers, recording)
         log_plots(layers, recording, self._focus_index)
-        log_brigade_states(layers, recording)
-        log_text(layers, recording)
+        brigades.log_states(layers, recording)
+        _log_text(layers, recording)
 
 
-def building_indices(city: CityRecord, ids: Sequence[int]) -> list[int]:
-    """Return the indices of buildings.
+def _log_text(layers: Layers, recording: Recording) -> None:
+    """Send a line for every event, and one for every choice that is new or explores."""
+    layers.text("log/events", event_lines(recording))
+    choices = choices_of(recording)
+    new = choices.explored.copy()
+    for brigade in range(new.shape[1]):
+        pairs = np.column_stack([choices.action[:, brigade], choices.target[:, brigade]])
+        new[layers.changed(f"log/decisions/{brigade}", pairs), brigade] = True
+    new[[len(row) == 0 for row in recording.ragged("/decisions", "action")]] = False  # nobody was asked
+    layers.text("log/decisions", decision_lines(recording, choices, new))
 
-    Raises:
-        ViewError: the city has no building of such an id.
-    """
+
+def _building_indices(city: CityRecord, ids: Sequence[int]) -> list[int]:
+    """Return the indices of buildings, or raise ViewError where the city has no building of such an id."""
     index_of = {int(identifier): index for index, identifier in enumerate(city.building_id)}
     for identifier in ids:
         if identifier not in index_of:
             some = f"the first are {', '.join(map(str, list(index_of)[:3]))}"
             raise ViewError(expected("--focus", "", f"ids of buildings of city {city.name!r}", identifier, some))
     return [index_of[identifier] for identifier in ids]
+
+
+def log_comparison(
+    stream: rerun.RecordingStream,
+    first: Recording,
+    second: Recording,
+    *,
+    focus: Sequence[int] = (),
+    outcome: OutcomePage | None = None,
+) -> None:
+    """Send two runs, below /a and /b, and their difference; where they first differ is marked if the outcome is given.
+
+    Raises:
+        ViewError: the runs are of different cities, one has no steps, or a building of the focus is unknown.
+    """
+    check_same_city(first.city, second.city)
+    steps, rows_a, rows_b = common_steps(first.steps, second.steps)
+    RunLayers(stream, first.city, prefix="/a", name="A", focus=focus).add(first)
+    RunLayers(stream, second.city, prefix="/b", name="B", focus=focus).add(second)
+
+    layers = Layers(stream, "/diff", steps)
+    mesh = build_mesh(first.city)
+    city_layers.log_city(layers, first.city, mesh)
+    fieryness_a = first.column("/buildings", "fieryness")[rows_a]
+    fieryness_b = second.column("/buildings", "fieryness")[rows_b]
+    change = compare_damage(fieryness_a, fieryness_b)
+    city_layers.log_mesh(layers, mesh, (change + 1).astype(np.uint8), _DIFFERENCE_COLORS)
+    codes = {"difference": change, "fieryness_a": fieryness_a, "fieryness_b": fieryness_b}
+    layers.numbers("city/handles", "Difference", codes)
+
+    counts = np.column_stack([np.count_nonzero(change == sign, axis=1) for sign in (1, -1)]).astype(np.float64)
+    log_plot(layers, "plots/buildings", counts, ("worse in B", "better in B"), (colors.WORSE_RGB, colors.BETTER_RGB))
+    if outcome is not None:
+        _mark_first_difference(layers, outcome, np.any(change != 0, axis=1))
+
+
+def _mark_first_difference(layers: Layers, outcome: OutcomePage, buildings_differ: NDArray[np.bool_]) -> None:
+    """Send a timeline of whether the runs are the same, a mark in the plots and a line in the log."""
+    first = outcome.first_step
+    states = np.zeros(len(layers.steps), dtype=np.int64)
+    if first is not None:
+        states[layers.steps >= first] = 1
+        states[buildings_differ] = 2
+    layers.states("agreement", states, AGREEMENT, _AGREEMENT_RGB)
+    if first is None:
+        return
+    style = rerun.SeriesPoints(
+        names=[f"first difference, step {first}"],
+        colors=colors.single(colors.MARK_RGB),
+        markers="diamond",
+        marker_sizes=[6.0],
+    )
+    layers.static("plots/first_difference", style)
+    layers.rows("plots/first_difference", rerun.Scalars.columns(scalars=[0.0]), steps=[first])
+    line = LogLine(first, "ERROR", f"first difference: {outcome.first_sentence}", colors.MARK_RGB)
+    layers.text("log/first_difference", [line])

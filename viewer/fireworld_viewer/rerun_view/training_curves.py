@@ -21,43 +21,29 @@ _COLUMNS_OF_TAB: Final = 3
 class LayoutTab:
     """Plots with a page of text beside them; one tab is seen at a time."""
 
-    plots: Mapping[str, str]
-    """Titles by name."""
-    page: str
-    """Its name."""
+    plots: Mapping[str, str]  # titles by name
+    page: str  # its name
 
 
 @dataclass(frozen=True)
 class TrainingLayout:
-    """What is plotted of a training.
+    """What is plotted of a training."""
 
-    Attributes:
-        title: what the viewer calls it.
-        timeline: what is counted: episodes, generations.
-        plots: titles of the plots that are always seen, by name.
-        tabs: below them, by title.
-        log: title of the log; empty for none.
-    """
-
-    title: str
-    timeline: str
-    plots: Mapping[str, str]
-    tabs: Mapping[str, LayoutTab] = field(default_factory=dict)
-    log: str = ""
+    title: str  # what the viewer calls it
+    timeline: str  # what is counted: episodes, generations
+    plots: Mapping[str, str]  # titles of the plots that are always seen, by name
+    tabs: Mapping[str, LayoutTab] = field(default_factory=dict)  # below them, by title
+    log: str = ""  # title of the log; empty for none
 
 
 @dataclass(frozen=True)
 class TrainingPoint:
     """What is plotted at one place of the timeline."""
 
-    number: int
-    """Its place."""
-    values: Mapping[str, Mapping[str, float]]
-    """By the name of the plot, then by that of the curve in it."""
-    note: str = ""
-    """A line for the log; empty for none."""
-    pages: Mapping[str, str] = field(default_factory=dict)
-    """Text of pages from here on, in Markdown, by their names."""
+    number: int  # its place
+    values: Mapping[str, Mapping[str, float]]  # by the name of the plot, then by that of the curve in it
+    note: str = ""  # a line for the log; empty for none
+    pages: Mapping[str, str] = field(default_factory=dict)  # text of pages from here on, in Markdown, by their names
 
 
 class CurveWriter:
@@ -81,36 +67,26 @@ class CurveWriter:
             self._stream.send_recording_name(self._layout.title)
         curves: dict[tuple[str, str], list[tuple[int, float]]] = defaultdict(list)
         for point in points:
-            for plot, values in point.values.items():
-                for curve, value in values.items():
+            for plot, named in point.values.items():
+                for curve, value in named.items():
                     curves[plot, curve].append((point.number, value))
         for (plot, curve), row in curves.items():
-            self._style(plot, curve)
-            scalars = rerun.Scalars.columns(scalars=[value for _, value in row])
-            self._send(f"{plot}/{curve}", [number for number, _ in row], scalars)
-        noted = [point for point in points if point.note]
-        if noted:
-            texts = rerun.TextLog.columns(text=[point.note for point in noted])
-            self._send(LOG_PATH, [point.number for point in noted], texts)
+            drawn = self._drawn[plot]
+            if curve not in drawn:
+                rgb = colors.BRIGADE_RGB[len(drawn) % len(colors.BRIGADE_RGB)]
+                drawn.append(curve)
+                style = rerun.SeriesLines(names=[curve], colors=colors.single(rgb), widths=[1.5])
+                self._stream.log(f"{plot}/{curve}", style, static=True)
+            numbers, values = zip(*row, strict=True)
+            self._send(f"{plot}/{curve}", numbers, rerun.Scalars.columns(scalars=values))
         for point in points:
+            if point.note:
+                self._send(LOG_PATH, [point.number], rerun.TextLog.columns(text=[point.note]))
             for name, text in point.pages.items():
                 page = rerun.TextDocument.columns(text=[text], media_type=[rerun.MediaType.MARKDOWN])
                 self._send(name, [point.number], page)
 
-    def _style(self, plot: str, curve: str) -> None:
-        """Name and color a curve that is new."""
-        import rerun
-
-        drawn = self._drawn[plot]
-        if curve in drawn:
-            return
-        rgb = colors.BRIGADE_RGB[len(drawn) % len(colors.BRIGADE_RGB)]
-        drawn.append(curve)
-        style = rerun.SeriesLines(names=[curve], colors=colors.single(rgb), widths=[1.5])
-        self._stream.log(f"{plot}/{curve}", style, static=True)
-
     def _send(self, path: str, numbers: Sequence[int], columns: Any) -> None:
-        """Send what belongs to some places of the timeline."""
         import rerun
 
         times = rerun.TimeColumn(self._layout.timeline, sequence=numbers)

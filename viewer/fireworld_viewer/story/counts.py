@@ -9,17 +9,17 @@ from typing import Final
 import numpy as np
 
 from fireworld.records import ACTION_NAMES, ACTIVITIES, EVENT_KINDS, Array, Recording
-from fireworld_viewer.story.choices import choices_of
+from fireworld_viewer.story.series import choices_of
 
 _OWN_TARGET: Final = ACTION_NAMES.index("own-target")
+_REFILLED: Final = EVENT_KINDS.index("refilled")
 
 
 @dataclass(frozen=True, kw_only=True)
 class OwnTarget:
     """A building that a policy named itself as the target of a brigade."""
 
-    building: int
-    """Index of the building."""
+    building: int  # its index
     n_steps: int
     first_step: int
     last_step: int
@@ -30,20 +30,15 @@ class Counts:
     """What one brigade chose and did in the steps in which brigades were asked for a decision."""
 
     brigade: int
-    n_by_action: tuple[int, ...]
-    """Steps by index into ACTION_NAMES."""
-    n_without: int
-    """Steps without a choice: refilling, dead, or nothing burns."""
-    n_changes: int
-    """How often a choice differed from the one before; steps without a choice are ignored."""
+    n_by_action: tuple[int, ...]  # steps by index into ACTION_NAMES
+    n_without: int  # steps without a choice: refilling, dead, or nothing burns
+    n_changes: int  # how often a choice differed from the one before; steps without a choice are ignored
     n_explored: int
-    n_by_activity: tuple[int, ...]
-    """Steps by index into ACTIVITIES."""
+    n_by_activity: tuple[int, ...]  # steps by index into ACTIVITIES
     sprayed_litres: int
     driven_m: float
     n_refills: int
-    own_targets: Sequence[OwnTarget]
-    """Those pursued longest first."""
+    own_targets: Sequence[OwnTarget]  # those pursued longest first
 
 
 def count_choices(recording: Recording) -> list[Counts]:
@@ -55,7 +50,9 @@ def count_choices(recording: Recording) -> list[Counts]:
     activity, sprayed, driven = (
         np.asarray(recording.column("/brigades", name))[asked] for name in ("activity", "sprayed_litres", "driven_m")
     )
-    refills = _refills(recording, action.shape[1])
+    kinds, entities = recording.ragged("/events", "kind"), recording.ragged("/events", "entity")
+    refilled = [np.asarray(who)[np.asarray(kind) == _REFILLED] for kind, who in zip(kinds, entities, strict=True)]
+    n_refills = _numbers(np.concatenate([np.zeros(0, dtype=np.int64), *refilled]), action.shape[1])
     return [
         Counts(
             brigade=brigade,
@@ -66,7 +63,7 @@ def count_choices(recording: Recording) -> list[Counts]:
             n_by_activity=tuple(_numbers(activity[:, brigade], len(ACTIVITIES))),
             sprayed_litres=int(sprayed[:, brigade].sum()),
             driven_m=float(driven[:, brigade].sum()),
-            n_refills=refills[brigade],
+            n_refills=n_refills[brigade],
             own_targets=_own_targets(steps, action[:, brigade], target[:, brigade]),
         )
         for brigade in range(action.shape[1])
@@ -82,13 +79,6 @@ def _changes(action: Array, target: Array) -> int:
     """Count changes of the action, or of the target where that is what was chosen."""
     chosen = np.where(action == _OWN_TARGET, len(ACTION_NAMES) + target, action)[action >= 0]
     return int(np.count_nonzero(chosen[1:] != chosen[:-1]))
-
-
-def _refills(recording: Recording, n_brigades: int) -> list[int]:
-    refilled = EVENT_KINDS.index("refilled")
-    kinds, entities = recording.ragged("/events", "kind"), recording.ragged("/events", "entity")
-    found = [np.asarray(who)[np.asarray(kind) == refilled] for kind, who in zip(kinds, entities, strict=True)]
-    return _numbers(np.concatenate([np.zeros(0, dtype=np.int64), *found]), n_brigades)
 
 
 def _own_targets(steps: Array, action: Array, target: Array) -> list[OwnTarget]:

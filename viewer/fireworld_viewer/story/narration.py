@@ -2,35 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fireworld.records import ACTION_NAMES, ACTIONS, EVENT_KINDS, LEVELS, VOLUMES, CityRecord, Recording
+from fireworld.records import ACTION_NAMES, ACTIONS, EVENT_KINDS, LEVELS, VOLUMES, Recording
 from fireworld_viewer import colors
-from fireworld_viewer.story.choices import ChoiceTables, per_brigade
+from fireworld_viewer.story.series import ChoiceTables, per_brigade
 
 
 class LogLine(NamedTuple):
     """A line of a log."""
 
     step: int
-    level: str
-    """INFO, WARN, ERROR or CRITICAL."""
+    level: str  # INFO, WARN, ERROR or CRITICAL
     text: str
     rgb: colors.Rgb
 
 
-OBSERVED: Final = (
-    "free_edges",
-    "distance_from_center",
-    "distance_from_civilian",
-    "volume",
-    *(f"others_{action.replace('-', '_')}" for action in ACTIONS),
-    "state_index",
-)
+_OTHERS: Final = {f"others_{action.replace('-', '_')}": action for action in ACTIONS}
+OBSERVED: Final = ("state_index", "free_edges", "distance_from_center", "distance_from_civilian", "volume", *_OTHERS)
 """The fields of /observations that a line about a choice contains."""
 
 _EVENT_LINES: Final = {
@@ -49,30 +42,27 @@ _EVENT_LINES: Final = {
 
 def event_lines(recording: Recording) -> Iterator[LogLine]:
     """Write the events in words, in the order in which they happened."""
-    id_of = _building_ids(recording.city)
+    building_id = np.asarray(recording.city.building_id).tolist()
     kinds, entities = recording.ragged("/events", "kind"), recording.ragged("/events", "entity")
     for step, kind_row, entity_row in zip(recording.steps.tolist(), kinds, entities, strict=True):
         for kind, entity in zip(kind_row.tolist(), entity_row.tolist(), strict=True):
             level, wording, rgb = _EVENT_LINES[EVENT_KINDS[kind]]
-            yield LogLine(step, level, wording.format(id_of(entity) if "building" in wording else entity), rgb)
+            yield LogLine(step, level, wording.format(building_id[entity] if "building" in wording else entity), rgb)
 
 
 def decision_lines(recording: Recording, choices: ChoiceTables, new: NDArray[np.bool_]) -> Iterator[LogLine]:
     """Write choices in words: the action, its target and value, and what the brigade observed.
 
-    Args:
-        recording: the steps.
-        choices: their choices.
-        new: (k, n_brigades) which of the choices to write.
+    `new`: (k, n_brigades), which of the choices of the recording to write.
     """
-    id_of = _building_ids(recording.city)
+    building_id = np.asarray(recording.city.building_id).tolist()
     observed = {name: per_brigade(recording, name, missing=-1, topic="/observations") for name in OBSERVED}
     steps = recording.steps.tolist()
     for row, brigade in zip(*(places.tolist() for places in np.nonzero(new)), strict=True):
         action, target = int(choices.action[row, brigade]), int(choices.target[row, brigade])
         parts = ["no choice"]
         if action >= 0:
-            aim = f" → building {id_of(target)}" if target >= 0 else ""
+            aim = f" → building {building_id[target]}" if target >= 0 else ""
             exploring = " (exploring)" if choices.explored[row, brigade] else ""
             state = state_words({name: int(table[row, brigade]) for name, table in observed.items()})
             parts = [f"{ACTION_NAMES[action]}{aim}{exploring}", value_words(choices, row, brigade), state]
@@ -101,15 +91,10 @@ def state_words(observed: Mapping[str, int]) -> str:
     """Write the state that a brigade observed, feature by feature; "" where it observed none."""
     if observed["state_index"] < 0:
         return ""
-    others = [action for action in ACTIONS if observed[f"others_{action.replace('-', '_')}"] == 1]
+    others = [action for name, action in _OTHERS.items() if observed[name] == 1]
     return (
         f"state {observed['state_index']}: free edges {observed['free_edges']}, "
         f"center {LEVELS[observed['distance_from_center']]}, "
         f"civilian {LEVELS[observed['distance_from_civilian']]}, volume {VOLUMES[observed['volume']]}, "
         f"others {' '.join(others) or 'nothing'}"
     )
-
-
-def _building_ids(city: CityRecord) -> Callable[[int], int]:
-    ids: list[int] = np.asarray(city.building_id).tolist()
-    return ids.__getitem__

@@ -1,4 +1,4 @@
-"""Which steps are shown of one recording, or of two in one city; each recording is read once."""
+"""Which steps are shown of one recording, or of two in one city, and which buildings of two are worse off."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fireworld.errors import ViewError, expected
-from fireworld.records import MemoryRecording, Recording, StepRecord
-from fireworld_viewer.story.two_runs import check_same_city, common_steps
+from fireworld.records import CityRecord, MemoryRecording, Recording, StepRecord
 
-LAST: Final = -1
-"""In place of a step: the last one."""
+LAST: Final = -1  # in place of a step: the last one
+DAMAGE_ORDER: Final = (0, 4, 5, 1, 6, 2, 7, 3, 8)
+"""Fieryness codes from the least damage to the most: by the official score's factors; 8 comes after 3, both count 0."""
+
+_DAMAGE: Final = np.argsort(np.array(DAMAGE_ORDER)).astype(np.int8)  # (9,) place of each code in that order
 
 
 @dataclass(frozen=True)
@@ -96,14 +98,49 @@ def _between(doing: str, steps: NDArray[np.int64], first: int | None, last: int 
 
 
 def _read(recordings: Sequence[Recording], steps: Sequence[int]) -> list[ShownStep]:
-    """Read every recording once; only what is shown stays in memory. `steps` rise."""
-    found = [_records_at(recording, steps) for recording in recordings]
-    return [ShownStep(step, records) for step, records in zip(steps, zip(*found, strict=True), strict=True)]
+    """Read every recording once; only what is shown stays in memory. `steps` rise; none is before any recording."""
+    columns = []
+    for recording in recordings:
+        own = recording.steps
+        wanted = own[np.searchsorted(own, steps, side="right") - 1].tolist()  # the step, or the last one before it
+        found = {record.step: record for record in recording if record.step in set(wanted)}
+        columns.append([found[step] for step in wanted])
+    return [ShownStep(step, tuple(records)) for step, *records in zip(steps, *columns, strict=True)]
 
 
-def _records_at(recording: Recording, steps: Sequence[int]) -> list[StepRecord]:
-    """Return the record of each step, or the last one before it; none of the steps is before the first."""
-    own = recording.steps
-    wanted = own[np.searchsorted(own, steps, side="right") - 1].tolist()
-    found = {record.step: record for record in recording if record.step in set(wanted)}
-    return [found[step] for step in wanted]
+def compare_damage(fieryness_a: NDArray[np.uint8], fieryness_b: NDArray[np.uint8]) -> NDArray[np.int8]:
+    """Compare codes: -1 where the second run has less damage, 1 where it has more, 0 where the codes are equal."""
+    signs: NDArray[np.int8] = np.sign(_DAMAGE[fieryness_b] - _DAMAGE[fieryness_a])
+    return signs
+
+
+def common_steps(
+    steps_a: NDArray[np.int64], steps_b: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.intp], NDArray[np.intp]]:
+    """Align two runs: every step of either once both have begun, (k,), and the row of each run with its state there.
+
+    A run that has ended stays in its last state.
+
+    Raises:
+        ViewError: a run has no steps.
+    """
+    if len(steps_a) == 0 or len(steps_b) == 0:
+        raise ViewError(expected("view", "", "two recordings with steps", f"{len(steps_a)} and {len(steps_b)} steps"))
+    steps = np.union1d(steps_a, steps_b)
+    steps = steps[steps >= max(steps_a[0], steps_b[0])]
+    rows_a, rows_b = (np.searchsorted(own, steps, side="right") - 1 for own in (steps_a, steps_b))
+    return steps, rows_a, rows_b
+
+
+def check_same_city(first: CityRecord, second: CityRecord) -> None:
+    """Check that two runs took place in the same city.
+
+    Raises:
+        ViewError: the cities differ in a building; the message names both and what differs.
+    """
+    for name in ("building_id", "outline_ptr", "outline_x_m", "outline_y_m", "floors"):
+        if not np.array_equal(getattr(first, name), getattr(second, name)):
+            n, m = len(first.building_id), len(second.building_id)
+            cities = f"{first.name!r} with {n} buildings and {second.name!r} with {m}"
+            hint = f"{name} differs; try to view them one by one"
+            raise ViewError(expected("view", "", "two recordings of one city", cities, hint))
