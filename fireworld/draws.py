@@ -1,7 +1,7 @@
-"""Keyed draws in plain Python: luck as a pure function of (seed, purpose, entity, step).
+"""Keyed draws in plain Python: random numbers as a pure function of (seed, purpose, entity, step).
 
 Nothing here depends on the order in which things are drawn: a building added far away changes no other
-building's luck, and two policies on one seed meet the same luck. `fireworld.kernels.draws` is the compiled twin
+building's draws, and two policies on one seed see the same ones. `fireworld.kernels.draws` is the compiled twin
 and gives the same numbers; this one serves code that must not import numba.
 """
 
@@ -26,7 +26,7 @@ CITY: Final = 7
 PLACEMENT: Final = 8
 """Purpose: where civilians, brigades and fires are placed. Entity: what is placed."""
 STEP: Final = 9
-"""Purpose: the key that names all the luck of a step. Entity: 0."""
+"""Purpose: the key that names all the draws of a step. Entity: 0."""
 TABLE: Final = 10
 """Purpose: which brigade's table is taken over between scenarios. Entity: scenario."""
 EPISODE: Final = 11

@@ -20,7 +20,7 @@ from fireworld.simulation.city_arrays import air_inside, brigade_constants, city
 from fireworld.simulation.state import fresh_brigades, fresh_fire
 
 RAY_SEED = 1
-"""Luck of the rays where a trace has no links."""
+"""Seed of the rays where a trace has no links."""
 
 
 @dataclass(frozen=True)

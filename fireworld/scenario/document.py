@@ -141,7 +141,7 @@ class CitySource(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Annotated[str, Meta(pattern="^[0-9a-f]{64}$")] | None,
         Meta(description="Digest that the city file must have; null accepts any."),
     ] = None
-    ray_seed: Annotated[Seed, Meta(description="Luck of the rays that measure radiation between buildings.")] = 1
+    ray_seed: Annotated[Seed, Meta(description="Random draws of the rays that measure radiation between buildings.")] = 1
 
     @property
     def summary(self) -> str:
@@ -180,7 +180,7 @@ class Civilians(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         tuple[Direction, ...],
         Meta(min_length=1, description="With `n`: on which sides of that point, taken in turn."),
     ] = DIRECTIONS
-    seed: Annotated[Seed, Meta(description="With `n`: luck of the placement.")] = 1
+    seed: Annotated[Seed, Meta(description="With `n`: random draws of the placement.")] = 1
 
     @property
     def count(self) -> int:
