@@ -146,7 +146,7 @@ def _notes(trace: Trace, city_name: str) -> list[str]:
     if trace.order is None:
         notes.append("the trace has no order: fireworld's own is used")
     if trace.links is None:
-        notes.append("the trace has no links: fireworld's own are used, whose rays are drawn by other luck")
+        notes.append("the trace has no links: fireworld's own are used, whose rays are drawn differently")
     if trace.rates is None:
         notes.append("the trace has no burn rates: the average is used")
     if not any(series.name == "energy" for series in trace.outputs):

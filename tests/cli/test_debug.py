@@ -10,6 +10,8 @@ import pytest
 from fireworld import cli
 from fireworld.cli import COMMANDS, root
 
+pytestmark = pytest.mark.slow
+
 BROKEN = "class A:\n    def decide(self, observation):\n        return {}['key']\n"
 
 

@@ -38,6 +38,7 @@ def test_of_several_classes_one_must_be_named(here, monkeypatch):
     assert "got SpreadOut, Steady" in done.err
 
 
+@pytest.mark.slow
 def test_its_python_runs(here):
     _, python, test = fenced(PAGE, "python")
     exec(python, {"__name__": "__main__"})  # noqa: S102 - our own page

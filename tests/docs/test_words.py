@@ -28,7 +28,7 @@ WORDS = (
 
 OUT = {
     "luck": r"\bluck\b",  # random draws; the same random draws (common random numbers)
-    "B less A": r"\bless [AB]\b",  # B - A
+    "B less A": r"(?-i:\bless [AB]\b)",  # B - A
     "told": r"\btold\b",  # say what happens: is printed, is written, knows
     "tells": r"\btells\b",  # the same; "cannot tell" is a verdict
     "go on": r"\b(?:go|goes|going|gone) on\b",  # continue, resume

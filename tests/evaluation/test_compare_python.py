@@ -243,6 +243,7 @@ print(len(read_results(pathlib.Path("runs.parquet"))))
 """
 
 
+@pytest.mark.slow
 def test_a_new_score_touches_the_table_of_outcomes_only(tmp_path):
     """One that follows from the columns, and one that needs a column more; rows of before stay in the file."""
     words = {"scenarios": "quick", "seeds": 6, "set": {"steps": 60}, "results": tmp_path / "runs.parquet"}

@@ -23,6 +23,7 @@ from tests.simulation.town import town_world
 SHORT = PlannerOptions(horizon=6, interval=3)
 
 
+@pytest.mark.slow
 class TestConformance(PolicyConformance):
     def make_policy(self):
         return Planner(SHORT)

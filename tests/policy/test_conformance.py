@@ -13,6 +13,8 @@ from fireworld.policy.names import BUILT_IN, find_policy
 from fireworld.policy.protocol import Action, Decision
 from fireworld.testing import PolicyConformance
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("name", BUILT_IN)
 class TestBuiltIn(PolicyConformance):

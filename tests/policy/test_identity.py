@@ -175,6 +175,7 @@ assert find_policy(find_policy(A).name).digest == find_policy(A).digest, "its re
 """
 
 
+@pytest.mark.slow
 def test_scripts(tmp_path):
     """A script that is run, in whatever folder; what comes from standard input has no source."""
     digests = []

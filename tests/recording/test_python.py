@@ -20,6 +20,8 @@ from fireworld.recording.pages.run_page import report
 from fireworld.recording.pages.view import view
 from fireworld.recording.verify import verify
 
+pytestmark = pytest.mark.slow
+
 
 def test_a_difference_is_what_the_command_writes(here, fireworld):
     difference = diff("easiest.mcap", here / "random.mcap", ignore=["draws"], last_step=20)
