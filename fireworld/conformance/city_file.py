@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from fireworld.city.city import Plan
 from fireworld.city.fields import Fields
-from fireworld.city.plan_file import COORDINATE_MAX_MM, ID_MAX, parse_plan
+from fireworld.city.formats.json_plan import COORDINATE_MAX_MM, ID_MAX, parse_plan
 from fireworld.errors import CityError, expected
 
 STEP_MAX: Final = 100_000

@@ -32,7 +32,7 @@ from fireworld.recording.resume import Resumed, has_memory, recorded_policy, res
 from fireworld.recording.run import Run
 from fireworld.records import CityRecord, MemoryRecording, RunHeader, StepRecord, StoredRun
 from fireworld.simulation.observer import Observer
-from fireworld.simulation.run import PreparedRun
+from fireworld.simulation.prepared_run import PreparedRun
 from fireworld.simulation.world import World
 from fireworld.version import __version__
 

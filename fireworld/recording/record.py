@@ -127,7 +127,7 @@ def run(
     from fireworld.policy.names import find_policy
     from fireworld.scenario import find_scenario
     from fireworld.simulation.built import build_scenario
-    from fireworld.simulation.run import prepare_run
+    from fireworld.simulation.prepared_run import prepare_run
 
     seed = seed_of(seed)
     n_steps_max = None if steps is None else whole_number("steps", steps, least=1, most=STEPS_MAX)

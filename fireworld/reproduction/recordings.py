@@ -20,7 +20,7 @@ from fireworld.reproduction.repetitions import Repetition
 from fireworld.reproduction.study import ALONE, TOGETHER, Study
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import CityCache
-from fireworld.simulation.run import prepare_run
+from fireworld.simulation.prepared_run import prepare_run
 
 
 @dataclass(frozen=True)

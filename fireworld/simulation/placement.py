@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from fireworld import draws
 from fireworld.city.city import Int32Array, Int64Array, Plan
+from fireworld.city.formats import read_plan
 from fireworld.city.generator import generate_plan
-from fireworld.city.plan_file import parse_plan
 from fireworld.errors import CityError, ScenarioError, expected
 from fireworld.scenario.document import Civilians, Direction, Fire, Point
 from fireworld.scenario.scenario import Scenario, read_city_file
@@ -55,7 +55,7 @@ def scenario_plan(scenario: Scenario, *, city_json: bytes | None = None) -> Plan
     if generated is None:
         file = Path(scenario.city.file or "")
         text = _check_city_file(scenario, city_json if city_json is not None else read_city_file(scenario))
-        return parse_plan(text, where=file.name if city_json is not None else str(file), name=file.stem)
+        return read_plan(text, file=file, where=file.name if city_json is not None else str(file))
     name = f"generated-{generated.columns}x{generated.rows}-{generated.seed}"
     try:
         return generate_plan(name=name, **msgspec.structs.asdict(generated))

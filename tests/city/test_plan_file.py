@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fireworld.city.formats.json_plan import parse_plan
 from fireworld.city.generator import generate_plan
-from fireworld.city.plan_file import parse_plan
 from fireworld.conformance.city_file import load_city_file
 from fireworld.errors import CityError
 from tests.city.plans import dump_plan

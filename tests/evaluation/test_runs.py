@@ -11,7 +11,7 @@ from fireworld.outcome import COLUMNS
 from fireworld.policy.names import BUILT_IN, find_policy
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import build_scenario
-from fireworld.simulation.run import prepare_run
+from fireworld.simulation.prepared_run import prepare_run
 
 SEEDS = [3, 1, 4]
 

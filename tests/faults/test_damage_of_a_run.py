@@ -13,7 +13,7 @@ from fireworld.policy.names import find_policy
 from fireworld.recording.replay import Replay
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import build_scenario
-from fireworld.simulation.run import prepare_run
+from fireworld.simulation.prepared_run import prepare_run
 
 pytestmark = pytest.mark.slow
 

@@ -10,7 +10,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fireworld.city.plan_file import parse_plan
+from fireworld.city.formats.json_plan import parse_plan
 from fireworld.conformance.city_file import load_city_file
 from fireworld.errors import TrainingError
 from fireworld.policy.teams.table_team import TableTeam
