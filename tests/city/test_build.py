@@ -63,7 +63,7 @@ def test_the_city_is_the_same_in_every_process(setting):
 
 
 def test_plans_and_records_need_no_compiler():
-    modules = ["city.generator", "city.plan_file", "city.record", "draws"]
+    modules = ["city.generator", "city.formats.json_plan", "city.record", "draws"]
     code = f"import sys, {', '.join(f'fireworld.{name}' for name in modules)}; print('numba' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "False"

@@ -19,7 +19,7 @@ from fireworld.scenario import parse_scenario
 from fireworld.scenario.shipped import shipped_folder
 from fireworld.training.curriculum import load_curriculum
 from tests.city.plans import dump_plan
-from tests.city.test_plan_file import CITY
+from tests.city.test_json_plan import CITY
 from tests.fuzz.support import FOLDER, FUZZ, altered, changed, file_of, only_complaints, target
 
 pytestmark = pytest.mark.slow
