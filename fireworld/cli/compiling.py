@@ -6,7 +6,7 @@ import click
 
 
 def announce_compilation() -> None:
-    """Say what is going on if the kernels are not compiled yet on this machine."""
+    """Say what is happening if the kernels are not compiled yet on this machine."""
     from fireworld import kernels
 
     if kernels.is_cold():

@@ -25,7 +25,7 @@ N_WEIGHTS = N_TARGET_FEATURES + N_ACTIONS
 OWN_TARGET = N_ACTIONS
 """The action of a brigade that names a building by itself."""
 DEGREES, METERS_100, METERS_50_SQUARE, METERS_MOST = 500.0, 1e5, 2.5e9, 3.0
-"""Units of the features: degrees; lengths in mm; the longest distance told apart, in hundreds of metres."""
+"""Units of the features: degrees; lengths in mm; the longest distance that is distinguished, in hundreds of metres."""
 WATER_HEAT_LEAST = 1e-6
 """So that water that takes no heat needs very many steps, not infinitely many."""
 

@@ -86,7 +86,7 @@ def can_be_imported(given: Any) -> bool:
 
 
 def _state(given: Any, seen: set[int]) -> list[Any]:
-    """Return what tells a function or object from others of the same source; of an object what pickle would keep."""
+    """Return what separates a function or object from others of one source; of an object what pickle would keep."""
     parts: tuple[Any, ...] = ()
     if isinstance(given, FunctionType):
         enclosed = [cell.cell_contents for cell in given.__closure__ or () if cell != CellType()]

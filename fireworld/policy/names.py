@@ -74,7 +74,7 @@ class NamedPolicy:
 
     name: str
     digest: str
-    """"" if what it does cannot be told: of an object with values that are not plain, of a function without source."""
+    """"" if what it does is not known: of an object with values that are not plain, of a function without source."""
     policy: Policy = field(repr=False)
     attachments: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     """Files that go with a recording of it, by name."""
@@ -93,7 +93,7 @@ class NamedPolicy:
 
     @property
     def identity(self) -> str:
-        """What tells the policy from every other one, parts of one file too; "" if that cannot be told."""
+        """What distinguishes the policy from every other one, parts of one file too; "" if nothing is known to."""
         own = self.policy.digest
         if own and not self.parameters:
             return own

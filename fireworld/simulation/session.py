@@ -51,7 +51,7 @@ class Session:
         self._world = built.world(seed=seed, n_steps_max=n_steps_max)
         self._given: object = None
         self._policy: Policy | None = None
-        """What `_given` became, once it was told that the run begins."""
+        """What `_given` became, once its run has begun."""
 
     @property
     def scenario(self) -> Scenario:
@@ -127,7 +127,7 @@ class Session:
         return data.getvalue()
 
     def restore(self, snapshot: bytes) -> None:
-        """Bring the world into the state of a snapshot, its seed included; a policy is told that a run begins.
+        """Bring the world into the state of a snapshot, its seed included; a policy begins anew.
 
         Raises:
             LogError: it is no snapshot, or one of another scenario.

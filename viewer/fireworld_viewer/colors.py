@@ -58,7 +58,7 @@ ACTION_RGB: Final[tuple[Rgb, ...]] = (
     (0, 158, 115),  # nearest-to-me
     (176, 90, 148),  # own-target
 )
-"""By index into records.ACTION_NAMES: every eye tells them apart."""
+"""By index into records.ACTION_NAMES: every eye can distinguish them."""
 NO_CHOICE_RGB: Final[Rgb] = (70, 74, 80)
 
 MARK_RGB: Final[Rgb] = (255, 196, 0)

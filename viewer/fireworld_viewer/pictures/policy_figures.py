@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 BETTER: Final = "#0072b2"
 WORSE: Final = "#d55e00"
 EQUAL: Final = "#8a8a8a"
-"""Blue, vermilion and grey: every eye tells them apart; side and mark say the same."""
+"""Blue, vermilion and grey: every eye can distinguish them; side and mark say the same."""
 _INK: Final = "#222222"
 _GOLDEN: Final = 0.6180339887498949
 _SPREAD: Final = 0.3  # points lie that far above and below their line
