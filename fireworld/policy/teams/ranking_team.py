@@ -25,8 +25,8 @@ from fireworld.policy.teams.ranking_words import (
     sentences,
     targets_in_words,
 )
-from fireworld.policy.teams.shown import SHOWN_MAX, Block, TextTable
 from fireworld.policy.teams.team import Team, no_states
+from fireworld.shown import SHOWN_MAX, Block, TextTable
 
 
 @dataclass(frozen=True, eq=False, repr=False)

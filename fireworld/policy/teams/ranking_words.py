@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 from fireworld.errors import TrainingError, expected
-from fireworld.policy.teams.shown import SHOWN_MAX, Block, TextTable, more
 from fireworld.policy.teams.team import TeamDifference
 from fireworld.records import ACTIONS
+from fireworld.shown import SHOWN_MAX, Block, TextTable, more
 
 HINT: Final = "a weight counts by its size and by how much what it weighs differs from target to target; mind the units"
 

@@ -13,11 +13,11 @@ from fireworld.errors import TrainingError, expected
 from fireworld.kernels.arrays import Array
 from fireworld.policy.kernel import KernelPolicy, from_tables
 from fireworld.policy.teams.npz import check_arrays, check_finite
-from fireworld.policy.teams.shown import SHOWN_MAX, Block, TextTable
 from fireworld.policy.teams.table_words import Choice, TableDifference, TableSummary, describe_choices, first_state
 from fireworld.policy.teams.team import Team
 from fireworld.policy.words import N_STATES, N_STATES_ALONE, find_states
 from fireworld.records import ACTIONS
+from fireworld.shown import SHOWN_MAX, Block, TextTable
 
 COMMIT_MAX: Final = 1_000_000
 

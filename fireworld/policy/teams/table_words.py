@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from fireworld.policy.teams.shown import SHOWN_MAX, Block, TextTable, more
 from fireworld.policy.teams.team import TeamDifference
 from fireworld.policy.words import FEATURES, N_OWN, N_STATES, describe_state, features_of, short_state
 from fireworld.records import ACTIONS
+from fireworld.shown import SHOWN_MAX, Block, TextTable, more
 
 
 @dataclass(frozen=True)

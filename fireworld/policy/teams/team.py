@@ -16,7 +16,7 @@ from fireworld.kernels.arrays import Array
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.teams.npz import SUFFIX, pack_arrays, parse_arrays, read_bytes, write_arrays
 from fireworld.policy.teams.shipped import team_names, team_path
-from fireworld.policy.teams.shown import SHOWN_MAX, Block, Shown
+from fireworld.shown import SHOWN_MAX, Block, Shown
 
 FORMAT: Final = "fireworld-team/2"
 KIND_OF_OLD_FORMAT: Final = {"fireworld-team/1": "tables", "fireworld-ranking/1": "ranking"}
