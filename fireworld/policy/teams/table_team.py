@@ -37,9 +37,7 @@ class TableTeam(Team):
     @property
     def digest(self) -> str:
         """SHA-256 of the tables."""
-        content = hashlib.sha256(repr(self.tables.shape).encode())
-        content.update(np.ascontiguousarray(self.tables, dtype="<f8").tobytes())
-        return content.hexdigest()
+        return hashlib.sha256(repr(self.tables.shape).encode() + self.arrays()["tables"].tobytes()).hexdigest()
 
     @property
     def summary(self) -> str:

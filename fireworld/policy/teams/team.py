@@ -164,6 +164,8 @@ class Team(Shown):
 class TeamDifference(Shown):
     """How two teams of one kind differ."""
 
+    what: ClassVar[str] = "teams of another kind"
+
     @property
     @abstractmethod
     def same(self) -> bool:
@@ -176,7 +178,7 @@ class TeamDifference(Shown):
         Raises:
             TrainingError: it does not.
         """
-        raise TrainingError(expected("--actions-only", "", "two teams with tables of actions", "teams of another kind"))
+        raise TrainingError(expected("--actions-only", "", "two teams with tables of actions", self.what))
 
     @abstractmethod
     def as_dict(self, *, limit: int = SHOWN_MAX) -> dict[str, Any]:

@@ -247,7 +247,9 @@ class SearchTrainer(Trainer[Search, Generation]):
 
     def _generation(self, pool: Executor, stop: Event) -> Generation | None:
         method, progress = self.method, self.progress
-        candidates = progress.mean + progress.spread * self._noise()
+        noise = np.zeros((method.n_candidates, len(self._free)))
+        fill_normals(self.seed, WEIGHT, progress.generation, noise)
+        candidates = progress.mean + progress.spread * noise
         fires = self._draw_fires()
         shares = pool.map(
             lambda pair: math.nan if stop.is_set() else self._fight(*pair),
@@ -266,11 +268,6 @@ class SearchTrainer(Trainer[Search, Generation]):
             score_best=math.fsum(means[k] for k in best) / len(best),
             spread=math.fsum(self.progress.spread[self._free]) / int(self._free.sum()),
         )
-
-    def _noise(self) -> Array:
-        noise = np.zeros((self.method.n_candidates, len(self._free)))
-        fill_normals(self.seed, WEIGHT, self.progress.generation, noise)
-        return noise
 
     def _draw_fires(self) -> list[int]:
         """Draw the fires of a generation, without repetition while there are enough."""
