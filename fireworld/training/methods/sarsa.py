@@ -123,14 +123,10 @@ class Progress:
 
 
 class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
-    """Trains one team through a curriculum, an episode at a time.
+    """Trains one team through a curriculum, an episode at a time; arguments as for `Method.trainer`.
 
     Args:
-        curriculum: what to learn in.
-        method: how to learn.
-        seed: of all random draws of this training.
         progress: where an earlier training stopped.
-        cities: cities built before, shared between trainings.
     """
 
     report_type: ClassVar[type[Report]] = EpisodeReport

@@ -120,13 +120,9 @@ class Progress:
 
 
 class SearchTrainer(Trainer[Search, Generation]):
-    """Searches for one ranking; a report is yielded after every generation.
+    """Searches for one ranking, a report after every generation; arguments as for `Method.trainer`.
 
-    Args:
-        curriculum: its scenarios are the fires, whatever their stage.
-        method: how to search.
-        seed: of all random draws of this search.
-        cities: cities built before, shared between trainings.
+    The scenarios of the curriculum are the fires, whatever their stage.
     """
 
     report_type: ClassVar[type[Report]] = Generation
@@ -156,7 +152,11 @@ class SearchTrainer(Trainer[Search, Generation]):
             workers: who fights, in threads. When their `stop` is set, the generation under way is left, as if it had
                 not begun.
         """
-        self._build()
+        if not self._fires:
+            n = self.method.n_steps_max
+            scenarios = [scenario for stage in self.curriculum.stages for scenario in stage.scenarios]
+            short = [one.with_values({"steps": n}) if one.steps > n else one for one in scenarios]
+            self._fires = [self._cities.build(scenario) for scenario in short]
         with workers.make_pool(workers.n) as pool:
             while not self.done and not workers.stop.is_set():
                 report = self._generation(pool, workers.stop)
@@ -236,14 +236,6 @@ class SearchTrainer(Trainer[Search, Generation]):
             for name, members in GROUPS.items()
         }
         return {name: members for name, members in groups.items() if members}
-
-    def _build(self) -> None:
-        if self._fires:
-            return
-        n = self.method.n_steps_max
-        scenarios = [scenario for stage in self.curriculum.stages for scenario in stage.scenarios]
-        short = [one.with_values({"steps": n}) if one.steps > n else one for one in scenarios]
-        self._fires = [self._cities.build(scenario) for scenario in short]
 
     def _generation(self, pool: Executor, stop: Event) -> Generation | None:
         method, progress = self.method, self.progress
