@@ -11,7 +11,7 @@ import click
 from fireworld.cli.tables import print_table
 
 if TYPE_CHECKING:
-    from fireworld.policy.teams.shown import Block
+    from fireworld.shown import Block
 
 SHOWN_OPTION = click.option(
     "--limit",

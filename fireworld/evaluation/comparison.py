@@ -16,7 +16,7 @@ from fireworld.evaluation.paired import N_SEEDS_ENOUGH, Judgement, Pairing, Verd
 from fireworld.html_page import html_mark, html_table, text_cell
 from fireworld.junit import report
 from fireworld.outcome import METRICS, Metric
-from fireworld.text_table import text_table
+from fireworld.shown import text_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,6 +10,7 @@ import json
 import linecache
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from enum import Enum
 from functools import cached_property, partial
 from pathlib import Path, PurePath
@@ -66,14 +67,11 @@ def digest_of(given: Any) -> str:
 
 def digest_of_module(module: ModuleType) -> str:
     """Return the SHA-256 of the file of a module; "" if it has none."""
-    try:
+    with suppress(AttributeError, OSError):
         return hashlib.sha256(Path(str(module.__file__)).read_bytes()).hexdigest()
-    except (AttributeError, OSError):
-        pass
-    try:  # a module in an archive
+    with suppress(OSError, TypeError):  # a module in an archive
         return hashlib.sha256(inspect.getsource(module).encode()).hexdigest()
-    except (OSError, TypeError):
-        return ""
+    return ""
 
 
 def can_be_imported(given: Any) -> bool:

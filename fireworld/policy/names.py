@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import inspect
 import pickle
 import re
@@ -12,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
+from pkgutil import resolve_name
 from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
 
@@ -111,11 +111,7 @@ class NamedPolicy:
         return False
 
     def require_identity(self, purpose: str) -> str:
-        """Return the identity; raise PolicyError if there is none.
-
-        Args:
-            purpose: what it is for: what the message begins with, as in "results".
-        """
+        """Return the identity; raise PolicyError, whose message begins with the purpose, if there is none."""
         if not self.identity:
             wanted = "a policy whose source is in a file and whose values are plain, or with an attribute `digest`"
             raise PolicyError(expected(purpose, "", wanted, self.name))
@@ -201,24 +197,16 @@ def note_on_team(named: NamedPolicy, n_brigades: int, *, choices: str = "") -> s
     """
     if TEAM_ATTACHMENT not in named.attachments or not isinstance(named.policy, KernelPolicy):
         return ""
-    notes = (_note_on_tables(len(named.policy.kinds), n_brigades), _note_on_choices(named.trained_choices, choices))
-    return "\n".join(f"{named.name}: {note}" for note in notes if note)
-
-
-def _note_on_tables(n_tables: int, n_brigades: int) -> str:
-    """Return which brigade follows which table, if there is not one for each."""
-    if n_tables in {1, n_brigades}:
-        return ""
-    if n_tables > n_brigades:
-        return f"{n_tables} tables for {n_brigades} brigades: the last {n_tables - n_brigades} are not used"
-    return f"{n_tables} tables for {n_brigades} brigades: brigade b follows table b modulo {n_tables}"
-
-
-def _note_on_choices(trained: str, choices: str) -> str:
-    """Return whether the brigades learned to choose in another order than the scenario has."""
-    if not (trained and choices) or trained == choices:
-        return ""
-    return f"trained with choices {trained}, run with choices {choices}; --set choices={trained} runs it as trained"
+    n_tables, trained, notes = len(named.policy.kinds), named.trained_choices, []
+    tables = f"{named.name}: {n_tables} tables for {n_brigades} brigades"
+    if n_tables > max(n_brigades, 1):
+        notes.append(f"{tables}: the last {n_tables - n_brigades} are not used")
+    elif 1 < n_tables < n_brigades:
+        notes.append(f"{tables}: brigade b follows table b modulo {n_tables}")
+    if trained and choices and trained != choices:
+        hint = f"--set choices={trained} runs it as trained"
+        notes.append(f"{named.name}: trained with choices {trained}, run with choices {choices}; {hint}")
+    return "\n".join(notes)
 
 
 def _by_name(text: str, more: Parameters) -> NamedPolicy:
@@ -234,7 +222,7 @@ def _by_name(text: str, more: Parameters) -> NamedPolicy:
         check_no_parameters(values, where=where)
         return _team_by_name(source)
     if target is None and source in BUILT_IN | PLANNERS:
-        make = BUILT_IN.get(source) or _function(PLANNERS[source])
+        make: Callable[..., Policy] = BUILT_IN.get(source) or resolve_name(PLANNERS[source])
         check_signature(make, values, where=where)
         policy = make(**values)
         return NamedPolicy(name, policy.digest, policy, given=name)
@@ -250,11 +238,10 @@ def _by_name(text: str, more: Parameters) -> NamedPolicy:
 def _split(text: str) -> tuple[str, str | None, str]:
     """Split SOURCE:TARGET:PARAMETERS; what holds a "=" is parameters, so a target can be left out."""
     file = _FILE.fullmatch(text)
-    source, rest = (
-        (file[1], file[2]) if file else (text.partition(":")[0], text.partition(":")[2] if ":" in text else None)
-    )
-    if rest is None:
+    source = file[1] if file else text.partition(":")[0]
+    if source == text:
         return source, None, ""
+    rest = text[len(source) + 1 :]
     target, _, written = rest.partition(":")
     return (source, None, rest) if "=" in target else (source, target, written)
 
@@ -265,12 +252,6 @@ def _with_parameters(name: str, parameters: Parameters) -> str:
         return name
     separator = "," if "=" in _split(name)[2] else ":"
     return f"{name}{separator}{write_parameters(parameters)}"
-
-
-def _function(place: str) -> Callable[..., Policy]:
-    module, _, name = place.partition(":")
-    function: Callable[..., Policy] = vars(importlib.import_module(module))[name]
-    return function
 
 
 def _team_by_name(source: str) -> NamedPolicy:

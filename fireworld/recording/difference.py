@@ -13,7 +13,7 @@ from fireworld.errors import LogError, expected
 from fireworld.files import check_output, write_file
 from fireworld.recording.inputs import AnyRun, open_run, run_name
 from fireworld.records import StoredRun
-from fireworld.text_table import text_table
+from fireworld.shown import text_table
 
 if TYPE_CHECKING:
     from fireworld_recorder.diff import RunComparison

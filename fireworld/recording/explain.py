@@ -24,7 +24,7 @@ from fireworld.recording.inputs import AnyRun, open_run, run_name
 from fireworld.recording.replay import Replay, build_recorded, check_replay
 from fireworld.recording.resume import recorded_policy
 from fireworld.records import ACTION_NAMES, ACTIONS, RunHeader, StoredRun
-from fireworld.text_table import text_table
+from fireworld.shown import text_table
 
 BUDGET: Final = 200
 BUDGET_MAX: Final = 10**9

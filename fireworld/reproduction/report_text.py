@@ -7,7 +7,7 @@ from typing import Final
 from fireworld.reproduction.findings import caveat, findings
 from fireworld.reproduction.paper_tables import APART, NEAR, WITHIN, PaperCell, PaperTables
 from fireworld.reproduction.study import Study
-from fireworld.text_table import text_table
+from fireworld.shown import text_table
 
 _MARKS: Final = {WITHIN: "=", NEAR: "~", APART: "x"}
 _QUANTITIES: Final = {"convergence episode": "episodes", "time to complete": "time"}

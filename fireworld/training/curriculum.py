@@ -88,14 +88,7 @@ class Curriculum:
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything there is to learn in as plain values, scenarios as YAML."""
-        stages = [
-            {
-                "name": stage.name,
-                "cooperation": stage.cooperation,
-                "scenarios": [scenario.to_yaml() for scenario in stage.scenarios],
-            }
-            for stage in self.stages
-        ]
+        stages = [{**vars(stage), "scenarios": [one.to_yaml() for one in stage.scenarios]} for stage in self.stages]
         return {"name": self.name, "digest": self.digest, "stages": stages}
 
 
@@ -195,11 +188,9 @@ def _build_stage(stage: StageText, *, where: str, folder: Path) -> CurriculumSta
     if math.prod(len(values) for values in stage.vary.values()) * max(1, len(stage.each)) > N_VARIATIONS_MAX:
         raise TrainingError(expected(where, "vary", f"at most {N_VARIATIONS_MAX} combinations", "more of them"))
     try:
-        scenarios = (
-            tuple(_load(name, folder) for name in stage.scenarios)
-            if stage.base is None
-            else tuple(_variations(_load(stage.base, folder), stage))
-        )
+        scenarios = tuple(_load(name, folder) for name in stage.scenarios)
+        if stage.base is not None:
+            scenarios = tuple(_variations(_load(stage.base, folder), stage))
     except FireworldError as error:
         raise TrainingError(f"{where}: {error}") from None
     return CurriculumStage(name=stage.name, cooperation=stage.cooperation, scenarios=scenarios)

@@ -74,8 +74,7 @@ class Method(ABC):
         """Raise TrainingError if a hyperparameter is not what it may be."""
         for key, kind in _kinds(type(self)).items():
             value = getattr(self, key)
-            wanted = _wanted(kind)
-            if wanted and not _allowed(value, kind):
+            if wanted := _fault(value, kind):
                 raise TrainingError(expected("method", key, wanted, value))
 
     @abstractmethod
@@ -242,24 +241,15 @@ def _kinds(method: type[Method]) -> dict[str, Any]:
     return {item.name: hints[item.name] for item in fields(method)}
 
 
-def _wanted(kind: Any) -> str:
-    """Return in words what a hyperparameter may be."""
+def _fault(value: object, kind: Any) -> str:
+    """Return in words what a hyperparameter may be, if a value is none of that; "" if it is."""
     if kind is bool:
-        return "true or false"
+        return "" if isinstance(value, bool) else "true or false"
     if get_origin(kind) is Literal:
-        return "one of " + ", ".join(get_args(kind))
-    limits: Limits = kind.__metadata__[0]
-    return limits.wanted
-
-
-def _allowed(value: object, kind: Any) -> bool:
-    if kind is bool:
-        return isinstance(value, bool)
-    if get_origin(kind) is Literal:
-        return value in get_args(kind)
+        return "" if value in get_args(kind) else "one of " + ", ".join(get_args(kind))
     number, limits = get_args(kind)
     is_number = isinstance(value, int) or (number is float and isinstance(value, float))
-    return is_number and not isinstance(value, bool) and limits.allow(value)
+    return "" if is_number and not isinstance(value, bool) and limits.allow(value) else limits.wanted
 
 
 def _read(key: str, given: object, kind: Any) -> object:

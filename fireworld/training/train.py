@@ -15,7 +15,7 @@ from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import Curriculum, find_curriculum
 from fireworld.training.method import Method
 from fireworld.training.methods import find_method
-from fireworld.training.training import Callback, Training, begin_all, train_all
+from fireworld.training.training import Callback, Training, train_all
 
 REPETITIONS_MAX: Final = 10_000
 JOBS_MAX: Final = 1000
@@ -131,7 +131,14 @@ def prepare_trainings(
         )
         for number in range(1, repetitions + 1)
     ]
-    begin_all(trainings, resume=resume)
+    if not resume:
+        for training in trainings:
+            training.begin()
+        return trainings
+    found = [training.resume() for training in trainings]  # all of them, each to be looked at
+    if not any(found):
+        got = f"no {trainings[0].checkpoint}"
+        raise TrainingError(expected("--resume", "", "a checkpoint to continue from", got, "leave out --resume"))
     return trainings
 
 

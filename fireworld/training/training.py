@@ -93,7 +93,7 @@ class Training:
         """
         if self.path is not None and self.path.exists():
             self.team = read_team(self.path)[0]
-            self._check_identity(self.team, self.path)
+            check_same(self.team.short_provenance, self.trainer.identity, self.path)
             return True
         if self.checkpoint is None or not self.checkpoint.exists():
             self.begin()
@@ -102,7 +102,7 @@ class Training:
             check_output(self.log_path)
         source = str(self.checkpoint)
         team, state = read_team(self.checkpoint)
-        self._check_identity(team, self.checkpoint)
+        check_same(team.short_provenance, self.trainer.identity, self.checkpoint)
         log = state.pop("log", np.zeros(0, dtype=np.uint8))
         self.trainer.restore(team, state, source=source)
         try:
@@ -187,9 +187,6 @@ class Training:
             f"{error}; continue from {self.checkpoint} with --resume" if self.has_checkpoint else str(error)
         )
 
-    def _check_identity(self, team: Team, path: Path) -> None:
-        check_same(team.short_provenance, self.trainer.identity, path)
-
 
 Callback = Callable[[Training, Report], object]
 """Called with a training and its last report."""
@@ -218,23 +215,6 @@ def train_all(trainings: Sequence[Training], *, jobs: int | None = None, callbac
         for training in trainings:
             if training.error is not None:  # while all were stopping
                 raise training.error
-
-
-def begin_all(trainings: Sequence[Training], *, resume: bool) -> None:
-    """Check that nothing is in the way, or find what there is to continue from.
-
-    Raises:
-        TrainingError: there is nothing to continue from, or a file of another training.
-        OutputError: a file is in the way.
-    """
-    if not resume:
-        for training in trainings:
-            training.begin()
-        return
-    found = [training.resume() for training in trainings]  # all of them, each to be looked at
-    if not any(found):
-        got = f"no {trainings[0].checkpoint}"
-        raise TrainingError(expected("--resume", "", "a checkpoint to continue from", got, "leave out --resume"))
 
 
 def check_same(found: Mapping[str, Any], identity: Mapping[str, Any], path: Path) -> None:

@@ -12,9 +12,9 @@ import pytest
 from fireworld.draws import WEIGHT, below
 from fireworld.errors import TrainingError, expected
 from fireworld.policy.kernel import always
-from fireworld.policy.teams.shown import SHOWN_MAX, TextTable
 from fireworld.policy.teams.team import KINDS, Team, TeamDifference, compare_teams, load_team, no_states
 from fireworld.records import ACTIONS
+from fireworld.shown import SHOWN_MAX, TextTable
 from fireworld.simulation.built import CityCache
 from fireworld.training import methods
 from fireworld.training.method import Count, Method, Report, Trainer

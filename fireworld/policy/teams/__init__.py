@@ -2,7 +2,7 @@
 
 * `team.py`: `Team`, `load_team`, and the registry of kinds.
 * `NAME_team.py`: a kind of team; `NAME_words.py`: what such a team does, in words.
-* `shown.py`: how objects show themselves, in the terminal and in notebooks; `npz.py`: files of arrays with a header.
+* `npz.py`: files of arrays with a header; how teams show themselves: `fireworld.shown`.
 * `shipped.py`: the teams that come with fireworld.
 
 Another kind is a module `NAME_team.py` with a subclass of `Team`; docs/training.md says what it needs.

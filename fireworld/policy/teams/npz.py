@@ -55,14 +55,12 @@ def read_bytes(path: Path) -> bytes:
     """
     try:
         if path.stat().st_size > SIZE_MAX_BYTES:
-            raise TrainingError(
-                expected(str(path), "", f"a team file of at most {SIZE_MAX_BYTES} bytes", "a larger one")
-            )
+            wanted = f"a team file of at most {SIZE_MAX_BYTES} bytes"
+            raise TrainingError(expected(str(path), "", wanted, "a larger one"))
         return path.read_bytes()
     except (OSError, ValueError) as error:
-        raise TrainingError(
-            expected(str(path), "", "a team file", getattr(error, "strerror", None) or str(error))
-        ) from None
+        reason = getattr(error, "strerror", None) or str(error)
+        raise TrainingError(expected(str(path), "", "a team file", reason)) from None
 
 
 def parse_arrays(content: bytes, *, source: str) -> tuple[dict[str, Any], dict[str, Array]]:

@@ -25,8 +25,8 @@ from fireworld.policy.teams.ranking_words import (
     sentences,
     targets_in_words,
 )
-from fireworld.policy.teams.shown import SHOWN_MAX, Block, TextTable
 from fireworld.policy.teams.team import Team, no_states
+from fireworld.shown import SHOWN_MAX, Block, TextTable
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,9 +45,8 @@ class RankingTeam(Team):
     @property
     def digest(self) -> str:
         """SHA-256 of what the brigades follow."""
-        content = hashlib.sha256(repr((self.weights.shape, self.own_targets)).encode())
-        content.update(np.ascontiguousarray(self.weights, dtype="<f8").tobytes())
-        return content.hexdigest()
+        kind = repr((self.weights.shape, self.own_targets)).encode()
+        return hashlib.sha256(kind + self.arrays()["weights"].tobytes()).hexdigest()
 
     @property
     def summary(self) -> str:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from pathlib import Path
+from typing import Any, ClassVar, Final, NamedTuple
 
-from fireworld.errors import TrainingError, expected
-from fireworld.policy.teams.shown import SHOWN_MAX, Block, TextTable, more
 from fireworld.policy.teams.team import TeamDifference
 from fireworld.records import ACTIONS
+from fireworld.shown import SHOWN_MAX, Block, TextTable, more
 
 HINT: Final = "a weight counts by its size and by how much what it weighs differs from target to target; mind the units"
 
@@ -26,79 +26,16 @@ class Weight(NamedTuple):
     """What a weight below 0 comes to."""
 
 
-OF_BUILDING: Final = (
-    Weight(
-        "temperature",
-        "temperature of the building, in 500 degrees above ambient",
-        "prefers hotter buildings",
-        "prefers cooler buildings",
-    ),
-    Weight(
-        "volume", "its size: root of the volume in 1000 m3", "prefers larger buildings", "prefers smaller buildings"
-    ),
-    Weight(
-        "fuel_left",
-        "share of its fuel that is left",
-        "prefers what has much fuel left",
-        "prefers what has little fuel left",
-    ),
-    Weight(
-        "civilian_distance",
-        "way to the nearest civilian not yet reached by fire, in 100 m, 3 at most",
-        "prefers what is far from civilians",
-        "prefers what is close to civilians",
-    ),
-    Weight(
-        "exposure",
-        "share of its radiation that falls on buildings that never burned, times 3",
-        "goes for what endangers unburnt buildings",
-        "leaves what endangers unburnt buildings",
-    ),
-    Weight(
-        "kindling",
-        "radiation on buildings that never burned, each counted by how near ignition it is, times 5",
-        "goes for what is about to kindle others",
-        "leaves what is about to kindle others",
-    ),
-    Weight(
-        "steps_needed",
-        "root of the steps that one brigade would have to spray it",
-        "prefers what takes long to put out",
-        "prefers what is soon put out",
-    ),
-)
-OF_BRIGADE: Final = (
-    Weight(
-        "in_range",
-        "1 if the brigade can spray it from where it is",
-        "prefers what it can spray at once",
-        "prefers what it has to drive to",
-    ),
-    Weight(
-        "beyond_range", "how far beyond its range it is, in 100 m, 3 at most", "prefers a long way", "avoids a long way"
-    ),
-    Weight("mine", "1 if the brigade went for it in the last step", "stays with its target", "changes its target"),
-)
-OF_TEAM: Final = (
-    Weight(
-        "others_here",
-        "how many other brigades go for it",
-        "joins those who go for the same",
-        "avoids what others go for",
-    ),
-    Weight(
-        "others_near",
-        "other brigades' targets around it: 1 each, 1/2 at 50 m, 1/5 at 100 m",
-        "stays near what others go for",
-        "keeps away from what others go for",
-    ),
-    Weight(
-        "enough",
-        "1 if those that go for it put it out in this step",
-        "goes along where the others are enough",
-        "leaves what the others put out anyway",
-    ),
-)
+def _of(group: str) -> tuple[Weight, ...]:
+    """Return the weights of a group; they are in a table beside this module, a line each."""
+    text = Path(__file__).with_name("weights.txt").read_text(encoding="utf-8")
+    table = [line.split(" | ") for line in text.splitlines()]
+    return tuple(Weight(*words) for name, *words in table if name == group)
+
+
+OF_BUILDING: Final = _of("building")
+OF_BRIGADE: Final = _of("brigade")
+OF_TEAM: Final = _of("team")
 OF_ACTION: Final = tuple(
     Weight(action, f"1 if the action {action} names it", f"prefers what {action} names", f"avoids what {action} names")
     for action in ACTIONS
@@ -170,6 +107,8 @@ class WeightChange(NamedTuple):
 class RankingDifference(TeamDifference):
     """Where two rankings differ."""
 
+    what: ClassVar[str] = "two rankings"
+
     n_rows: int
     changed: tuple[WeightChange, ...]
     """Row by row, in each the largest change first."""
@@ -179,11 +118,6 @@ class RankingDifference(TeamDifference):
     def same(self) -> bool:
         """Whether the brigades of both do the same."""
         return not self.changed and self.own_targets[0] == self.own_targets[1]
-
-    @property
-    def same_actions(self) -> bool:
-        """Raise TrainingError: a ranking has no actions beside its values."""
-        raise TrainingError(expected("--actions-only", "", "two teams with tables of actions", "two rankings"))
 
     def describe(self, *, limit: int = SHOWN_MAX) -> Iterator[Block]:
         """Yield which weights differ."""

@@ -13,11 +13,11 @@ from fireworld.errors import TrainingError, expected
 from fireworld.kernels.arrays import Array
 from fireworld.policy.kernel import KernelPolicy, from_tables
 from fireworld.policy.teams.npz import check_arrays, check_finite
-from fireworld.policy.teams.shown import SHOWN_MAX, Block, TextTable
 from fireworld.policy.teams.table_words import Choice, TableDifference, TableSummary, describe_choices, first_state
 from fireworld.policy.teams.team import Team
 from fireworld.policy.words import N_STATES, N_STATES_ALONE, find_states
 from fireworld.records import ACTIONS
+from fireworld.shown import SHOWN_MAX, Block, TextTable
 
 COMMIT_MAX: Final = 1_000_000
 
@@ -37,9 +37,7 @@ class TableTeam(Team):
     @property
     def digest(self) -> str:
         """SHA-256 of the tables."""
-        content = hashlib.sha256(repr(self.tables.shape).encode())
-        content.update(np.ascontiguousarray(self.tables, dtype="<f8").tobytes())
-        return content.hexdigest()
+        return hashlib.sha256(repr(self.tables.shape).encode() + self.arrays()["tables"].tobytes()).hexdigest()
 
     @property
     def summary(self) -> str:

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from fireworld.policy.teams.shown import SHOWN_MAX, Block, TextTable, more
 from fireworld.policy.teams.team import TeamDifference
 from fireworld.policy.words import FEATURES, N_OWN, N_STATES, describe_state, features_of, short_state
 from fireworld.records import ACTIONS
+from fireworld.shown import SHOWN_MAX, Block, TextTable, more
 
 
 @dataclass(frozen=True)
@@ -101,10 +101,8 @@ class TableDifference(TeamDifference):
         seen = [features_of(choice.state) for choice, _ in self.changed]
         known = FEATURES if self.n_states == N_STATES else FEATURES[:N_OWN]
         for place, feature in enumerate(known):
-            counts = {
-                name: sum(features[place] == value for features in seen) for value, name in enumerate(feature.values)
-            }
-            yield feature.name, counts
+            values = [features[place] for features in seen]
+            yield feature.name, {name: values.count(value) for value, name in enumerate(feature.values)}
 
     def describe(self, *, limit: int = SHOWN_MAX) -> Iterator[Block]:
         """Yield in which states the teams act differently."""

@@ -16,7 +16,7 @@ from fireworld.kernels.arrays import Array
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.teams.npz import SUFFIX, pack_arrays, parse_arrays, read_bytes, write_arrays
 from fireworld.policy.teams.shipped import team_names, team_path
-from fireworld.policy.teams.shown import SHOWN_MAX, Block, Shown
+from fireworld.shown import SHOWN_MAX, Block, Shown
 
 FORMAT: Final = "fireworld-team/2"
 KIND_OF_OLD_FORMAT: Final = {"fireworld-team/1": "tables", "fireworld-ranking/1": "ranking"}
@@ -136,12 +136,8 @@ class Team(Shown):
     def save(self, path: Path | str, *, force: bool = False) -> None:
         """Write the team file, beside its place and renamed; equal teams give equal bytes.
 
-        Args:
-            path: of the file.
-            force: replace an existing file.
-
         Raises:
-            OutputError: the file exists, or cannot be written.
+            OutputError: the file exists and `force` does not replace it, or it cannot be written.
         """
         write_team(self, Path(path), force=force)
 
@@ -164,6 +160,8 @@ class Team(Shown):
 class TeamDifference(Shown):
     """How two teams of one kind differ."""
 
+    what: ClassVar[str] = "teams of another kind"
+
     @property
     @abstractmethod
     def same(self) -> bool:
@@ -176,7 +174,7 @@ class TeamDifference(Shown):
         Raises:
             TrainingError: it does not.
         """
-        raise TrainingError(expected("--actions-only", "", "two teams with tables of actions", "teams of another kind"))
+        raise TrainingError(expected("--actions-only", "", "two teams with tables of actions", self.what))
 
     @abstractmethod
     def as_dict(self, *, limit: int = SHOWN_MAX) -> dict[str, Any]:
@@ -200,11 +198,7 @@ def compare_teams(a: Team, b: Team, *, names: tuple[str, str] = ("A", "B")) -> T
 
 
 def no_states(what: str, states: Sequence[str]) -> None:
-    """Check that no states are asked for, of a kind of team that has none.
-
-    Raises:
-        PolicyError: some are.
-    """
+    """Raise PolicyError if states are asked for, of a kind of team that has none."""
     if states:
         raise PolicyError(expected("STATE", "", f"none: {what} has no states", states[0]))
 
@@ -251,14 +245,7 @@ def read_team(path: Path) -> tuple[Team, dict[str, Array]]:
 
 
 def write_team(team: Team, path: Path, *, force: bool = False, extra: Mapping[str, Array] | None = None) -> None:
-    """Write a team file; as `Team.save`.
-
-    Args:
-        team: the team.
-        path: of the file.
-        force: replace an existing file.
-        extra: more arrays by name, as a checkpoint has.
-    """
+    """Write a team file as `Team.save` does, with `extra` arrays by name, as a checkpoint has."""
     write_arrays(path, _header(team), {**team.arrays(), **(extra or {})}, force=force)
 
 

@@ -123,14 +123,10 @@ class Progress:
 
 
 class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
-    """Trains one team through a curriculum, an episode at a time.
+    """Trains one team through a curriculum, an episode at a time; arguments as for `Method.trainer`.
 
     Args:
-        curriculum: what to learn in.
-        method: how to learn.
-        seed: of all random draws of this training.
         progress: where an earlier training stopped.
-        cities: cities built before, shared between trainings.
     """
 
     report_type: ClassVar[type[Report]] = EpisodeReport
@@ -156,7 +152,9 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         super().__init__(curriculum, method, seed=seed)
         self._cities = cities if cities is not None else CityCache()
         self._plan = [(stage, scenario) for stage in curriculum.stages for scenario in stage.scenarios]
-        self.progress = progress if progress is not None else self._begin()
+        shape = self.shape(0)
+        untrained = Progress(tables=np.zeros(shape), visits=np.zeros(shape, dtype=np.int64))
+        self.progress = progress if progress is not None else untrained
         self.graduate: TableTeam | None = None
         """The team at the end of the last scenario finished here, before one of its tables was drawn for all."""
 
@@ -228,11 +226,6 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         stage, scenario = self._plan[min(scenario_number, len(self._plan) - 1)]
         n_tables = 1 if self.method.shared_table else scenario.brigades.n
         return n_tables, N_STATES if stage.cooperation else N_STATES_ALONE, len(ACTIONS)
-
-    def _begin(self) -> Progress:
-        """Return untrained tables for the first stage."""
-        shape = self.shape(0)
-        return Progress(tables=np.zeros(shape), visits=np.zeros(shape, dtype=np.int64))
 
     def _build(self, scenario: Scenario) -> BuiltScenario:
         varied = msgspec.structs.replace(scenario, choices=self.method.choices)

@@ -120,13 +120,9 @@ class Progress:
 
 
 class SearchTrainer(Trainer[Search, Generation]):
-    """Searches for one ranking; a report is yielded after every generation.
+    """Searches for one ranking, a report after every generation; arguments as for `Method.trainer`.
 
-    Args:
-        curriculum: its scenarios are the fires, whatever their stage.
-        method: how to search.
-        seed: of all random draws of this search.
-        cities: cities built before, shared between trainings.
+    The scenarios of the curriculum are the fires, whatever their stage.
     """
 
     report_type: ClassVar[type[Report]] = Generation
@@ -156,7 +152,11 @@ class SearchTrainer(Trainer[Search, Generation]):
             workers: who fights, in threads. When their `stop` is set, the generation under way is left, as if it had
                 not begun.
         """
-        self._build()
+        if not self._fires:
+            n = self.method.n_steps_max
+            scenarios = [scenario for stage in self.curriculum.stages for scenario in stage.scenarios]
+            short = [one.with_values({"steps": n}) if one.steps > n else one for one in scenarios]
+            self._fires = [self._cities.build(scenario) for scenario in short]
         with workers.make_pool(workers.n) as pool:
             while not self.done and not workers.stop.is_set():
                 report = self._generation(pool, workers.stop)
@@ -237,17 +237,11 @@ class SearchTrainer(Trainer[Search, Generation]):
         }
         return {name: members for name, members in groups.items() if members}
 
-    def _build(self) -> None:
-        if self._fires:
-            return
-        n = self.method.n_steps_max
-        scenarios = [scenario for stage in self.curriculum.stages for scenario in stage.scenarios]
-        short = [one.with_values({"steps": n}) if one.steps > n else one for one in scenarios]
-        self._fires = [self._cities.build(scenario) for scenario in short]
-
     def _generation(self, pool: Executor, stop: Event) -> Generation | None:
         method, progress = self.method, self.progress
-        candidates = progress.mean + progress.spread * self._noise()
+        noise = np.zeros((method.n_candidates, len(self._free)))
+        fill_normals(self.seed, WEIGHT, progress.generation, noise)
+        candidates = progress.mean + progress.spread * noise
         fires = self._draw_fires()
         shares = pool.map(
             lambda pair: math.nan if stop.is_set() else self._fight(*pair),
@@ -266,11 +260,6 @@ class SearchTrainer(Trainer[Search, Generation]):
             score_best=math.fsum(means[k] for k in best) / len(best),
             spread=math.fsum(self.progress.spread[self._free]) / int(self._free.sum()),
         )
-
-    def _noise(self) -> Array:
-        noise = np.zeros((self.method.n_candidates, len(self._free)))
-        fill_normals(self.seed, WEIGHT, self.progress.generation, noise)
-        return noise
 
     def _draw_fires(self) -> list[int]:
         """Draw the fires of a generation, without repetition while there are enough."""

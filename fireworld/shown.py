@@ -1,9 +1,9 @@
-"""Objects that show themselves: as lines and tables, which the terminal prints and a notebook shows as HTML."""
+"""Objects that show themselves: as lines and tables, as plain text and as the HTML of a notebook."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import Final
@@ -47,6 +47,27 @@ def more(n_all: int, limit: int) -> Iterator[str]:
     """Yield a line about the entries of a list that are not shown, if there are any."""
     if n_all > limit:
         yield f"... and {n_all - limit} more; --limit shows more of them"
+
+
+def text_table(heads: Sequence[str], rows: Iterable[Sequence[str]], align: str) -> str:
+    """Return a table as lines of text.
+
+    Args:
+        heads: of the columns.
+        rows: cells; a row may be shorter than the heads, and a row of one cell may run over all columns.
+        align: a character for each column: < to the left, > to the right.
+    """
+    lines = [heads, *rows]
+    whole = [line for line in lines if len(line) > 1]
+    widths = [max(len(line[k]) for line in whole if k < len(line)) for k in range(len(heads))]
+
+    def write(line: Sequence[str]) -> str:
+        if len(line) == 1:
+            return line[0]
+        return "  ".join(f"{cell:{align[k]}{widths[k]}}" for k, cell in enumerate(line)).rstrip()
+
+    head, *body = map(write, lines)
+    return "\n".join([head, "-" * (sum(widths) + 2 * (len(widths) - 1)), *body])
 
 
 def _html(block: Block) -> str:
