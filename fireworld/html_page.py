@@ -53,6 +53,12 @@ def _cell(html: str) -> str:
     return f'<td class="text">{html[1:]}</td>' if html.startswith("\0") else f"<td>{html}</td>"
 
 
+def compared_row(label: str, values: Sequence[str]) -> list[str]:
+    """Return the cells of a row for `html_table`: text, bold where it is not the same in all columns."""
+    cells = [escape(value) for value in values]
+    return [text_cell(label), *(f"<b>{cell}</b>" if len(set(cells)) > 1 else cell for cell in cells)]
+
+
 def html_mark(text: str, kind: str) -> str:
     """Write a word on a colored ground: good, fair, bad or open."""
     return f'<span class="mark {kind}">{escape(text)}</span>'

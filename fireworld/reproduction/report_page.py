@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from html import escape
+from pathlib import Path
 from typing import Final
 
 from fireworld.evaluation.statistics import Estimate
@@ -26,6 +27,7 @@ _MARKS: Final = {
     WITHIN: "good", NEAR: "fair", APART: "bad",
     "reproduced": "good", "partly": "fair", "not reproduced": "bad", "open": "open", "yes": "good", "no": "bad",
 }  # fmt: skip
+_METHOD: Final = Path(__file__).with_name("method.html")
 _CLAIMS: Final = {True: ("as the paper says", "good"), False: ("the other way", "bad"), None: ("open", "open")}
 
 
@@ -58,7 +60,7 @@ def report_page(study: Study, tables: PaperTables, images: Mapping[str, bytes]) 
         "<h2>The city before and after</h2>",
         *(_maps(images, row.scenario) for row in (*paper.TABLE_2, *paper.TABLE_3)),
         "<h2>How it was measured</h2>",
-        _method(),
+        " ".join(_METHOD.read_text(encoding="utf-8").split()),
     ]
     return html_page("fireworld: reproduction", body)
 
@@ -74,14 +76,10 @@ def _introduction(study: Study) -> str:
 
 
 def _findings(study: Study, tables: PaperTables) -> str:
-    rows = [
-        [
-            text_cell(finding.question),
-            text_cell(html_mark(finding.verdict, _MARKS[finding.verdict])),
-            text_cell(escape(finding.text)),
-        ]
-        for finding in findings(study, tables)
-    ]
+    rows = []
+    for one in findings(study, tables):
+        cells = one.question, html_mark(one.verdict, _MARKS[one.verdict]), escape(one.text)
+        rows.append([text_cell(cell) for cell in cells])
     return html_table(["question", "answer", "numbers"], rows, n_text=3)
 
 
@@ -132,24 +130,9 @@ def _share(row: TeamShare) -> list[str]:
 
 
 def _maps(images: Mapping[str, bytes], scenario: str) -> str:
-    shown = [
-        _image(images, f"{scenario}-before", "before"),
-        _image(images, f"{scenario}-{ALONE}", "after: without cooperation"),
-        _image(images, f"{scenario}-{TOGETHER}", "after: with cooperation"),
-    ]
+    captions = {"before": "before", ALONE: "after: without cooperation", TOGETHER: "after: with cooperation"}
+    shown = [_image(images, f"{scenario}-{name}", caption) for name, caption in captions.items()]
     return f'<h3>{scenario}</h3><div class="maps">{"".join(shown)}</div>' if any(shown) else ""
-
-
-def _method() -> str:
-    return (
-        "<p>Tabular SARSA with the paper's hyperparameters (learning rate 0.7, discount 0.5, exploration 0.9 to the "
-        "power of the episode), 24 scenarios alone and eight together, at most 130 episodes each. The paper's values "
-        "count as met where they lie within our interval, however wide that is. Intervals come from a bootstrap "
-        "that draws repetitions and seeds anew, "
-        "apart from each other; differences are taken run by run on the same repetition and seed. The size of the "
-        "fires at the start is not in the paper: it was set once with rules that learn nothing, so scores are not to "
-        "be compared with the paper's to the decimal. The maps and recordings show repetition 1 on the first seed.</p>"
-    )
 
 
 def _compared(cell: PaperCell, *, digits: int) -> list[str]:

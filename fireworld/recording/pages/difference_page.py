@@ -7,7 +7,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from fireworld.html_page import html_figure, html_mark, html_page, html_table, text_cell
+from fireworld.html_page import compared_row, html_figure, html_mark, html_page, html_table, text_cell
 from fireworld.recording.difference_text import (
     SPREAD_HEADS,
     SPREAD_NOTE,
@@ -71,11 +71,7 @@ def _header(compared: Difference) -> str:
         if any(values):
             rows.append([key.replace("_", " "), *values])
     rows += [("digest", *(run.digest[:12] for run in runs)), *totals_rows(*compared.totals)]
-    marked = [
-        [text_cell(label), *(f"<b>{escape(value)}</b>" if a != b else escape(value) for value in (a, b))]
-        for label, a, b in rows
-    ]
-    return html_table(["", "A", "B"], marked)
+    return html_table(["", "A", "B"], [compared_row(label, values) for label, *values in rows])
 
 
 def _maps(title: str, moment: str, images: Mapping[str, bytes]) -> Iterator[str]:

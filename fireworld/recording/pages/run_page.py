@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
+from itertools import chain
 from pathlib import Path
 from typing import Final
 
@@ -20,7 +21,7 @@ from fireworld_viewer.story.steps import evenly_spaced
 
 from fireworld.errors import one_line
 from fireworld.files import check_output, write_file
-from fireworld.html_page import html_figure, html_page, html_table, text_cell
+from fireworld.html_page import compared_row, html_figure, html_page, html_table, text_cell
 from fireworld.outcome import QUANTITIES
 from fireworld.recording.inputs import AnyRun, open_one_or_two, run_name
 from fireworld.records import ACTION_NAMES, EVENT_KINDS, StoredRun
@@ -29,14 +30,13 @@ _STYLE: Final = """
 pre { background: #f0ede6; padding: .7rem 1rem; overflow-x: auto; font-size: 13px; }
 td.text { overflow-wrap: anywhere; } summary { cursor: pointer; }
 """
-ENDINGS: Final = (".html", ".htm")
-"""Of the page's file."""
-SCENARIO: Final = "scenario.yaml"
-"""Every recording has its scenario in a file of that name."""
+ENDINGS: Final = (".html", ".htm")  # of the page's file
+SCENARIO: Final = "scenario.yaml"  # every recording has its scenario in a file of that name
 _ALWAYS_OF_NOTE: Final = frozenset({"civilian-hurt", "civilian-died", "brigade-hurt", "brigade-died", "site-out"})
 _FIRST_OF_NOTE: Final = frozenset({"ignited", "burnt-out", "extinguished", "tank-empty"})
-_MAPS: Final = 4
-"""Maps in the strip."""
+_MAPS: Final = 4  # in the strip
+_MAPS_CAPTION: Final = "The city at the start, at the end and evenly between."
+_ROWS_CAPTION: Final = "Above A, below B; a run that ended before the other keeps its last state."
 _EVENTS_SHOWN: Final = 40
 _TARGETS_SHOWN: Final = 12
 
@@ -82,7 +82,7 @@ def run_page(logs: Sequence[StoredRun], images: Mapping[str, bytes]) -> str:
         "<h2>Outcome</h2>",
         _outcome(logs, names),
         "<h2>Maps</h2>",
-        html_figure(images["maps"], "The city at the start, at the end and evenly between." + _rows_note(logs)),
+        html_figure(images["maps"], _MAPS_CAPTION if len(logs) == 1 else f"{_MAPS_CAPTION} {_ROWS_CAPTION}"),
         "<h2>Curves</h2>",
         html_figure(images["curves"], "Steps are simulated minutes. Rewards are never above zero: less is worse."),
         "<h2>Decisions</h2>",
@@ -109,30 +109,21 @@ def _name(log: StoredRun) -> str:
     return Path(run_name(log)).name
 
 
-def _rows_note(logs: Sequence[StoredRun]) -> str:
-    return " Above A, below B; a run that ended before the other keeps its last state." if len(logs) > 1 else ""
-
-
 def _outcome(logs: Sequence[StoredRun], names: Sequence[str]) -> str:
     columns = [_outcome_of(log) for log in logs]
-    rows = []
-    for label in columns[0]:
-        values = [escape(column[label]) for column in columns]
-        rows.append([text_cell(label), *(f"<b>{value}</b>" if len(set(values)) > 1 else value for value in values)])
+    rows = [compared_row(label, [column[label] for column in columns]) for label in columns[0]]
     note = "<p>Bold: where they differ.</p>" if len(logs) > 1 else ""
     return html_table(["", *map(escape, names)], rows) + note
 
 
 def _outcome_of(log: StoredRun) -> dict[str, str]:
     outcome, last = final_outcome(log), log.step(int(log.steps[-1]))
-    ended = (
-        "nothing burned any more" if last.terminated else "the scenario's last step" if last.truncated else "stopped"
-    )
+    ended = "the scenario's last step" if last.truncated else "stopped"
     return {
         "scenario": one_line(log.header.scenario),
         "policy": one_line(log.header.policy),
         "seed": str(log.header.seed),
-        "last step": f"{last.step}: {ended}",
+        "last step": f"{last.step}: {'nothing burned any more' if last.terminated else ended}",
         **{quantity.label: quantity.text(outcome) for quantity in QUANTITIES},
         "score by today's rule": f"{outcome.score_now:.3f}",
         "digest": log.digest[:12],
@@ -175,10 +166,7 @@ def _event_counts(logs: Sequence[StoredRun], names: Sequence[str]) -> str:
     """Write how often each kind of event happened, and when first and last."""
     found = [_steps_by_kind(log) for log in logs]
     kinds = [kind for kind in EVENT_KINDS if any(len(steps[kind]) for steps in found)]
-    rows = [
-        [text_cell(kind.replace("-", " ")), *(cell for steps in found for cell in _count_cells(steps[kind]))]
-        for kind in kinds
-    ]
+    rows = [[text_cell(kind.replace("-", " ")), *chain(*(_count_cells(one[kind]) for one in found))] for kind in kinds]
     heads = [f"{escape(name)}: {what}" if len(logs) > 1 else what for name in names for what in ("how often", "steps")]
     return html_table(["event", *heads], rows) if rows else "<p>Nothing happened.</p>"
 
@@ -203,9 +191,10 @@ def _events_of_note(log: StoredRun, name: str) -> Iterator[str]:
     met: set[str] = set()
     noted: list[tuple[int, str]] = []
     for kind, (step, _, text, _) in zip(kinds, event_lines(log), strict=True):
-        first = kind not in met
-        if kind in _ALWAYS_OF_NOTE or (kind in _FIRST_OF_NOTE and first):
-            noted.append((step, f"{text}, the first" if kind in _FIRST_OF_NOTE else text))
+        if kind in _ALWAYS_OF_NOTE:
+            noted.append((step, text))
+        elif kind in _FIRST_OF_NOTE and kind not in met:
+            noted.append((step, f"{text}, the first"))
         met.add(kind)
     if noted:
         yield f"<h3>{escape(name)}</h3>"
