@@ -101,11 +101,7 @@ def compare(
 
 
 def _seeds(seeds: object, first_seed: object) -> Sequence[int]:
-    """Return the seeds of the runs.
-
-    Raises:
-        ArgumentError: they are none, or some come twice.
-    """
+    """Return the seeds of the runs."""
     if isinstance(seeds, Iterable) and not isinstance(seeds, str | bytes):
         listed = [seed_of(seed, name="seeds") for seed in seeds]
         if not listed or len({*listed}) < len(listed):
@@ -119,23 +115,14 @@ def _seeds(seeds: object, first_seed: object) -> Sequence[int]:
 
 
 def _policies(policies: object) -> list[RunnablePolicy]:
-    """Find the policies.
-
-    Raises:
-        ArgumentError: there are fewer than two.
-        PolicyError, TrainingError: one cannot be found or made.
-    """
+    """Find the policies."""
     if not isinstance(policies, Sequence) or isinstance(policies, str) or len(policies) < 2:
         raise ArgumentError(expected("policies", "", 'two or more, as in ["chief", "best"]', policies))
     return [runnable(given, place) for place, given in enumerate(policies)]
 
 
 def _check_policy(policy: RunnablePolicy, *, results: Path | None, processes: bool) -> None:
-    """Check that results can name a policy, and processes make it.
-
-    Raises:
-        PolicyError: they cannot.
-    """
+    """Check that results can name a policy, and processes make it."""
     if results is not None:
         policy.named.require_identity("results")
     if processes:
@@ -143,12 +130,7 @@ def _check_policy(policy: RunnablePolicy, *, results: Path | None, processes: bo
 
 
 def _built(scenarios: object, values: Mapping[str, Any]) -> dict[str, BuiltScenario]:
-    """Build the scenarios, by the names they were asked for.
-
-    Raises:
-        ArgumentError: there are none.
-        ScenarioError: one of them cannot be read or built, or comes twice.
-    """
+    """Build the scenarios, by the names they were asked for."""
     listed = [scenarios] if isinstance(scenarios, str | Path | Scenario) else scenarios
     if not isinstance(listed, Sequence) or not listed:
         raise ArgumentError(expected("scenarios", "", "one or more names, files or scenarios", scenarios))

@@ -205,11 +205,7 @@ def diff(
 
 
 def _open_both(a: AnyRun, b: AnyRun, *, partial: bool) -> tuple[StoredRun, StoredRun]:
-    """Open what has to be opened; files of the same bytes are read once.
-
-    Raises:
-        LogError: one cannot be read, or is cut off or damaged and `partial` is not given.
-    """
+    """Open what has to be opened; files of the same bytes are read once."""
     runs: list[StoredRun] = []
     for given in (a, b):
         run = runs[0] if runs and _same_bytes(a, b) else open_run(given, partial=True)

@@ -162,11 +162,7 @@ def prepare_fork(
 
 
 def _recorded_up_to(run: StoredRun, step: int) -> MemoryRecording:
-    """Read the steps of a run up to one of them.
-
-    Raises:
-        LogError: there is no such step, or the run has ended with it.
-    """
+    """Read the steps of a run up to one of them."""
     if step not in run.steps:
         steps = run.steps
         held = f"a step of {run_name(run)}, {steps[0]} to {steps[-1]}" if len(run) else f"steps in {run_name(run)}"
@@ -212,11 +208,7 @@ def _policy(run: StoredRun, given: object) -> NamedPolicy:
 
 
 def _check_change(change: ForkChange, resumed: Resumed, run: StoredRun) -> None:
-    """Check that every brigade can do what it is to do.
-
-    Raises:
-        LogError: a brigade has no decision to make or cannot make this one, or a swapped run does not fit.
-    """
+    """Check that every brigade can do what it is to do."""
     asked = _observations_of_next_step(resumed.world) if change.decided else {}
     for brigade, decision in change.decided.items():
         _check_decides(resumed.world, brigade, run, asked)

@@ -142,11 +142,7 @@ def reproduce(
 
 
 def _curriculum(given: Path | str) -> Curriculum:
-    """Read a curriculum.
-
-    Raises:
-        TrainingError: it cannot be read, or the brigades are not trained together in the scenarios of Table 1.
-    """
+    """Read a curriculum."""
     curriculum = load_curriculum(given)
     together = {scenario.name for stage in curriculum.stages if stage.cooperation for scenario in stage.scenarios}
     missing = [row.scenario for row in paper.TABLE_1 if row.scenario not in together]

@@ -18,8 +18,7 @@ from fireworld.files import check_output
 from fireworld.junit import clean, report
 from fireworld.recording.difference_text import change_lines
 from fireworld.recording.golden.spec import GoldenSpec, prepare_golden, spec_of
-from fireworld.recording.golden.store import SUFFIX, make_folder, store_recording, text_path
-from fireworld.recording.golden.text import is_text_of
+from fireworld.recording.golden.store import SUFFIX, is_text_of, make_folder, store_recording, text_path
 from fireworld.recording.record import run_prepared
 from fireworld.recording.run import Run
 from fireworld.records import RunHeader
