@@ -107,7 +107,7 @@ class Difference:
 
     def junit(self) -> bytes:
         """Return the comparison as JUnit XML, with a test case for each topic."""
-        from fireworld.recording.difference_junit import difference_junit
+        from fireworld.recording.difference_text import difference_junit
 
         return difference_junit(self.found, self.rules, names=self.names)
 
