@@ -76,9 +76,14 @@ def compare(
     workers_for(executor)
     run_seeds = _seeds(seeds, first_seed)
     known = open_results(None if results is None else path_of("results", results))
-    found = _policies(policies)
+    if not isinstance(policies, Sequence) or isinstance(policies, str) or len(policies) < 2:
+        raise ArgumentError(expected("policies", "", 'two or more, as in ["chief", "best"]', policies))
+    found = [runnable(given, place) for place, given in enumerate(policies)]
     for policy in found:
-        _check_policy(policy, results=known.path, processes=in_processes(executor))
+        if known.path is not None:
+            policy.named.require_identity("results")
+        if in_processes(executor):
+            policy.named.require_found_again("executor")
     built = _built(scenarios, settings_of(set))
     runs = ComparisonRuns(found, built, run_seeds, known)
     with gentle_interrupt(stop) as interrupted:
@@ -112,21 +117,6 @@ def _seeds(seeds: object, first_seed: object) -> Sequence[int]:
     if first + n - 1 > SEED_MAX:
         raise ArgumentError(expected("first_seed", "", f"{n} seeds up to {SEED_MAX}", first))
     return range(first, first + n)
-
-
-def _policies(policies: object) -> list[RunnablePolicy]:
-    """Find the policies."""
-    if not isinstance(policies, Sequence) or isinstance(policies, str) or len(policies) < 2:
-        raise ArgumentError(expected("policies", "", 'two or more, as in ["chief", "best"]', policies))
-    return [runnable(given, place) for place, given in enumerate(policies)]
-
-
-def _check_policy(policy: RunnablePolicy, *, results: Path | None, processes: bool) -> None:
-    """Check that results can name a policy, and processes make it."""
-    if results is not None:
-        policy.named.require_identity("results")
-    if processes:
-        policy.named.require_found_again("executor")
 
 
 def _built(scenarios: object, values: Mapping[str, Any]) -> dict[str, BuiltScenario]:
