@@ -144,7 +144,7 @@ def read_results(path: Path) -> dict[RunKey, Result]:
     wanted = _schema(len(table.schema))
     if len(table.schema) < N_FIRST or not table.schema.equals(wanted, check_metadata=True):
         raise _not_results(path, "a table with other columns, or of a later fireworld")
-    later = [None] * (len(KINDS) + len(KEYS) - len(wanted))
+    later: list[Any] = [None] * (len(KINDS) + len(KEYS) - len(wanted))
     results: dict[RunKey, Result] = {}
     for row in zip(*(column.to_pylist() for column in table.columns), strict=True):
         scenario, policy, scenario_digest, policy_digest, seed, version, *values = *row, *later
