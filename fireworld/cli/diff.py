@@ -5,10 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from fireworld.cli.installed import check_matplotlib
+
+if TYPE_CHECKING:
+    from fireworld_recorder.diff import RunComparison
 
 
 @click.command()
@@ -99,10 +103,25 @@ def command(
     elif difference.known_same and not outputs:
         click.echo(str(difference))
     else:
-        from fireworld.cli.difference_tables import show_difference
-
         show_difference(difference.found, names=difference.names)
     context.exit(0 if difference.same else 1)
+
+
+def show_difference(found: RunComparison, *, names: tuple[str, str]) -> None:
+    """Print the first difference, how both runs came out, when each topic came to differ, and how that spread."""
+    from fireworld.cli.tables import print_table
+    from fireworld.recording import difference_text as text
+
+    click.echo("\n".join([text.verdict(found), *text.header_lines(found.header), ""]))
+    print_table(("", *names), list(text.totals_rows(*found.totals)))
+    topics = list(text.topic_rows(found))
+    if topics:
+        click.echo()
+        print_table(("topic", "first at step", f"steps that differ, of {found.n_steps_compared}"), topics)
+    if found.spread.rows:
+        click.echo()
+        print_table(text.SPREAD_HEADS, list(map(text.spread_cells, found.spread.rows)), left=(), narrow=True)
+        click.echo("\n".join(["", text.SPREAD_NOTE, *text.spread_sentences(found)]))
 
 
 def _parse_tolerance(text: str) -> tuple[str, float]:

@@ -50,13 +50,9 @@ def command(*, log: Path, folder: Path, tables: str | None, force: bool, as_json
     if recording.damage is not None:
         click.echo(f"{log}: {recording.damage}; exported {len(recording)} committed steps", err=True)
     if as_json:
-        known = {
-            "folder": str(folder),
-            "state": recording.state,
-            "damage": recording.damage,
-            "digest": recording.digest,
-        }
-        click.echo(json.dumps({**known, "n_steps": len(recording), "n_rows": n_rows}, indent=2))
+        known = {key: getattr(recording, key) for key in ("state", "damage", "digest")}
+        known = {"folder": str(folder), **known, "n_steps": len(recording), "n_rows": n_rows}
+        click.echo(json.dumps(known, indent=2))
         return
     for name, n in n_rows.items():
         click.echo(f"{folder / name}.parquet: {n:,} rows")

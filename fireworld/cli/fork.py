@@ -83,8 +83,12 @@ def command(
         log,
         at=at,
         policy=policy,
-        decide=_by_brigade("--decide", "BRIGADE=ACTION as in 2=nearest-to-me", decided, _brigade_first),
-        swap=_by_brigade("--swap", "OTHER:BRIGADE as in other.mcap:2", swapped, _brigade_last),
+        decide=_by_brigade(
+            "--decide", "BRIGADE=ACTION as in 2=nearest-to-me", decided, lambda text: text.partition("=")[::2]
+        ),
+        swap=_by_brigade(
+            "--swap", "OTHER:BRIGADE as in other.mcap:2", swapped, lambda text: text.rpartition(":")[::-2]
+        ),
     )
     if run.note:
         click.echo(run.note, err=True)
@@ -101,9 +105,9 @@ def command(
 
 
 def _by_brigade(
-    option: str, form: str, texts: Sequence[str], split: Callable[[str], tuple[str, str]]
+    option: str, form: str, texts: Sequence[str], split: Callable[[str], tuple[str, ...]]
 ) -> dict[int, str]:
-    """Return what is given for each brigade."""
+    """Return what is given for each brigade; `split` returns its number and that."""
     given: dict[int, str] = {}
     for text in texts:
         number, value = split(text)
@@ -113,13 +117,3 @@ def _by_brigade(
             raise click.UsageError(f"{option}: expected one for brigade {int(number)}, got two")
         given[int(number)] = value
     return given
-
-
-def _brigade_first(text: str) -> tuple[str, str]:
-    number, _, value = text.partition("=")
-    return number, value
-
-
-def _brigade_last(text: str) -> tuple[str, str]:
-    value, _, number = text.rpartition(":")
-    return number, value

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import replace
+from functools import partial
 from threading import Lock
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -52,7 +53,7 @@ def watched_run(screen: Screen | None, header: RunHeader, city: CityRecord) -> I
         return
     from fireworld_viewer.rerun_view.live import RunView
 
-    with closing(RunView(screen, header, city, warn=_print_note)) as watched:
+    with closing(RunView(screen, header, city, warn=partial(click.echo, err=True))) as watched:
         yield watched.add
 
 
@@ -69,7 +70,9 @@ def watched_trainings(screen: Screen | None, trainings: Sequence[Training]) -> I
     from fireworld_viewer.rerun_view.live import TrainingView
 
     lock = Lock()
-    with closing(TrainingView(screen, _layout([one.trainer for one in trainings]), warn=_print_note)) as watched:
+    with closing(
+        TrainingView(screen, _layout([one.trainer for one in trainings]), warn=partial(click.echo, err=True))
+    ) as watched:
 
         def show(training: Training, report: Report) -> None:
             with lock:
@@ -130,8 +133,3 @@ def _play_run(play: Play) -> PlayRun:
         return play.title, run.header, run.city, [replace(record, snapshot=None) for record in run]
 
     return run
-
-
-def _print_note(line: str) -> None:
-    """Print why a view has ended before what it shows."""
-    click.echo(line, err=True)

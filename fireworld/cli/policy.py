@@ -38,7 +38,6 @@ def list_policies(*, as_json: bool) -> None:
 
     Your own are named FILE.py:CLASS or MODULE:CLASS.
     """
-    from fireworld.cli.tables import print_table
     from fireworld.policy.names import policies
 
     known = policies()

@@ -27,7 +27,7 @@ def command(context: click.Context, *, log: Path, as_json: bool) -> None:
     elif verified.difference is None:
         click.echo(repr(verified))
     else:
-        from fireworld.cli.difference_tables import show_difference
+        from fireworld.cli.diff import show_difference
 
         show_difference(verified.difference, names=(str(log), "replay"))
     context.exit(0 if verified else 1)

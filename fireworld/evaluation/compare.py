@@ -76,9 +76,14 @@ def compare(
     workers_for(executor)
     run_seeds = _seeds(seeds, first_seed)
     known = open_results(None if results is None else path_of("results", results))
-    found = _policies(policies)
+    if not isinstance(policies, Sequence) or isinstance(policies, str) or len(policies) < 2:
+        raise ArgumentError(expected("policies", "", 'two or more, as in ["chief", "best"]', policies))
+    found = [runnable(given, place) for place, given in enumerate(policies)]
     for policy in found:
-        _check_policy(policy, results=known.path, processes=in_processes(executor))
+        if known.path is not None:
+            policy.named.require_identity("results")
+        if in_processes(executor):
+            policy.named.require_found_again("executor")
     built = _built(scenarios, settings_of(set))
     runs = ComparisonRuns(found, built, run_seeds, known)
     with gentle_interrupt(stop) as interrupted:
@@ -101,11 +106,7 @@ def compare(
 
 
 def _seeds(seeds: object, first_seed: object) -> Sequence[int]:
-    """Return the seeds of the runs.
-
-    Raises:
-        ArgumentError: they are none, or some come twice.
-    """
+    """Return the seeds of the runs."""
     if isinstance(seeds, Iterable) and not isinstance(seeds, str | bytes):
         listed = [seed_of(seed, name="seeds") for seed in seeds]
         if not listed or len({*listed}) < len(listed):
@@ -118,37 +119,8 @@ def _seeds(seeds: object, first_seed: object) -> Sequence[int]:
     return range(first, first + n)
 
 
-def _policies(policies: object) -> list[RunnablePolicy]:
-    """Find the policies.
-
-    Raises:
-        ArgumentError: there are fewer than two.
-        PolicyError, TrainingError: one cannot be found or made.
-    """
-    if not isinstance(policies, Sequence) or isinstance(policies, str) or len(policies) < 2:
-        raise ArgumentError(expected("policies", "", 'two or more, as in ["chief", "best"]', policies))
-    return [runnable(given, place) for place, given in enumerate(policies)]
-
-
-def _check_policy(policy: RunnablePolicy, *, results: Path | None, processes: bool) -> None:
-    """Check that results can name a policy, and processes make it.
-
-    Raises:
-        PolicyError: they cannot.
-    """
-    if results is not None:
-        policy.named.require_identity("results")
-    if processes:
-        policy.named.require_found_again("executor")
-
-
 def _built(scenarios: object, values: Mapping[str, Any]) -> dict[str, BuiltScenario]:
-    """Build the scenarios, by the names they were asked for.
-
-    Raises:
-        ArgumentError: there are none.
-        ScenarioError: one of them cannot be read or built, or comes twice.
-    """
+    """Build the scenarios, by the names they were asked for."""
     listed = [scenarios] if isinstance(scenarios, str | Path | Scenario) else scenarios
     if not isinstance(listed, Sequence) or not listed:
         raise ArgumentError(expected("scenarios", "", "one or more names, files or scenarios", scenarios))

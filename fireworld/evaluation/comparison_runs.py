@@ -57,15 +57,7 @@ class RunnablePolicy:
 
 
 def runnable(given: Any, place: int) -> RunnablePolicy:
-    """Find a policy.
-
-    Args:
-        given: its name, file, class, object, or function.
-        place: among the policies of a comparison.
-
-    Raises:
-        PolicyError, TrainingError: it cannot be found or made.
-    """
+    """Find a policy by its name, file, class, object, or function; errors as for `find_policy`."""
     named = find_policy(given)
     identity = named.identity
     return RunnablePolicy(
@@ -88,11 +80,7 @@ class PolicyRun:
     seed: int
 
     def __call__(self) -> Row:
-        """Run.
-
-        Raises:
-            PolicyError: the policy failed.
-        """
+        """Run; PolicyError if the policy fails."""
         if isinstance(self.policy, KernelPolicy):
             return row_of(run_compiled(self.built, self.policy, seed=self.seed))
         try:
@@ -124,11 +112,7 @@ class ComparisonRuns:
                         self.missing[key] = policy, result, PolicyRun(built, label, policy.given, key.seed)
 
     def make(self, executor: AnyExecutor, stop: Event, on_run: Callable[[int, int], object]) -> None:
-        """Make the runs that are missing; what is done is saved, whatever happens.
-
-        Raises:
-            Interrupted: before the last run was done.
-        """
+        """Make the runs that are missing; what is done is saved, whatever happens. Interrupted if some are left."""
         n_all = len({policy.key for policy in self.policies}) * len(self.built) * len(self.seeds)
         n_known, n_done = n_all - len(self.missing), 0
         on_run(n_known, n_all)

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
+
+from fireworld_viewer.pictures.figure_files import save_figure
+from fireworld_viewer.pictures.policy_figures import DifferencePanel, draw_paired_differences
 
 from fireworld.evaluation.paired import Pairing
 from fireworld.outcome import METRICS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+__all__ = ["draw_differences", "save_figure"]
 
 
 def draw_differences(pairings: Sequence[Pairing], *, title: str) -> Figure:
@@ -23,8 +27,6 @@ def draw_differences(pairings: Sequence[Pairing], *, title: str) -> Figure:
     Raises:
         ViewError: matplotlib is not installed.
     """
-    from fireworld_viewer.pictures.policy_figures import DifferencePanel, draw_paired_differences
-
     panels = [
         DifferencePanel(
             label=metric.label,
@@ -40,14 +42,3 @@ def draw_differences(pairings: Sequence[Pairing], *, title: str) -> Figure:
         for metric in METRICS
     ]
     return draw_paired_differences(panels, title=title)
-
-
-def save_figure(figure: Figure, path: Path, *, force: bool) -> None:
-    """Write a figure as the kind of picture that the file's ending names.
-
-    Raises:
-        OutputError: the ending is of no such kind, or the file exists or cannot be written.
-    """
-    from fireworld_viewer.pictures import figure_files
-
-    figure_files.save_figure(figure, path, force=force)

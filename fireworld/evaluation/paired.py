@@ -17,13 +17,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from fireworld.evaluation.runs import Outcomes
-from fireworld.evaluation.statistics import (
-    Estimate,
-    estimate,
-    interquartile_mean,
-    mean,
-    paired_difference,
-)
+from fireworld.evaluation.statistics import Estimate, estimate, interquartile_mean, mean, paired_difference
 from fireworld.kernels.arrays import Array
 from fireworld.outcome import METRICS, Metric
 
@@ -171,17 +165,9 @@ def compare_outcomes(
         of_b: the new policy's, of the same scenarios and seeds.
         same_policy: the two are one policy.
     """
-    names = list(of_a)
-    scopes = [(name, [name]) for name in names]
-    everything: list[tuple[str | None, list[str]]] = [*scopes, (None, names)]
+    everything: list[tuple[str | None, list[str]]] = [*((name, [name]) for name in of_a), (None, list(of_a))]
     return [
-        _pair(
-            scenario,
-            metric,
-            [of_a[name] for name in within],
-            [of_b[name] for name in within],
-            same_policy=same_policy,
-        )
+        _pair(scenario, metric, *([of[name] for name in within] for of in (of_a, of_b)), same_policy=same_policy)
         for scenario, within in everything
         for metric in METRICS
     ]
@@ -216,6 +202,10 @@ def _pair(
         [getattr(outcomes, metric.attribute).astype(np.float64) for outcomes in side] for side in (of_a, of_b)
     )
     mean_a, mean_b = _over_scenarios(values_a), _over_scenarios(values_b)
+    chances = [
+        np.where(gain > 0.0, 1.0, np.where(gain == 0.0, 0.5, 0.0))
+        for gain in (metric.gain(b - a) for a, b in zip(values_a, values_b, strict=True))
+    ]
     return Pairing(
         scenario=scenario,
         metric=metric,
@@ -223,17 +213,9 @@ def _pair(
         b=_side(of_b, values_b),
         differences=(mean_b - mean_a)[0],
         difference=paired_difference(mean_b, mean_a),
-        improvement=_improvement(metric, values_a, values_b),
+        improvement=estimate(_over_scenarios(chances)),
         same_policy=same_policy,
     )
-
-
-def _improvement(metric: Metric, values_a: Sequence[Array], values_b: Sequence[Array]) -> Estimate:
-    chances = [
-        np.where(gain > 0.0, 1.0, np.where(gain == 0.0, 0.5, 0.0))
-        for gain in (metric.gain(b - a) for a, b in zip(values_a, values_b, strict=True))
-    ]
-    return estimate(_over_scenarios(chances))
 
 
 def _side(outcomes: Sequence[Outcomes], values: Sequence[Array]) -> Side:

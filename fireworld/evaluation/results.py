@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -21,10 +20,7 @@ from fireworld.version import __version__
 
 FORMAT: Final = "fireworld-results/1"
 KEYS: Final[dict[str, type]] = {
-    "scenario": str,
-    "policy": str,
-    "scenario_digest": str,
-    "policy_digest": str,
+    **dict.fromkeys(("scenario", "policy", "scenario_digest", "policy_digest"), str),
     "seed": int,
     "version": str,
 }
@@ -148,14 +144,10 @@ def read_results(path: Path) -> dict[RunKey, Result]:
     wanted = _schema(len(table.schema))
     if len(table.schema) < N_FIRST or not table.schema.equals(wanted, check_metadata=True):
         raise _not_results(path, "a table with other columns, or of a later fireworld")
-    later = [None] * (len(KINDS) + len(KEYS) - len(wanted))
-    columns = (column.to_pylist() for column in table.columns)
-    return _results(path, ((*row, *later) for row in zip(*columns, strict=True)))
-
-
-def _results(path: Path, rows: Iterable[tuple[Any, ...]]) -> dict[RunKey, Result]:
+    later: list[Any] = [None] * (len(KINDS) + len(KEYS) - len(wanted))
     results: dict[RunKey, Result] = {}
-    for scenario, policy, scenario_digest, policy_digest, seed, version, *values in rows:
+    for row in zip(*(column.to_pylist() for column in table.columns), strict=True):
+        scenario, policy, scenario_digest, policy_digest, seed, version, *values = *row, *later
         key = RunKey(scenario_digest, policy_digest, seed, version)
         known = results.setdefault(key, Result(scenario, policy, tuple(values)))
         if known.row != tuple(values):

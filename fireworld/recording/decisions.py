@@ -25,16 +25,7 @@ FALLBACK: Final = Decision(0)
 
 
 def check_same_draws(first: RunHeader, second: RunHeader, *, names: tuple[str, str]) -> None:
-    """Check that two runs start alike and see the same random draws.
-
-    Args:
-        first: a run.
-        second: the run to compare with it.
-        names: their files.
-
-    Raises:
-        LogError: with what differs.
-    """
+    """Raise LogError if two runs, with these names, do not start alike or do not see the same random draws."""
     if first.scenario_digest != second.scenario_digest:
         wanted = f"{first.scenario} ({first.scenario_digest[:12]}), as in {names[0]}"
         raise LogError(expected(names[1], "scenario", wanted, f"{second.scenario} ({second.scenario_digest[:12]})"))
@@ -157,23 +148,17 @@ def read_decision(where: str, given: DecisionGiven, run: StoredRun) -> Decision:
         raise PolicyError(expected(where, "", "one of " + ", ".join(ACTION_NAMES), name, hint))
     action = Action(ACTION_NAMES.index(name))
     if action == Action.OWN_TARGET:
-        return Decision(action, target=_building(where, given, building, run))
+        if not (building.isascii() and building.isdecimal()):
+            raise PolicyError(expected(where, "", f"a building behind {name}, as in {name}:301", given))
+        ids = run.city.building_id.tolist()
+        if int(building) not in ids:
+            wanted = f"the id of a building of {run_name(run)}, {min(ids)} to {max(ids)}"
+            raise PolicyError(expected(where, "", wanted, given))
+        return Decision(action, target=ids.index(int(building)))
     if colon:
         hint = "a brigade goes for a building with own-target:BUILDING"
         raise PolicyError(expected(where, "", f"{name} without a building", given, hint))
     return Decision(action)
-
-
-def _building(where: str, given: str, building: str, run: StoredRun) -> int:
-    """Return the index of a building given by its id."""
-    if not (building.isascii() and building.isdecimal()):
-        name = ACTION_NAMES[Action.OWN_TARGET]
-        raise PolicyError(expected(where, "", f"a building behind {name}, as in {name}:301", given))
-    ids = run.city.building_id.tolist()
-    if int(building) not in ids:
-        wanted = f"the id of a building of {run_name(run)}, {min(ids)} to {max(ids)}"
-        raise PolicyError(expected(where, "", wanted, given))
-    return int(ids.index(int(building)))
 
 
 def _last(observation: Observation) -> Decision:

@@ -107,7 +107,7 @@ class Difference:
 
     def junit(self) -> bytes:
         """Return the comparison as JUnit XML, with a test case for each topic."""
-        from fireworld.recording.difference_junit import difference_junit
+        from fireworld.recording.difference_text import difference_junit
 
         return difference_junit(self.found, self.rules, names=self.names)
 
@@ -205,11 +205,7 @@ def diff(
 
 
 def _open_both(a: AnyRun, b: AnyRun, *, partial: bool) -> tuple[StoredRun, StoredRun]:
-    """Open what has to be opened; files of the same bytes are read once.
-
-    Raises:
-        LogError: one cannot be read, or is cut off or damaged and `partial` is not given.
-    """
+    """Open what has to be opened; files of the same bytes are read once."""
     runs: list[StoredRun] = []
     for given in (a, b):
         run = runs[0] if runs and _same_bytes(a, b) else open_run(given, partial=True)

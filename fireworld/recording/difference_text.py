@@ -1,17 +1,26 @@
-"""A comparison of two recordings in words and cells, for the terminal and for pages."""
+"""A comparison of two recordings in words and cells, for the terminal and pages, and as JUnit XML for CI servers."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
+from xml.etree.ElementTree import Element, SubElement
 
+from fireworld.junit import clean, report
 from fireworld.outcome import QUANTITIES
+from fireworld.records import STEP_TOPICS, Snapshot
 
 if TYPE_CHECKING:
     from fireworld_recorder.diff import RunComparison
+    from fireworld_recorder.match import Rules
     from fireworld_recorder.spread import SpreadRow, ValuePair
     from fireworld_recorder.totals import Totals
 
+COMMIT: Final = "/commit"
+LENGTH: Final = "length"
+"""The case of steps that only one run has."""
 DIGEST_SHOWN: Final = 12
 SPREAD_HEADS: Final = ("step", "buildings", "fieryness", "brigades", "civilians", "score", "burning", "burnt out")
 SPREAD_NOTE: Final = "how many differ; fieryness: buildings in another state; score, burning, burnt out: B - A"
@@ -69,6 +78,58 @@ def verdict(difference: RunComparison) -> str:
     """Return the first difference in words, or how many steps are the same."""
     first = difference.first
     return f"the same: {difference.n_steps_compared} steps" if first is None else first.sentence
+
+
+def difference_junit(difference: RunComparison, rules: Rules, *, names: tuple[str, str]) -> bytes:
+    """Write a comparison as a suite with a test case for each topic, in the order in which things happen.
+
+    A topic that differs is a failure whose message, and text, is its first difference; one that is not compared is
+    skipped. The class of all cases is made of the first recording's path, so that several goldens stay apart.
+
+    Args:
+        difference: what was found.
+        rules: by which it was found.
+        names: paths of the two recordings, or what was run.
+    """
+    parts = [re.sub(r"[^\w-]+", "_", part) for part in Path(names[0]).with_suffix("").parts]
+    class_name = ".".join(["fireworld", "diff", *(part for part in parts if part.strip("_"))])
+    topics = (*(topic.topic for topic in STEP_TOPICS), Snapshot.topic, COMMIT, LENGTH)
+    cases = [_case(name, class_name, difference, rules) for name in topics]
+    properties = {key: f"{b}, was {a}" for key, (a, b) in difference.header.items()}
+    return report("fireworld diff", f"{names[0]} and {names[1]}", cases, properties)
+
+
+def _case(name: str, class_name: str, difference: RunComparison, rules: Rules) -> Element:
+    case = Element("testcase", {"classname": class_name, "name": name.removeprefix("/"), "time": "0"})
+    failure = _failure(name, difference)
+    if failure is not None:
+        sentence, details = failure
+        message = {"message": clean(sentence), "type": "difference"}
+        SubElement(case, "failure", message).text = clean(f"{sentence}\n{details}")
+    elif not _is_compared(name, rules):
+        SubElement(case, "skipped", {"message": "left out by --ignore or --tolerance"})
+    return case
+
+
+def _failure(name: str, difference: RunComparison) -> tuple[str, str] | None:
+    """Return the first difference of a topic and how often it differs, or None."""
+    if name == LENGTH:
+        first, (a, b) = difference.first, difference.totals
+        if first is not None and first.phase == LENGTH:
+            return first.sentence, f"{b.n_steps} steps, was {a.n_steps}"
+        return (f"{b.n_steps} steps, was {a.n_steps}", "") if a.n_steps != b.n_steps else None
+    if name not in difference.first_by_topic:
+        return None
+    n = difference.n_steps_differing[name]
+    return difference.first_by_topic[name].sentence, f"differs in {n} of {difference.n_steps_compared} steps"
+
+
+def _is_compared(name: str, rules: Rules) -> bool:
+    if name == LENGTH:
+        return True
+    if name == Snapshot.topic:
+        return rules.snapshots
+    return bool(rules.endings if name == COMMIT else rules.fields[name])
 
 
 def _change(pair: ValuePair) -> str:

@@ -186,11 +186,7 @@ def explain(
 
 
 def _sorted_by_score(a: StoredRun, b: StoredRun) -> tuple[StoredRun, StoredRun, tuple[float, float]]:
-    """Return two runs that can be compared, the worse first, and their scores.
-
-    Raises:
-        LogError: another scenario, seed or last step, or a run that stopped before its end.
-    """
+    """Return two runs that can be compared, the worse first, and their scores."""
     names = run_name(a), run_name(b)
     check_same_draws(a.header, b.header, names=names)
     if a.header.n_steps_max != b.header.n_steps_max:

@@ -28,7 +28,7 @@ from fireworld.recording.decisions import (
 from fireworld.recording.inputs import AnyRun, open_run, run_name
 from fireworld.recording.record import run_prepared
 from fireworld.recording.replay import build_recorded, check_replay
-from fireworld.recording.resume import Resumed, has_memory, recorded_policy, resume
+from fireworld.recording.resume import Resumed, recorded_policy, resume
 from fireworld.recording.run import Run
 from fireworld.records import CityRecord, MemoryRecording, RunHeader, StepRecord, StoredRun
 from fireworld.simulation.observer import Observer
@@ -45,26 +45,18 @@ BUILDINGS_NAMED_MAX: Final = 8
 
 
 @dataclass(frozen=True)
-class SwappedBrigade:
-    """A brigade that takes the decisions recorded in another run of the same scenario and seed."""
-
-    run: StoredRun
-    decisions: RecordedDecisions
-
-
-@dataclass(frozen=True)
 class ForkChange:
     """What is changed after the step of the fork.
 
     Attributes:
         named: the policy that takes over.
         decided: decisions by brigade, for the first step after the fork.
-        swaps: by brigade: whose decisions it takes, to the end.
+        swaps: by brigade: the run of the same scenario and seed whose decisions it takes to the end, and these.
     """
 
     named: NamedPolicy
     decided: Mapping[int, Decision] = field(default_factory=dict)
-    swaps: Mapping[int, SwappedBrigade] = field(default_factory=dict)
+    swaps: Mapping[int, tuple[StoredRun, RecordedDecisions]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -144,7 +136,7 @@ def prepare_fork(
     beginning = _recorded_up_to(run, at)
     built = build_recorded(run.header)
     change = _read_change(run, built.n_brigades, policy, decide or {}, swap or {})
-    with_memory = change.named if policy is None and has_memory(change.named.policy) else None
+    with_memory = change.named if policy is None and not change.named.policy.stateless else None
     resumed = resume(built, beginning, source=run_name(run), with_memory=with_memory)
     check_replay(resumed.recorded, resumed.replayed, source=run_name(run))
     _check_change(change, resumed, run)
@@ -162,11 +154,7 @@ def prepare_fork(
 
 
 def _recorded_up_to(run: StoredRun, step: int) -> MemoryRecording:
-    """Read the steps of a run up to one of them.
-
-    Raises:
-        LogError: there is no such step, or the run has ended with it.
-    """
+    """Read the steps of a run up to one of them."""
     if step not in run.steps:
         steps = run.steps
         held = f"a step of {run_name(run)}, {steps[0]} to {steps[-1]}" if len(run) else f"steps in {run_name(run)}"
@@ -193,39 +181,34 @@ def _read_change(
     for brigade in decide.keys() & swap.keys():
         raise ArgumentError(expected("decide, swap", "", f"one of them for brigade {brigade}", "both"))
     decided = {brigade: read_decision(f"decide: {brigade}", given, run) for brigade, given in decide.items()}
-    swaps: dict[int, SwappedBrigade] = {}
-    opened: dict[object, SwappedBrigade] = {}
+    swaps: dict[int, tuple[StoredRun, RecordedDecisions]] = {}
+    opened: dict[object, tuple[StoredRun, RecordedDecisions]] = {}
     for brigade, other in swap.items():
         key = str(other) if isinstance(other, str | os.PathLike) else id(other)
         if key not in opened:
-            opened[key] = SwappedBrigade(swapped := open_run(other), RecordedDecisions(swapped))
+            opened[key] = (swapped := open_run(other)), RecordedDecisions(swapped)
         swaps[brigade] = opened[key]
-    return ForkChange(_policy(run, policy), decided, swaps)
-
-
-def _policy(run: StoredRun, given: object) -> NamedPolicy:
-    """Return the policy that takes over."""
-    name = run.header.policy if given is None else given
+    name = run.header.policy if policy is None else policy
     if isinstance(name, str) and name == RECORDED:
-        return NamedPolicy(RECORDED, run.digest, RecordedDecisions(run))
-    return recorded_policy(run.header, source=run_name(run)) if given is None else find_policy(given)
+        named = NamedPolicy(RECORDED, run.digest, RecordedDecisions(run))
+    else:
+        named = recorded_policy(run.header, source=run_name(run)) if policy is None else find_policy(policy)
+    return ForkChange(named, decided, swaps)
 
 
 def _check_change(change: ForkChange, resumed: Resumed, run: StoredRun) -> None:
-    """Check that every brigade can do what it is to do.
-
-    Raises:
-        LogError: a brigade has no decision to make or cannot make this one, or a swapped run does not fit.
-    """
-    asked = _observations_of_next_step(resumed.world) if change.decided else {}
+    """Check that every brigade can do what it is to do."""
+    observing = _Observing()
+    if change.decided:
+        resumed.world.copy().step(observing)  # what the brigades that are asked in the next step see then
     for brigade, decision in change.decided.items():
-        _check_decides(resumed.world, brigade, run, asked)
-        _check_possible(resumed.world, brigade, decision, run.city, asked[brigade])
-    for swapped in change.swaps.values():
-        other, step = swapped.run, resumed.world.step_number
+        _check_decides(resumed.world, brigade, run, observing.seen)
+        _check_possible(resumed.world, brigade, decision, run.city, observing.seen[brigade])
+    step = resumed.world.step_number
+    for other, decisions in change.swaps.values():
         check_same_draws(run.header, other.header, names=(run_name(run), run_name(other)))
-        if swapped.decisions.last_step <= step:
-            wanted, got = f"a run with decisions after step {step}", f"one that ends at {swapped.decisions.last_step}"
+        if decisions.last_step <= step:
+            wanted, got = f"a run with decisions after step {step}", f"one that ends at {decisions.last_step}"
             raise LogError(expected("swap", run_name(other), wanted, got))
 
 
@@ -239,13 +222,6 @@ class _Observing(Policy):
         _ = observation.burning  # what burns where it stands now: the arrays behind it change within the step
         self.seen[observation.brigade] = observation
         return FALLBACK
-
-
-def _observations_of_next_step(world: World) -> dict[int, Observation]:
-    """Return what the brigades that are asked in the next step see then; the world stays as it is."""
-    observing = _Observing()
-    world.copy().step(observing)
-    return observing.seen
 
 
 def _check_decides(world: World, brigade: int, run: StoredRun, asked: Mapping[int, Observation]) -> None:
@@ -275,7 +251,7 @@ def _check_possible(world: World, brigade: int, decision: Decision, city: CityRe
 def _forced_policy(change: ForkChange, *, first_step: int) -> ForcedPolicy:
     def forced(brigade: int, step: int) -> Decision | None:
         if brigade in change.swaps:
-            return change.swaps[brigade].decisions.at(step, brigade)
+            return change.swaps[brigade][1].at(step, brigade)
         return change.decided.get(brigade) if step == first_step else None
 
     return ForcedPolicy(change.named.policy, forced)
@@ -289,7 +265,7 @@ def _header(run: StoredRun, change: ForkChange, step: int) -> RunHeader:
         "step": step,
         "policy": named.name,
         "decide": {str(brigade): decision_text(made, run.city) for brigade, made in sorted(change.decided.items())},
-        "swap": {str(brigade): swapped.run.digest for brigade, swapped in sorted(change.swaps.items())},
+        "swap": {str(brigade): other.digest for brigade, (other, _) in sorted(change.swaps.items())},
     }
     try:
         before = json.loads(header.attachments.get(FORK_ATTACHMENT, b"[]"))

@@ -70,11 +70,6 @@ def recorded_policy(header: RunHeader, *, source: str) -> NamedPolicy:
     return named
 
 
-def has_memory(policy: Policy) -> bool:
-    """Return whether what a policy decides may depend on what it saw in the steps before."""
-    return not policy.stateless
-
-
 def resume(
     built: BuiltScenario, recording: MemoryRecording, *, source: str, with_memory: NamedPolicy | None = None
 ) -> Resumed:
@@ -103,7 +98,12 @@ def resume(
         decider = ShadowPolicy(decider, with_memory.policy)
     again = _steps_again(world, decider, records[start:])
     if isinstance(decider, ShadowPolicy) and decider.disagreements:
-        raise _memory_error(decider, source=source, name=header.policy)
+        (step, brigade), (made, own) = next(iter(decider.disagreements.items()))
+        name, found = header.policy, f"{ACTION_NAMES[made.action]} is recorded"
+        raise PolicyError(
+            f"{source}: step {step}, brigade {brigade}: {found}, but {name} now decides {ACTION_NAMES[own.action]},"
+            f" so it cannot continue the run; --policy {name} starts it afresh"
+        )
     return Resumed(
         world=world,
         recorded=MemoryRecording(header, recording.city, records[start:]),
@@ -140,11 +140,3 @@ def _steps_again(world: World, decider: Policy, records: Sequence[StepRecord]) -
     while world.step_number < records[-1].step and not (world.terminated or world.truncated):
         again.append(observer.record(world.step(decider)))
     return again
-
-
-def _memory_error(shadow: ShadowPolicy, *, source: str, name: str) -> PolicyError:
-    (step, brigade), (recorded, own) = next(iter(shadow.disagreements.items()))
-    return PolicyError(
-        f"{source}: step {step}, brigade {brigade}: {ACTION_NAMES[recorded.action]} is recorded, but {name} now decides"
-        f" {ACTION_NAMES[own.action]}, so it cannot continue the run; --policy {name} starts it afresh"
-    )

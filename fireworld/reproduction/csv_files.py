@@ -17,16 +17,9 @@ from fireworld.reproduction.study import LearningCurve, Study
 _ESTIMATE = ("mean", "low_95", "high_95", "interquartile_mean", "repetitions", "seeds")
 
 CSV_FILES: Final = (
-    "table-1.csv",
-    "table-2.csv",
-    "table-3.csv",
-    "cooperation.csv",
-    "controls.csv",
-    "comparisons.csv",
-    "training.csv",
-    "episodes.csv",
-    "runs.csv",
-)
+    "table-1.csv", "table-2.csv", "table-3.csv", "cooperation.csv", "controls.csv", "comparisons.csv",
+    "training.csv", "episodes.csv", "runs.csv",
+)  # fmt: skip
 """Names of the files."""
 
 
@@ -77,18 +70,21 @@ def _controls_file(tables: PaperTables) -> str:
 
 
 def _comparisons_file(tables: PaperTables) -> str:
-    head = ("team", "other", "quantity", *_ESTIMATE)
-    rows: list[tuple[object, ...]] = []
-    for row in tables.comparisons:
-        rows.append((row.team, row.other, "difference of score / max", *_spread(row.difference)))
-        rows.append((row.team, row.other, "probability of improvement", *_spread(row.improvement)))
-    return _csv(head, rows)
+    rows = [
+        (row.team, row.other, quantity, *_spread(found))
+        for row in tables.comparisons
+        for quantity, found in (
+            ("difference of score / max", row.difference),
+            ("probability of improvement", row.improvement),
+        )
+    ]
+    return _csv(("team", "other", "quantity", *_ESTIMATE), rows)
 
 
 def _training_file(curves: Iterable[LearningCurve]) -> str:
     rows: list[tuple[object, ...]] = []
     for curve in curves:
-        ended = int(curve.converged), curve.score, curve.score_max, float(curve.total_reward[-1])
+        ended = curve.converged, curve.score, curve.score_max, float(curve.total_reward[-1])
         rows.append((curve.repetition, curve.team, curve.scenario, curve.n_episodes, *ended))
     return _csv(("repetition", "team", "scenario", "episodes", "converged", "score", "max", "return"), rows)
 
@@ -115,12 +111,8 @@ def _runs_file(study: Study) -> str:
         for team, repetitions in teams.items():
             for number, outcomes in enumerate(repetitions, 1):
                 values = zip(outcomes.seed.tolist(), outcomes.rows, strict=True)
-                rows += [(scenario, team, number, seed, *map(_plain, row)) for seed, row in values]
+                rows += [(scenario, team, number, seed, *row) for seed, row in values]
     return _csv(("scenario", "team", "repetition", "seed", *COLUMNS), rows)
-
-
-def _plain(value: object) -> object:
-    return int(value) if isinstance(value, bool) else value
 
 
 def _spread(found: Estimate) -> tuple[object, ...]:
@@ -132,5 +124,5 @@ def _csv(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(head)
-    writer.writerows(rows)
+    writer.writerows([int(value) if isinstance(value, bool) else value for value in row] for row in rows)
     return text.getvalue()

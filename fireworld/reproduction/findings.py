@@ -39,7 +39,10 @@ def findings(study: Study, tables: PaperTables) -> list[Finding]:
     """Return what a study found, the paper's main claim first."""
     return [
         _cooperation(tables),
-        *(_control(row) for row in tables.comparisons[1:]),
+        *(
+            Finding(_sentence(row.question).rstrip("."), _answer(row.difference), _sentence(_difference(row)))
+            for row in tables.comparisons[1:]
+        ),
         _uncontrolled(study, tables),
         _more_brigades(tables),
         _convergence(tables),
@@ -75,12 +78,6 @@ def _cooperation(tables: PaperTables) -> Finding:
         "reproduced" if main.difference.above_zero else "open" if unsure else "not reproduced",
         f"Share of the greatest score, mean over the three tests: {_difference(main)}; in the paper it is "
         f"{theirs:+.2f}. {_directions(tables.tests)} {_sentence(tally(cells_of(tables.tests)))}",
-    )
-
-
-def _control(row: TeamComparison) -> Finding:
-    return Finding(
-        _sentence(row.question).rstrip("."), _answer(row.difference, "yes", "no"), f"{_sentence(_difference(row))}"
     )
 
 
@@ -133,10 +130,8 @@ def _same_tables(tables: PaperTables) -> Finding:
     )
 
 
-def _answer(difference: Estimate, yes: Answer, no: Answer) -> Answer:
-    if difference.above_zero:
-        return yes
-    return no if difference.below_zero else "open"
+def _answer(difference: Estimate) -> Answer:
+    return "yes" if difference.above_zero else "no" if difference.below_zero else "open"
 
 
 def _degree(n_met: int, n_all: int) -> Answer:

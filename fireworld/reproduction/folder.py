@@ -88,11 +88,7 @@ class ReproductionFolder:
             raise OutputError(f"{self.path}: cannot be made: {error.strerror or error}") from None
 
     def write(self, name: str, content: bytes | str) -> None:
-        """Write a file of the folder.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
+        """Write a file of the folder; errors as for `write_file`."""
         write_file(self.path / name, content.encode() if isinstance(content, str) else content)
 
     def repetition(self, number: int) -> Repetition | None:
@@ -115,11 +111,7 @@ class ReproductionFolder:
         )
 
     def write_repetition(self, number: int, repetition: Repetition) -> None:
-        """Write the teams of a repetition, and then how they learned: with that it counts as done.
-
-        Raises:
-            OutputError: a file cannot be written.
-        """
+        """Write the teams of a repetition, and then how they learned: with that it counts as done."""
         teams, graduates = repetition.teams, repetition.graduates
         for name, team in teams.items():
             team.save(self._team(name, number), force=True)
@@ -163,11 +155,7 @@ class ReproductionFolder:
         }
 
     def write_tested(self, name: str, tested: Tested) -> None:
-        """Write the outcomes of a repetition's tests, or of the rules'.
-
-        Raises:
-            OutputError: the file cannot be written.
-        """
+        """Write the outcomes of a repetition's tests, or of the rules'; errors as for `write_file`."""
         content = {
             scenario: {
                 team: dict(zip(COLUMNS, map(list, zip(*found.rows, strict=True)), strict=True))
@@ -178,11 +166,7 @@ class ReproductionFolder:
         self._write(self._tests(name), content)
 
     def write_settings(self, identity: Mapping[str, Any]) -> None:
-        """Write what the work is begun with.
-
-        Raises:
-            OutputError: the file cannot be written.
-        """
+        """Write what the work is begun with; errors as for `write_file`."""
         self._write(self.path / SETTINGS, {"format": FORMAT, **identity})
 
     def check_settings(self, identity: Mapping[str, Any]) -> None:

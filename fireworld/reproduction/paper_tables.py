@@ -187,13 +187,10 @@ def _comparisons(study: Study, scenarios: Sequence[str], shares: Sequence[TeamSh
         (TOGETHER, "random", "is it better than random actions?"),
         (TOGETHER, best_rule, "is it better than the best of the rules that learn nothing (chosen on these tests)?"),
     ]
-    return [
-        TeamComparison(
-            team,
-            other,
-            question,
-            paired_difference(study.mean_share(scenarios, team), study.mean_share(scenarios, other)),
-            probability_of_improvement(study.mean_share(scenarios, team), study.mean_share(scenarios, other)),
+    made = []
+    for team, other, question in asked:
+        values = study.mean_share(scenarios, team), study.mean_share(scenarios, other)
+        made.append(
+            TeamComparison(team, other, question, paired_difference(*values), probability_of_improvement(*values))
         )
-        for team, other, question in asked
-    ]
+    return made

@@ -6,21 +6,26 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fireworld_viewer.pictures.figure_files import png_bytes
 from fireworld_viewer.pictures.maps import draw_record
+from fireworld_viewer.pictures.policy_figures import LearningPanel, draw_learning_curves
 
+from fireworld.kernels.arrays import Array
 from fireworld.policy.names import NamedPolicy
 from fireworld.policy.teams.team import Team
 from fireworld.recording.record import play
 from fireworld.records import CityRecord, StepRecord
 from fireworld.reproduction import paper
-from fireworld.reproduction.convergence_figures import draw_policy_changes, draw_returns
 from fireworld.reproduction.repetitions import Repetition
-from fireworld.reproduction.study import ALONE, TOGETHER, Study
+from fireworld.reproduction.study import ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS, LearningCurve, Study
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import CityCache
 from fireworld.simulation.prepared_run import prepare_run
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -34,45 +39,33 @@ class RecordedRun:
     last: StepRecord
 
 
-@dataclass(frozen=True, kw_only=True)
-class RunToRecord:
-    """A run to be recorded."""
-
-    scenario: str
-    team: str
-    members: Team
-    seed: int
-    path: Path
-
-    def __call__(self, cities: CityCache) -> RecordedRun:
-        """Run and record.
-
-        Raises:
-            OutputError: the recording cannot be written.
-        """
-        policy = self.members.policy()
-        named = NamedPolicy(name=self.team, digest=policy.digest, policy=policy)
-        run = prepare_run(cities.build(load_scenario(self.scenario)), named, seed=self.seed)
-        last = play(run, record=self.path, force=True).last
-        return RecordedRun(self.scenario, self.team, run.city, next(iter(run)), last)
-
-
-def runs_to_record(repetition: Repetition, *, seed: int, folder: Path) -> list[RunToRecord]:
-    """Return one run of each row of the paper's tables.
+def runs_to_record(repetition: Repetition) -> list[tuple[str, str, Team]]:
+    """Return scenario, team and its members for one run of each row of the paper's tables.
 
     In Table 1 it is the cooperative team as it was at the end of the row's scenario; in Tables 2 and 3 it is both teams
     as they are after all of their training.
     """
-    rows = [(row.scenario, TOGETHER, repetition.graduates[row.scenario]) for row in paper.TABLE_1]
-    rows += [
+    rows: list[tuple[str, str, Team]] = [
+        (row.scenario, TOGETHER, repetition.graduates[row.scenario]) for row in paper.TABLE_1
+    ]
+    return rows + [
         (row.scenario, team, repetition.teams[team])
         for row in (*paper.TABLE_2, *paper.TABLE_3)
         for team in (ALONE, TOGETHER)
     ]
-    return [
-        RunToRecord(scenario=name, team=team, members=members, seed=seed, path=folder / f"{name}-{team}.mcap")
-        for name, team, members in rows
-    ]
+
+
+def record_run(scenario: str, team: str, members: Team, *, seed: int, folder: Path, cities: CityCache) -> RecordedRun:
+    """Run and record.
+
+    Raises:
+        OutputError: the recording cannot be written.
+    """
+    policy = members.policy()
+    named = NamedPolicy(name=team, digest=policy.digest, policy=policy)
+    run = prepare_run(cities.build(load_scenario(scenario)), named, seed=seed)
+    last = play(run, record=folder / f"{scenario}-{team}.mcap", force=True).last
+    return RecordedRun(scenario, team, run.city, next(iter(run)), last)
 
 
 def pictures(study: Study, recorded: Sequence[RecordedRun]) -> dict[str, Callable[[], bytes]]:
@@ -89,6 +82,31 @@ def pictures(study: Study, recorded: Sequence[RecordedRun]) -> dict[str, Callabl
             drawn[f"{run.scenario}-before"] = partial(_map, run, run.first, "before")
         drawn[f"{run.scenario}-{run.team}"] = partial(_map, run, run.last, f"{run.team}, step {run.last.step}")
     return drawn
+
+
+def draw_returns(study: Study) -> Figure:
+    """Draw the return of every episode of Table 1's scenarios."""
+    return _draw_curves(study, "return of the episode, in thousands", lambda curve: curve.total_reward / 1000.0)
+
+
+def draw_policy_changes(study: Study) -> Figure:
+    """Draw in how many states the greedy action changed, episode by episode of Table 1's scenarios."""
+    return _draw_curves(study, "states whose best action changed", lambda curve: curve.n_changed)
+
+
+def _draw_curves(study: Study, label: str, of: Callable[[LearningCurve], Array]) -> Figure:
+    panels = [
+        LearningPanel(
+            title=row.scenario,
+            curves={
+                team: [of(curve) for curve in study.curves_of(team, row.scenario)]
+                for team in (TOGETHER, TOGETHER_WITHOUT_FLAGS)
+            },
+            marked_episode=row.convergence_episode,
+        )
+        for row in paper.TABLE_1
+    ]
+    return draw_learning_curves(panels, label=label, mark="paper converged")
 
 
 def _map(run: RecordedRun, record: StepRecord, moment: str) -> bytes:

@@ -19,7 +19,7 @@ from fireworld.reproduction.findings import Finding, caveat, findings
 from fireworld.reproduction.folder import REPORT, ReproductionFolder
 from fireworld.reproduction.measurement import Measurement, OnProgress, Parts
 from fireworld.reproduction.paper_tables import PaperTables, make_tables
-from fireworld.reproduction.recordings import pictures, runs_to_record
+from fireworld.reproduction.recordings import pictures, record_run, runs_to_record
 from fireworld.reproduction.report_page import report_page
 from fireworld.reproduction.report_text import report_text
 from fireworld.reproduction.study import Study
@@ -142,11 +142,7 @@ def reproduce(
 
 
 def _curriculum(given: Path | str) -> Curriculum:
-    """Read a curriculum.
-
-    Raises:
-        TrainingError: it cannot be read, or the brigades are not trained together in the scenarios of Table 1.
-    """
+    """Read a curriculum."""
     curriculum = load_curriculum(given)
     together = {scenario.name for stage in curriculum.stages if stage.cooperation for scenario in stage.scenarios}
     missing = [row.scenario for row in paper.TABLE_1 if row.scenario not in together]
@@ -163,12 +159,12 @@ def _carry_out(measurement: Measurement, executor: AnyExecutor) -> Reproduction:
     tables = make_tables(study)
     for name, text in csv_files(study, tables).items():
         place.write(name, text)
-    to_record = runs_to_record(first, seed=FIRST_SEED, folder=place.path / "recordings")
+    to_record = runs_to_record(first)
     parts, recorded = Parts("recording", len(to_record), on_progress), []
     for run in to_record:
         if measurement.stop.is_set():
             raise Interrupted("interrupted")
-        recorded.append(run(measurement.cities))
+        recorded.append(record_run(*run, seed=FIRST_SEED, folder=place.path / "recordings", cities=measurement.cities))
         parts.done()
     drawn, images = pictures(study, recorded), {}
     parts = Parts("drawing", len(drawn), on_progress)

@@ -55,12 +55,7 @@ class TeamTests:
 
 
 def build_tests(seeds: Sequence[int], cities: CityCache) -> TeamTests:
-    """Build the tests.
-
-    Args:
-        seeds: of the runs.
-        cities: cities built before; added to.
-    """
+    """Build the tests, whose runs have these seeds; cities that are built are added to those built before."""
     scenarios = {row.scenario: load_scenario(row.scenario) for row in (*paper.TABLE_2, *paper.TABLE_3)}
     no_water = {"parameters.brigades.power_litres": 0}
     return TeamTests(

@@ -10,10 +10,10 @@ import pytest
 
 from fireworld.evaluation.statistics import Estimate
 from fireworld.reproduction import paper
-from fireworld.reproduction.convergence_figures import draw_policy_changes, draw_returns
 from fireworld.reproduction.csv_files import CSV_FILES, csv_files
 from fireworld.reproduction.findings import caveat, findings, tally
 from fireworld.reproduction.paper_tables import APART, NEAR, WITHIN, PaperCell, make_tables
+from fireworld.reproduction.recordings import draw_policy_changes, draw_returns
 from fireworld.reproduction.report_page import report_page
 from fireworld.reproduction.study import ALONE, TOGETHER
 from tests.evaluation import synthetic

@@ -12,7 +12,6 @@ from fireworld.policy.kernel import KernelPolicy, always
 from fireworld.policy.protocol import Action, Decision, Policy
 from fireworld.recording.decisions import ForcedPolicy, RecordedDecisions, ShadowPolicy
 from fireworld.recording.explanation.spans import DecisionSpan, span_at
-from fireworld.recording.resume import has_memory
 from fireworld.records import Steps
 from fireworld.simulation.built import BuiltScenario
 from fireworld.simulation.state import copy_into, copy_world
@@ -65,7 +64,7 @@ class CounterfactualRun:
         """
         policy = self.make_policy() if self.make_policy is not None else self.recorded
         first = min(span.first for span in spans)
-        world = self._world_before(0 if has_memory(policy) else first)
+        world = self._world_before(first if policy.stateless else 0)
         own_targets = any(span.action == Action.OWN_TARGET for span in spans)
         if isinstance(policy, KernelPolicy) and self._can_compile(policy) and not own_targets:
             _run_compiled(world, policy, spans)

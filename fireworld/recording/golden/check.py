@@ -18,8 +18,7 @@ from fireworld.files import check_output
 from fireworld.junit import clean, report
 from fireworld.recording.difference_text import change_lines
 from fireworld.recording.golden.spec import GoldenSpec, prepare_golden, spec_of
-from fireworld.recording.golden.store import SUFFIX, make_folder, store_recording, text_path
-from fireworld.recording.golden.text import is_text_of
+from fireworld.recording.golden.store import SUFFIX, is_text_of, make_folder, store_recording, text_path
 from fireworld.recording.record import run_prepared
 from fireworld.recording.run import Run
 from fireworld.records import RunHeader
@@ -186,13 +185,12 @@ def compare_golden(path: Path, fresh: Run, spec: GoldenSpec) -> GoldenResult:
 
 def goldens_junit(results: Sequence[GoldenResult]) -> bytes:
     """Return results as JUnit XML: a difference is a failure, what cannot be run an error."""
-    return report("fireworld golden", "fireworld golden", [_case(result) for result in results])
-
-
-def _case(result: GoldenResult) -> Element:
-    case = Element("testcase", {"classname": "golden", "name": clean(result.name), "time": "0"})
-    if result.result != "same":
-        kind = "error" if result.difference is None else "failure"
-        fault = SubElement(case, kind, {"message": clean(result.sentence), "type": result.result})
-        fault.text = clean("\n".join((result.sentence, *result.changes)))
-    return case
+    cases = []
+    for result in results:
+        case = Element("testcase", {"classname": "golden", "name": clean(result.name), "time": "0"})
+        if result.result != "same":
+            kind = "error" if result.difference is None else "failure"
+            fault = SubElement(case, kind, {"message": clean(result.sentence), "type": result.result})
+            fault.text = clean("\n".join((result.sentence, *result.changes)))
+        cases.append(case)
+    return report("fireworld golden", "fireworld golden", cases)

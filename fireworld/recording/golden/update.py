@@ -62,7 +62,11 @@ def add_golden(
         OutputError: there is such a golden already, the name is not possible, or it cannot be written.
         ScenarioError, CityError, PolicyError, TrainingError: it cannot be run.
     """
-    path = folder / f"{_default_name(scenario, policy, seed) if name is None else _checked_name(name)}{SUFFIX}"
+    if name is None:
+        name = _default_name(scenario, policy, seed)
+    elif not re.fullmatch(r"[\w.+=-]+", name) or name.startswith((".", "-")):
+        raise OutputError(expected("name", "", "letters, digits and any of _ . + = -", name))
+    path = folder / f"{name}{SUFFIX}"
     if path.exists():
         hint = "`fireworld golden update` records it anew; or try another name"
         raise OutputError(expected(str(path), "", "a name that is free", "an existing golden", hint))
@@ -139,12 +143,6 @@ def _update(result: GoldenResult) -> GoldenUpdate:
         store_golden(result.path, result.fresh)
         return GoldenUpdate(result.name, "recording", result.sentence)
     return GoldenUpdate(result.name, "text" if store_text(result.path) else "nothing", "")
-
-
-def _checked_name(name: str) -> str:
-    if not re.fullmatch(r"[\w.+=-]+", name) or name.startswith((".", "-")):
-        raise OutputError(expected("name", "", "letters, digits and any of _ . + = -", name))
-    return name
 
 
 def _default_name(scenario: str | Path, policy: str, seed: int) -> str:

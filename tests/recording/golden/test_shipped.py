@@ -10,10 +10,8 @@ import pytest
 from fireworld_recorder.reader import open_log
 
 from fireworld.recording.golden.check import check_golden, find_goldens
-from fireworld.recording.golden.kinds import scenario_kind
 from fireworld.recording.golden.spec import spec_of
-from fireworld.recording.golden.store import text_path
-from fireworld.recording.golden.text import golden_text
+from fireworld.recording.golden.store import golden_text, scenario_kind, text_path
 from fireworld.recording.replay import recorded_scenario
 from fireworld.records import EVENT_KINDS
 from fireworld.scenario import load_scenario, scenario_names
