@@ -109,12 +109,12 @@ class World:
         """Run one step: the brigades look and decide one after another, then come the phases of `finish_step`."""
         self.step_number += 1
         self._look()
-        brigades, before = self.state.brigades, (self.state.brigades.action.copy(), self.state.brigades.target.copy())
+        before, target_before = self.state.brigades.action.copy(), self.state.brigades.target.copy()
         try:
-            choices = self._decide(complete(policy))
+            choices = self._decide(complete(policy), before, target_before)
         except BaseException:  # nothing but the choices has changed: the step can be tried again
             self.step_number -= 1
-            brigades.action[:], brigades.target[:] = before
+            self.state.brigades.action[:], self.state.brigades.target[:] = before, target_before
             raise
         state = self.state
         finish_step(
@@ -167,12 +167,12 @@ class World:
             state.sites,
         )
 
-    def _decide(self, policy: Policy) -> Choices:
+    def _decide(self, policy: Policy, before: Array, target_before: Array) -> Choices:
+        """Ask for all decisions; what the brigades did in the last step is (b,) `before` and `target_before`."""
         features = np.zeros((self.n_brigades, 8), dtype=np.int64)
         states = np.full(self.n_brigades, -1, dtype=np.int64)
         decisions = [NO_DECISION] * self.n_brigades
         brigades, sites, thresholds = self.state.brigades, self.state.sites, self.constants.observation
-        before, target_before = brigades.action.copy(), brigades.target.copy()
         shown, known = (brigades.action, brigades.target) if thresholds.in_turn else (before, target_before)
         for brigade in range(self.n_brigades):
             states[brigade] = observe(brigade, shown, brigades.site, sites, thresholds, features[brigade])
