@@ -11,6 +11,7 @@ from typing import Any, Final
 from fireworld.errors import FireworldError, expected
 
 SEED_MAX: Final = 2**32 - 1
+STEPS_MAX: Final = 100_000
 
 
 class ArgumentError(FireworldError, ValueError):
@@ -36,6 +37,11 @@ def whole_number(name: str, value: object, *, least: int, most: int) -> int:
 def seed_of(value: object, *, name: str = "seed") -> int:
     """Return the seed of a run; errors as for `whole_number`."""
     return whole_number(name, value, least=0, most=SEED_MAX)
+
+
+def last_step_of(value: object) -> int | None:
+    """Return the step to stop after, None for the scenario's own; errors as for `whole_number`."""
+    return None if value is None else whole_number("steps", value, least=1, most=STEPS_MAX)
 
 
 def path_of(name: str, value: object) -> Path:

@@ -7,13 +7,12 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Event
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from fireworld_recorder.chain import Digest
 from fireworld_recorder.writer import PARTIAL_SUFFIX, LogWriter
 
-from fireworld.arguments import path_of, seed_of, settings_of, whole_number
+from fireworld.arguments import last_step_of, path_of, seed_of, settings_of
 from fireworld.errors import PolicyError
 from fireworld.interrupt import Interrupted, gentle_interrupt
 from fireworld.records import MemoryRecording, StepRecord, Steps
@@ -24,8 +23,6 @@ if TYPE_CHECKING:
     from fireworld.policy.protocol import Policy
     from fireworld.recording.run import Run
     from fireworld.scenario import Scenario
-
-STEPS_MAX: Final = 100_000
 
 
 @dataclass(frozen=True)
@@ -50,7 +47,6 @@ def play(
     force: bool = False,
     scene: Scene | None = None,
     on_step: Callable[[StepRecord], object] = lambda _: None,
-    stop: Event | None = None,
 ) -> Played:
     """Run a prepared run to its end, or until Ctrl-C; every step is recorded before `on_step` sees it.
 
@@ -60,7 +56,6 @@ def play(
         force: replace an existing log.
         scene: what the log holds besides, for other tools.
         on_step: called after each step.
-        stop: set it, and the run ends after the step under way.
 
     Raises:
         PolicyError: the policy failed; the steps before are in the partial log.
@@ -79,7 +74,7 @@ def play(
                 sink.write(step)
                 on_step(step)
                 last = step
-                if interrupted.is_set() or (stop is not None and stop.is_set()):
+                if interrupted.is_set():
                     break
     except (PolicyError, KeyboardInterrupt) as error:
         where = ""
@@ -130,7 +125,7 @@ def run(
     from fireworld.simulation.prepared_run import prepare_run
 
     seed = seed_of(seed)
-    n_steps_max = None if steps is None else whole_number("steps", steps, least=1, most=STEPS_MAX)
+    n_steps_max = last_step_of(steps)
     path = None if record is None else path_of("record", record)
     chosen = find_scenario(scenario).with_values(settings_of(set))
     named = find_policy(policy)

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from fireworld.arguments import ArgumentError, seed_of, settings_of, whole_number
+from fireworld.arguments import ArgumentError, last_step_of, seed_of, settings_of
 from fireworld.errors import LogError, PolicyError, expected
 from fireworld.outcome import Outcome
 from fireworld.policy.asking import begin
@@ -21,7 +21,6 @@ from fireworld.scenario import Scenario, find_scenario
 from fireworld.simulation.built import BuiltScenario, build_scenario
 from fireworld.simulation.state import named_arrays, restore_snapshot
 
-STEPS_MAX: Final = 100_000
 _SNAPSHOT: Final = "fireworld-snapshot/1"
 
 
@@ -211,6 +210,6 @@ def world(
         ArgumentError: an argument that makes no sense.
     """
     seed = seed_of(seed)
-    n_steps_max = None if steps is None else whole_number("steps", steps, least=1, most=STEPS_MAX)
+    n_steps_max = last_step_of(steps)
     chosen = find_scenario(scenario).with_values(settings_of(set))
     return Session(build_scenario(chosen), seed=seed, n_steps_max=n_steps_max)
