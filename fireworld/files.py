@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -151,9 +151,3 @@ def write_file(path: Path, data: bytes) -> None:
     """
     with written_beside(path) as partial:
         partial.write_bytes(data)
-
-
-def write_files(contents: Mapping[Path, bytes]) -> None:
-    """Write several files, each beside and renamed; errors as for `write_file`."""
-    for path, data in contents.items():
-        write_file(path, data)
