@@ -377,3 +377,12 @@ def test_the_docs_example_is_train_1():
 def test_resolved_content_is_plain_json():
     resolved = load_scenario("default").resolved
     assert json.loads(json.dumps(resolved)) == resolved
+
+
+def test_the_same_scenario_from_yaml_values_and_keywords(tmp_path):
+    values = {"city": {"generated": {"columns": 6, "rows": 4}}, "fires": [{"at": [0.5, 0.5]}], "steps": 9}
+    made = [Scenario(**values), Scenario.from_dict(values), Scenario.from_yaml(json.dumps(values), folder=tmp_path)]
+    assert len({scenario.digest for scenario in made}) == 1
+    assert made[0].steps == 9
+    with pytest.raises(ScenarioError, match=r"^Scenario: steps: expected a whole number from 1 to 100000, got 0$"):
+        Scenario(**{**values, "steps": 0})
