@@ -201,7 +201,8 @@ def test_the_compiled_episode_learns_as_the_textbook(seed, n_steps_max, terminat
     else:  # the choices that would come next
         world.step_number += 1
         world._look()
-        world._decide(complete(textbook))
+        brigades = world.state.brigades
+        world._decide(complete(textbook), brigades.action.copy(), brigades.target.copy())
     np.testing.assert_array_equal(learner.tables, textbook.tables)
     assert learner.visits.sum() > 40
     assert n_refilling > 5
