@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-from typing import Final
+from dataclasses import replace
+from typing import Any, Final
 
-from fireworld.records import FORMAT, STEP_TOPICS, CityRecord, Snapshot, StepRecord
+from fireworld.records import STEP_TOPICS, CityRecord, StepRecord
 from fireworld_recorder.codec import Buffer, encode
+from fireworld_recorder.kind import RUN, LogKind
 from fireworld_recorder.schema import Commit
 
-UNCHAINED: Final = frozenset({Snapshot.topic, Commit.topic})
-"""Topics whose messages `Chain.add` does not take: derived state, and the commit itself."""
 SCENE_PREFIX: Final = "/scene/"
 """What the topics begin with that show a step to other tools: derived from it, not chained, any number in a step."""
 
@@ -18,28 +18,34 @@ _PARTS: Final = [(topic.topic, topic.topic[1:]) for topic in STEP_TOPICS]
 
 
 class Chain:
-    """The chain of hashes of a run, message by message.
+    """The chain of hashes of a run or a training, message by message.
 
     h_0 = sha256(format name, /city); h_t = sha256(h_(t-1), then topic, zero byte, length as 8 little-endian bytes
     and bytes of every message of step t but /snapshot and /scene/..., and at last of its /commit without the hash).
+    A training has /plan instead of /city, and parts instead of steps, of which /tables are left out.
     """
 
-    def __init__(self, city: Buffer) -> None:
-        self.hash = hashlib.sha256(FORMAT.encode() + bytes(city)).digest()
+    def __init__(self, first: Buffer, kind: LogKind = RUN) -> None:
+        self.hash = hashlib.sha256(kind.format.encode() + bytes(first)).digest()
+        self._unchained = kind.unchained
         self._parts: list[Buffer] = []  # of the step under way: one long call of the hash beats many short ones
 
     def add(self, topic: str, data: Buffer) -> None:
-        """Add a message of the step under way; those of UNCHAINED topics and of the scene are left out."""
-        if topic not in UNCHAINED and not topic.startswith(SCENE_PREFIX):
+        """Add a message of the step under way but /commit; what follows from others and the scene are left out."""
+        if topic not in self._unchained and not topic.startswith(SCENE_PREFIX):
             self._update(topic, data)
 
     def commit(self, *, step: int, terminated: bool, truncated: bool) -> Commit:
         """End the step under way and return its commit."""
-        open_commit = Commit(step=step, terminated=terminated, truncated=truncated, hash=b"")
-        self._update(Commit.topic, encode(open_commit))
+        commit: Commit = self.seal(Commit(step=step, terminated=terminated, truncated=truncated, hash=b""))
+        return commit
+
+    def seal(self, commit: Any) -> Any:
+        """End what is under way with a commit whose hash is empty; return the commit with its hash."""
+        self._update(commit.topic, encode(commit))
         self.hash = hashlib.sha256(b"".join((self.hash, *self._parts))).digest()
         self._parts.clear()
-        return Commit(step=step, terminated=terminated, truncated=truncated, hash=self.hash)
+        return replace(commit, hash=self.hash)
 
     def _update(self, topic: str, data: Buffer) -> None:
         self._parts += (topic.encode(), b"\0", len(data).to_bytes(8, "little"), data)

@@ -1,4 +1,4 @@
-"""The run header: as metadata that checks itself, and against the header of another run.
+"""The header of a log: as metadata that checks itself, and against the header of another run.
 
 As metadata it is text keys and values, and the hashes of the attachments.
 """
@@ -8,62 +8,64 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 from collections.abc import Mapping
-from typing import Final
+from typing import Any, Final
 
 from fireworld.errors import LogError, expected
-from fireworld.records import FORMAT, RunHeader
+from fireworld.records import RunHeader
+from fireworld_recorder.kind import NOUNS, RUN, LogKind
 
-METADATA_NAME: Final = "fireworld.run"
 PROFILE: Final = "fireworld"
 _ATTACHMENT: Final = "attachment:"
 _DIGEST_SHOWN: Final = 12
-_FIELDS: Final = tuple(item for item in dataclasses.fields(RunHeader) if item.name != "attachments")
 
 
 class ForeignError(LogError):
     """A file that is no log, or one of another format."""
 
 
-def to_metadata(header: RunHeader) -> dict[str, str]:
+def to_metadata(header: Any, kind: LogKind = RUN) -> dict[str, str]:
     """Write a header as text, by rising key, with a checksum over all the rest (MCAP has none for metadata)."""
-    metadata = {item.name: str(getattr(header, item.name)) for item in _FIELDS}
-    metadata["format"] = FORMAT
+    metadata = {item.name: str(getattr(header, item.name)) for item in _fields(kind)}
+    metadata["format"] = kind.format
     for name, data in header.attachments.items():
         metadata[_ATTACHMENT + name] = hashlib.sha256(data).hexdigest()
     metadata["checksum"] = _checksum(metadata)
     return dict(sorted(metadata.items()))
 
 
-def check_format(found: str) -> None:
-    """Check that a log is of the format that this version reads.
+def check_format(found: str, kind: LogKind = RUN) -> None:
+    """Check that a log is of the kind and version that are to be read.
 
     Raises:
         ForeignError: it is not.
     """
-    if found == FORMAT:
+    if found == kind.format:
         return
     name, _, major = found.partition("/")
-    ours_name, _, ours = FORMAT.partition("/")
+    ours_name, _, ours = kind.format.partition("/")
     newer = name == ours_name and major.isdecimal() and int(major) > int(ours)
     hint = "it was written by a newer fireworld: try to upgrade" if newer else ""
-    raise ForeignError(expected("format", "", FORMAT, found, hint))
+    if name != ours_name and name in NOUNS:
+        hint = f"it is the log of a {NOUNS[name]}, not of a {kind.noun}"
+    raise ForeignError(expected("format", "", kind.format, found, hint))
 
 
-def from_metadata(metadata: Mapping[str, str], attachments: Mapping[str, bytes]) -> RunHeader:
+def from_metadata(metadata: Mapping[str, str], attachments: Mapping[str, bytes], kind: LogKind = RUN) -> Any:
     """Read a header and the attachments it names; keys of later versions are ignored.
 
     Args:
-        metadata: the metadata `fireworld.run`.
+        metadata: that of the log's kind.
         attachments: every attachment of the log; those that the header does not name are left out.
+        kind: of the log.
 
     Raises:
         LogError: another format, a value that was changed, an attachment that is lost or was changed.
     """
-    check_format(metadata.get("format", ""))
+    check_format(metadata.get("format", ""), kind)
     if metadata.get("checksum") != _checksum(metadata):
-        raise LogError(expected(METADATA_NAME, "", "its own checksum", "other bytes", "the header is damaged"))
+        raise LogError(expected(kind.metadata_name, "", "its own checksum", "other bytes", "the header is damaged"))
     values: dict[str, object] = {}
-    for item in _FIELDS:
+    for item in _fields(kind):
         text = metadata.get(item.name)
         if text is None and item.default is dataclasses.MISSING:
             raise LogError(expected(item.name, "", "a value in the header", "none"))
@@ -76,12 +78,12 @@ def from_metadata(metadata: Mapping[str, str], attachments: Mapping[str, bytes])
             if name not in attachments or hashlib.sha256(attachments[name]).hexdigest() != digest:
                 raise LogError(expected(name, "", "the attachment as it was recorded", "other bytes or none"))
             named[name] = attachments[name]
-    return RunHeader(**values, attachments=named)  # type: ignore[arg-type]  # checked field by field above
+    return kind.header_type(**values, attachments=named)
 
 
 def header_differences(a: RunHeader, b: RunHeader) -> dict[str, tuple[str | int, str | int]]:
     """Return what the runs were asked to do differently; attachments are covered by the digests."""
-    pairs = {item.name: (getattr(a, item.name), getattr(b, item.name)) for item in _FIELDS}
+    pairs = {item.name: (getattr(a, item.name), getattr(b, item.name)) for item in _fields(RUN)}
     return {name: pair for name, pair in pairs.items() if pair[0] != pair[1]}
 
 
@@ -95,6 +97,10 @@ def check_same_scenario(a: RunHeader, b: RunHeader, *, names: tuple[str, str]) -
         raise LogError(
             f"cannot compare runs of different scenarios, {first} and {second}; try --any-scenario if that is meant"
         )
+
+
+def _fields(kind: LogKind) -> tuple[dataclasses.Field[Any], ...]:
+    return tuple(item for item in dataclasses.fields(kind.header_type) if item.name != "attachments")
 
 
 def _integer(key: str, text: str) -> int:

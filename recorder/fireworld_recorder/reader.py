@@ -49,7 +49,7 @@ class Log(RecordingBase):
         self.path = path
         self.found = found
         self.header: RunHeader = found.header
-        self.city: CityRecord = decode(CityRecord, found.city)
+        self.city: CityRecord = decode(CityRecord, found.first)
         self.digest = found.hash.hex()
         """The hash of the last committed step: the identity of the run up to there, 64 hexadecimal digits."""
         self.state: State = found.state

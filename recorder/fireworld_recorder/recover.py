@@ -46,7 +46,7 @@ def recover(path: Path | str, output: Path | str, *, force: bool = False) -> Rec
         metadata=log.found.metadata,
         attachments=log.header.attachments,
         channels=channels_of(log),
-        city=log.found.city,
+        city=log.found.first,
         force=force,
         scratch_suffix=".recovering",
     )

@@ -4,29 +4,27 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import IO, Final, Literal, NamedTuple
+from typing import IO, Any, Final, Literal, NamedTuple
 
 import zstandard
 from mcap.opcode import Opcode
 
 from fireworld.errors import LogError, expected
-from fireworld.records import STEP_SECONDS, CityRecord, RunHeader, Snapshot
+from fireworld.records import Snapshot
 from fireworld_recorder import container
 from fireworld_recorder.chain import SCENE_PREFIX, Chain
 from fireworld_recorder.codec import decode
 from fireworld_recorder.container import ChannelRecord, Fields, Record, SchemaRecord, TruncatedError
-from fireworld_recorder.header import METADATA_NAME, PROFILE, ForeignError, check_format, from_metadata
-from fireworld_recorder.schema import Commit
+from fireworld_recorder.header import PROFILE, ForeignError, check_format, from_metadata
+from fireworld_recorder.kind import RUN, LogKind
 
 State = Literal["complete", "partial", "damaged"]
 # Plain integers, because comparing enumeration members takes as long as decoding a message.
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = (
     int(opcode) for opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK)
 )
-_STEP_MAX: Final = (2**64 - 1) // (STEP_SECONDS * 1_000_000_000)
-"""The last step that the time of a message can hold."""
 _BARE: Final = frozenset({_SCHEMA, _CHANNEL, _MESSAGE})
 
 
@@ -47,12 +45,13 @@ class TopicSize:
 
 @dataclass
 class Scan:
-    """What one pass over a log has found; it grows step by step."""
+    """What one pass over a log has found; it grows step by step, or part by part of a training."""
 
+    kind: LogKind
     n_bytes: int
     metadata: Mapping[str, str]
-    header: RunHeader
-    city: bytes
+    header: Any
+    first: bytes
     schemas: Mapping[int, SchemaRecord]
     channels: Mapping[int, ChannelRecord]
     hash: bytes
@@ -68,15 +67,17 @@ class Scan:
         """What is wrong and how far the log is good; None if nothing is wrong."""
         if self.fault is None:
             return None
-        good = f"good up to step {self.steps[-1]}" if self.steps else "no step is good"
+        unit = self.kind.unit
+        good = f"good up to {unit} {self.steps[-1]}" if self.steps else f"no {unit} is good"
         return f"{self.state}: {self.fault}; {good}"
 
-    def add(self, commit: Commit, start: Start, sizes: Mapping[str, TopicSize]) -> None:
+    def add(self, commit: Any, start: Start, sizes: Mapping[str, TopicSize]) -> None:
         """Add a step whose hash fits."""
-        if not 0 <= commit.step <= _STEP_MAX:
-            raise LogError(f"a step has the number {commit.step}")
+        unit = self.kind.unit
+        if not 0 <= commit.step <= (2**64 - 1) // (self.kind.seconds * 1_000_000_000):  # what a message's time can hold
+            raise LogError(f"a {unit} has the number {commit.step}")
         if self.steps and commit.step <= self.steps[-1]:
-            raise LogError(f"step {commit.step} follows step {self.steps[-1]}")
+            raise LogError(f"{unit} {commit.step} follows {unit} {self.steps[-1]}")
         self.hash = commit.hash
         self.steps.append(commit.step)
         self.starts.append(start)
@@ -88,40 +89,42 @@ class Scan:
                 self.snapshots.append(commit.step)
 
 
-def scan(path: Path) -> Scan:
+def scan(path: Path, kind: LogKind = RUN) -> Scan:
     """Read a whole log once, holding one chunk at a time.
 
     Raises:
-        LogError: the file cannot be read, is no log of this format, or its header or city are lost.
+        LogError: the file cannot be read, is no log of this kind, or its header or city are lost.
     """
     try:
         with path.open("rb") as file:
             n_bytes = file.seek(0, 2)
             file.seek(0)
-            return _scan(str(path), _Stream(file, n_bytes))
+            return _scan(str(path), _Stream(file, n_bytes, kind))
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror}") from error
 
 
 def _scan(path: str, stream: _Stream) -> Scan:
-    stream_of_messages = stream.messages()
+    stream_of_messages, kind = stream.messages(), stream.kind
     try:
-        city = _read_city(stream_of_messages)
-        header = from_metadata(stream.metadata, stream.attachments)
+        first = _read_first(stream_of_messages, kind.first_type)
+        header = from_metadata(stream.metadata, stream.attachments, kind)
     except ForeignError as error:
         raise LogError(f"{path}: {error}") from error
     except LogError as error:
-        raise LogError(f"{path}: {error}; without header and city nothing can be read") from error
-    chain = Chain(city)
+        lost = f"header and {kind.first_type.topic.removeprefix('/')}"
+        raise LogError(f"{path}: {error}; without {lost} nothing can be read") from error
+    chain = Chain(first, kind)
     found = Scan(
+        kind=kind,
         n_bytes=stream.n_bytes,
         metadata=stream.metadata,
         header=header,
-        city=city,
+        first=first,
         schemas=stream.schemas,
         channels=stream.channels,
         hash=chain.hash,
-        topics={CityRecord.topic: TopicSize(1, len(city))},
+        topics={kind.first_type.topic: TopicSize(1, len(first))},
     )
     try:
         _follow(found, chain, stream_of_messages)
@@ -131,14 +134,14 @@ def _scan(path: str, stream: _Stream) -> Scan:
     return found
 
 
-def _read_city(stream_of_messages: Iterator[tuple[str, memoryview, Start]]) -> bytes:
-    """Take the first message, which must be a city."""
+def _read_first(stream_of_messages: Iterator[tuple[str, memoryview, Start]], first_type: type[Any]) -> bytes:
+    """Take the first message, which must be of a type: the city of a run."""
     for topic, payload, _ in stream_of_messages:
-        if topic != CityRecord.topic:
-            raise LogError(f"expected {CityRecord.topic} first, got {topic!r}")
-        decode(CityRecord, payload)
+        if topic != first_type.topic:
+            raise LogError(f"expected {first_type.topic} first, got {topic!r}")
+        decode(first_type, payload)
         return bytes(payload)
-    raise LogError(f"expected {CityRecord.topic} first, got no message")
+    raise LogError(f"expected {first_type.topic} first, got no message")
 
 
 def _follow(found: Scan, chain: Chain, stream_of_messages: Iterator[tuple[str, memoryview, Start]]) -> None:
@@ -148,22 +151,21 @@ def _follow(found: Scan, chain: Chain, stream_of_messages: Iterator[tuple[str, m
     for topic, payload, place in stream_of_messages:
         start = start or place
         if topic in sizes and not topic.startswith(SCENE_PREFIX):
-            raise LogError(f"a step holds {topic} twice")
+            raise LogError(f"a {found.kind.unit} holds {topic} twice")
         size = sizes.setdefault(topic, TopicSize())
         size.n_messages += 1
         size.n_bytes += len(payload)
-        if topic != Commit.topic:
+        if topic != found.kind.commit_type.topic:
             chain.add(topic, payload)
             continue
-        commit = decode(Commit, payload)
-        sealed = chain.commit(step=commit.step, terminated=commit.terminated, truncated=commit.truncated)
-        if sealed.hash != commit.hash:
-            raise LogError(f"the hash of step {commit.step} does not fit")
+        commit = decode(found.kind.commit_type, payload)
+        if chain.seal(replace(commit, hash=b"")).hash != commit.hash:
+            raise LogError(f"the hash of {found.kind.unit} {commit.step} does not fit")
         found.add(commit, start, sizes)
         start = None
         sizes.clear()
     if start is not None:
-        raise LogError("the last step is not committed")
+        raise LogError(f"the last {found.kind.unit} is not committed")
 
 
 def messages(
@@ -196,8 +198,9 @@ def _topic_and_payload(message: memoryview, channels: Mapping[int, ChannelRecord
 class _Stream:
     """The messages of a file in order; collects what else is in the file on the way, and checks every checksum."""
 
-    def __init__(self, file: IO[bytes], n_bytes: int) -> None:
+    def __init__(self, file: IO[bytes], n_bytes: int, kind: LogKind) -> None:
         self.n_bytes = n_bytes
+        self.kind = kind
         self.metadata: dict[str, str] = {}
         self.attachments: dict[str, bytes] = {}
         self.schemas: dict[int, SchemaRecord] = {}
@@ -235,11 +238,11 @@ class _Stream:
             profile, library = fields.text(), fields.text()
             if profile != PROFILE:
                 raise ForeignError(expected("profile", "", PROFILE, profile, "this is no fireworld log"))
-            if library.startswith("fireworld-log/"):  # other tools that rewrite a log put their own name here
-                check_format(library)
+            if library.startswith("fireworld-"):  # other tools that rewrite a log put their own name here
+                check_format(library, self.kind)
         elif record.opcode == Opcode.METADATA:
             fields = Fields(record.body)
-            if fields.text() == METADATA_NAME:
+            if fields.text() == self.kind.metadata_name:
                 self.metadata = fields.mapping()
         elif record.opcode == Opcode.ATTACHMENT:
             name, data = container.read_attachment(record.body)

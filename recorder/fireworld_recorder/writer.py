@@ -12,16 +12,16 @@ from typing import Final, NamedTuple, Protocol, Self
 
 from fireworld.errors import OutputError, expected
 from fireworld.files import check_output
-from fireworld.records import FORMAT, STEP_SECONDS, CityRecord, RunHeader, Snapshot, StepRecord
+from fireworld.records import CityRecord, RunHeader, Snapshot, StepRecord
 from fireworld_recorder.chain import Chain, step_messages
 from fireworld_recorder.codec import encode, encode_snapshot, long_fields
 from fireworld_recorder.container import CHUNK_BYTES_MAX
 from fireworld_recorder.container_writer import ContainerWriter
-from fireworld_recorder.header import METADATA_NAME, PROFILE, to_metadata
+from fireworld_recorder.header import PROFILE, to_metadata
+from fireworld_recorder.kind import RUN, LogKind
 from fireworld_recorder.schema import DESCRIPTORS, PACKAGE, TOPICS, Commit, message_of
 
 PARTIAL_SUFFIX: Final = ".partial"
-_STEP_NANOSECONDS: Final = STEP_SECONDS * 1_000_000_000
 CHUNK_PAYLOAD_MAX: Final = CHUNK_BYTES_MAX - (1 << 20)
 """Bytes of the messages of a chunk; the rest is for their heads, and for the schemas in the first one."""
 _MEDIA_TYPES: Final = {".yaml": "application/yaml", ".json": "application/json"}
@@ -55,14 +55,15 @@ def own_channels() -> list[Channel]:
 
 
 class StepFile:
-    """A log under way: encoded steps go in, each is on the disk when `commit` returns.
+    """A log under way: encoded steps go in, or parts of a training; each is on the disk when `commit` returns.
 
     Args:
         path: the log to make.
-        metadata: the metadata `fireworld.run`.
+        metadata: the header as text.
         attachments: files by name.
-        channels: topics that will be written; the first is /city.
-        city: the encoded city.
+        channels: topics that will be written; the first is that of the kind's first record, as /city.
+        city: that record, encoded.
+        kind: of the log.
         force: replace an existing log.
         scratch_suffix: what the name ends in until the log is complete, for a copy that nobody needs before: a
             leftover of that name is replaced, and an error leaves none. Without it the partial log is kept.
@@ -77,9 +78,10 @@ class StepFile:
         channels: Iterable[Channel],
         city: bytes,
         force: bool,
+        kind: LogKind = RUN,
         scratch_suffix: str = "",
     ) -> None:
-        self.path = path
+        self.path, self.kind = path, kind
         self.partial = path.with_name(path.name + (scratch_suffix or PARTIAL_SUFFIX))
         self.n_commits = 0
         self._force = force
@@ -89,14 +91,14 @@ class StepFile:
         check_output(path, force=force)
         if not replace_partial and self.partial.exists():
             raise OutputError(
-                f"{self.partial}: a run that did not end left this, or one is under way;"
-                " try `fireworld recover` to keep its steps, or --force to replace it"
+                f"{self.partial}: a {self.kind.noun} that did not end left this, or one is under way;"
+                f" try {self.kind.rescue}"
             )
         with self._guard():
             self._file = self.partial.open("wb" if replace_partial else "xb")
             self._open = True
-            self._writer = ContainerWriter(self._file, profile=PROFILE, library=FORMAT)
-            self._writer.add_metadata(METADATA_NAME, metadata)
+            self._writer = ContainerWriter(self._file, profile=PROFILE, library=kind.format)
+            self._writer.add_metadata(kind.metadata_name, metadata)
             for name in sorted(attachments):
                 media_type = _MEDIA_TYPES.get(Path(name).suffix, "application/octet-stream")
                 self._writer.add_attachment(name, media_type, attachments[name])
@@ -106,7 +108,7 @@ class StepFile:
                 )
                 for channel in channels
             }
-            self._write(0, [(CityRecord.topic, city)])
+            self._write(0, [(kind.first_type.topic, city)])
 
     def commit(self, step: int, messages: Iterable[tuple[str, bytes]]) -> None:
         """Write the messages of a step, /commit last; when this returns a kill cannot lose them.
@@ -165,9 +167,10 @@ class StepFile:
         chunk = [(self._channel_ids[topic], data) for topic, data in messages]
         n_bytes = sum([len(data) for _, data in chunk])
         if n_bytes > CHUNK_PAYLOAD_MAX:  # a reader would not accept it
-            wanted = f"at most {CHUNK_PAYLOAD_MAX} bytes in a step"
-            raise OutputError(expected(str(self.path), f"step {step}", wanted, f"{n_bytes} bytes"))
-        self._writer.write_chunk(chunk, time=step * _STEP_NANOSECONDS, sequence=step)
+            unit = self.kind.unit
+            wanted = f"at most {CHUNK_PAYLOAD_MAX} bytes in a {unit}"
+            raise OutputError(expected(str(self.path), f"{unit} {step}", wanted, f"{n_bytes} bytes"))
+        self._writer.write_chunk(chunk, time=step * self.kind.seconds * 1_000_000_000, sequence=step)
 
     @contextlib.contextmanager
     def _guard(self) -> Iterator[None]:
@@ -177,7 +180,7 @@ class StepFile:
         except OSError as error:
             self.abort()
             reason = "no space is left on the disk" if error.errno == errno.ENOSPC else error.strerror or str(error)
-            kept = f"; {self.n_commits} steps are safe in {self.partial}" if self._holds_steps else ""
+            kept = f"; {self.n_commits} {self.kind.unit}s are safe in {self.partial}" if self._holds_steps else ""
             raise OutputError(f"{self.path}: cannot be written: {reason}{kept}") from error
         except BaseException:
             self.abort()
