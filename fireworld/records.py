@@ -22,7 +22,7 @@ Array = NDArray[Any]
 Wire = Literal["double", "float", "sfixed32", "fixed64", "uint8", "bool", "string", "bytes"]
 Entity = Literal[
     "building", "brigade", "civilian", "site", "event", "link", "corner", "node", "street", "refuge", "hydrant",
-    "offset", "axis",
+    "offset", "axis", "scenario", "step", "choice", "table", "entry", "candidate", "fire", "weight",
 ]  # fmt: skip
 """What an array can have an entry for. An offset is where the entries of a building begin in another array; the last
 one is where they end."""
@@ -37,6 +37,10 @@ ACTIONS: Final = ("easiest", "nearest-to-civilian", "nearest-to-center", "neares
 """The paper's four actions."""
 ACTION_NAMES: Final = (*ACTIONS, "own-target")
 """All actions: the paper's four, and a target that the policy names itself. Recorded as the index here, -1 is none."""
+
+CHOICES: Final = ("none", "greedy", "explored", "kept")
+"""How a brigade that learns came to its action: it had no choice, took the best by its table, or one at random, or went
+on with what it had chosen before."""
 
 ACTIVITIES: Final = ("idle", "driving", "spraying", "driving-to-refuge", "refilling", "dead")
 """What a brigade did in a step."""

@@ -268,6 +268,15 @@ class PolicyArrays(NamedTuple):
     commit: Array  # (1,) int64, steps that a choice is kept for; 1: a new choice every step
 
 
+class Trace(NamedTuple):
+    """What a team that learns leaves behind of an episode; b brigades, k steps and one more. No rows: nothing."""
+
+    state: Array  # (b, k + 1) int32, what a brigade saw: 0..4319, -1 where it did not look
+    action: Array  # (b, k + 1) uint8, what it did; 0 where it did nothing
+    choice: Array  # (b, k + 1) uint8, how it came to that: position in fireworld.records.CHOICES
+    reward: Array  # (terms, k) float64, of each step
+
+
 class Learner(NamedTuple):
     """What a team that learns changes and remembers; b brigades."""
 
@@ -283,3 +292,4 @@ class Learner(NamedTuple):
     reward: Array  # (b,) float64, discounted reward since
     discount: Array  # (b,) float64, discount since
     td_error: Array  # (b,) float64, error of the last update
+    trace: Trace

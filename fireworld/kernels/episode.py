@@ -16,9 +16,21 @@ from fireworld.kernels.arrays import (
     PolicyArrays,
     WorldState,
 )
-from fireworld.kernels.choice import RANK_ALL, RANK_NAMED, choose, keeps_choice, table_state
+from fireworld.kernels.choice import RANK_ALL, RANK_NAMED, choose, explores, keeps_choice, table_state
 from fireworld.kernels.jit import inner, making_arrays
-from fireworld.kernels.learning import choose_and_learn, forget, go_on_and_learn, take_reward, update
+from fireworld.kernels.learning import (
+    EXPLORED,
+    GREEDY,
+    KEPT,
+    NO_CHOICE,
+    choose_and_learn,
+    forget,
+    go_on_and_learn,
+    note_choice,
+    note_reward,
+    take_reward,
+    update,
+)
 from fireworld.kernels.observation import can_choose, find_target, observe
 from fireworld.kernels.ranking import N_OF_BUILDING, rank
 from fireworld.kernels.sites import find_sites
@@ -68,13 +80,18 @@ def run_steps(  # noqa: C901, PLR0912 - handing all arrays to functions of its o
         shown, known = (brigades.action, brigades.target) if in_turn else (before, known_before)
         for brigade in range(n_brigades):
             action, target = -1, -1
+            if learning:
+                note_choice(brigade, step - 1, -1, 0, NO_CHOICE, learner)
             if can_choose(brigade, brigades.hp, brigades.refilling, sites.counts):
                 if keeps_choice(brigade, before[brigade], policy.commit[0], step):
                     action = before[brigade]
-                    if learning and step > last_step:
-                        state = observe(brigade, shown, brigades.site, sites, constants.observation, features)
-                        row = table_state(state, policy.tables.shape[1])
-                        go_on_and_learn(brigade, policy.table_of[brigade], row, action, learner)
+                    if learning:
+                        state = -1
+                        if step > last_step:
+                            state = observe(brigade, shown, brigades.site, sites, constants.observation, features)
+                            row = table_state(state, policy.tables.shape[1])
+                            go_on_and_learn(brigade, policy.table_of[brigade], row, action, learner)
+                        note_choice(brigade, step - 1, state, action, KEPT, learner)
                 elif policy.kind[brigade] >= RANK_NAMED:
                     own, weights = policy.kind[brigade] == RANK_ALL, policy.rankings[policy.table_of[brigade]]
                     action, target = rank(
@@ -101,6 +118,8 @@ def run_steps(  # noqa: C901, PLR0912 - handing all arrays to functions of its o
                     if learning:
                         row = table_state(state, policy.tables.shape[1])
                         choose_and_learn(brigade, policy.table_of[brigade], row, action, policy.epsilon[0], learner)
+                        choice = EXPLORED if explores(brigade, policy, seed, step) else GREEDY
+                        note_choice(brigade, step - 1, state, action, choice, learner)
                 if target < 0:
                     target = find_target(brigade, action, brigades, buildings, fire, geometry, sites)
             brigades.action[brigade] = action
@@ -110,6 +129,7 @@ def run_steps(  # noqa: C901, PLR0912 - handing all arrays to functions of its o
         finish_step(city, fire, people, brigades, outcome, constants, seed, step)
         if learning:
             take_reward(outcome.reward[TOTAL], learner)
+            note_reward(step - 1, outcome.reward, learner)
         if outcome.counts[BURNING] == 0:
             if learning:
                 for brigade in range(n_brigades):

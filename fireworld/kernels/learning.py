@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from fireworld.kernels.arrays import Array, Learner
-from fireworld.kernels.jit import inner
+import numpy as np
+
+from fireworld.kernels.arrays import TOTAL, Array, Learner
+from fireworld.kernels.choice import table_state
+from fireworld.kernels.jit import inner, kernel
 from fireworld.kernels.observation import N_ACTIONS
 
 SARSA, EXPECTED_SARSA, Q_LEARNING = 0, 1, 2
+NO_CHOICE, GREEDY, EXPLORED, KEPT = 0, 1, 2, 3
+"""Positions in fireworld.records.CHOICES."""
 
 
 @inner
@@ -90,3 +95,64 @@ def forget(learner: Learner) -> None:
     for brigade in range(len(learner.state)):
         learner.state[brigade] = -1
         learner.td_error[brigade] = 0.0
+
+
+@inner
+def note_choice(brigade: int, row: int, state: int, action: int, choice: int, learner: Learner) -> None:
+    """Write a choice into the trace, if there is one; row: the step, from 0."""
+    trace = learner.trace
+    if row < trace.state.shape[1]:
+        trace.state[brigade, row], trace.action[brigade, row], trace.choice[brigade, row] = state, action, choice
+
+
+@inner
+def note_reward(row: int, reward: Array, learner: Learner) -> None:
+    """Write the terms of a step's reward into the trace, if there is one."""
+    trace = learner.trace
+    if row < trace.reward.shape[1]:
+        for term in range(TOTAL):
+            trace.reward[term, row] = reward[term]
+
+
+@kernel
+def learn_again(
+    table_of: Array, epsilon: float, learner: Learner, n_steps: int, terminated: bool, values: Array, errors: Array
+) -> None:
+    """Learn an episode from its trace, without a world: the same updates in the same order.
+
+    Args:
+        table_of: (b,) the table of each brigade.
+        epsilon: probability of a random action.
+        learner: tables as they were before, memory, and the trace; tables, visits and memory change.
+        n_steps: steps of the episode.
+        terminated: it ended because nothing burned any more.
+        values: (b, n_steps + 1), becomes the value that was updated in each step, before that: the value of the choice
+            before. nan where there was no update. The last column has the updates that end an episode.
+        errors: (b, n_steps + 1), becomes the errors of these updates.
+    """
+    forget(learner)
+    trace, n_states = learner.trace, learner.tables.shape[1]
+    values[:], errors[:] = np.nan, np.nan
+    for row in range(n_steps + 1):
+        over = row == n_steps
+        for brigade in range(len(table_of)):
+            table, choice = table_of[brigade], trace.choice[brigade, row]
+            row_before, action_before = learner.state[brigade], learner.action[brigade]
+            value = learner.tables[table, row_before, action_before] if row_before >= 0 else np.nan
+            if over and terminated:
+                update(brigade, table, 0.0, learner)
+            elif choice == NO_CHOICE or (choice == KEPT and not over):
+                continue
+            else:
+                state, action = table_state(trace.state[brigade, row], n_states), trace.action[brigade, row]
+                if choice == KEPT:
+                    go_on_and_learn(brigade, table, state, action, learner)
+                else:
+                    choose_and_learn(brigade, table, state, action, epsilon, learner)
+            if row_before >= 0:
+                values[brigade, row], errors[brigade, row] = value, learner.td_error[brigade]
+        if not over:
+            total = 0.0
+            for term in range(TOTAL):
+                total += trace.reward[term, row]
+            take_reward(total, learner)

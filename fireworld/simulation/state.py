@@ -12,6 +12,7 @@ from fireworld.errors import LogError
 from fireworld.kernels.arrays import (
     COUNTS,
     SCORES,
+    TOTAL,
     Array,
     BrigadeState,
     CityArrays,
@@ -20,6 +21,7 @@ from fireworld.kernels.arrays import (
     Learner,
     Outcome,
     SiteState,
+    Trace,
     WorldState,
 )
 from fireworld.parameters import Parameters
@@ -151,6 +153,18 @@ def fresh_learner(
         reward=np.zeros(n_brigades),
         discount=np.ones(n_brigades),
         td_error=np.zeros(n_brigades),
+        trace=fresh_trace(n_brigades, 0),
+    )
+
+
+def fresh_trace(n_brigades: int, n_steps_max: int) -> Trace:
+    """Return room for what a team leaves behind of an episode; 0 steps: no room, and nothing is left."""
+    n_rows = n_steps_max + 1 if n_steps_max else 0
+    return Trace(
+        state=np.full((n_brigades, n_rows), -1, dtype=np.int32),
+        action=np.zeros((n_brigades, n_rows), dtype=np.uint8),
+        choice=np.zeros((n_brigades, n_rows), dtype=np.uint8),
+        reward=np.zeros((TOTAL, n_steps_max)),
     )
 
 

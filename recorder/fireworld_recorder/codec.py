@@ -8,7 +8,6 @@ are not such a message.
 from __future__ import annotations
 
 import contextlib
-import functools
 import math
 import struct
 from collections.abc import Iterator, Mapping
@@ -18,7 +17,7 @@ import numpy as np
 
 from fireworld.errors import LogError
 from fireworld.records import DTYPES, Array, Snapshot
-from fireworld_recorder.schema import NamedArray, message_of
+from fireworld_recorder.schema import NamedArray, message_of, varint
 
 RecordType = TypeVar("RecordType")
 Buffer = bytes | memoryview
@@ -45,17 +44,6 @@ class _Slot(NamedTuple):
     wire_type: int
     dtype: np.dtype[Any] | None  # of an array; None for a single value
     zero: Any  # what an absent value stands for
-
-
-@functools.cache
-def varint(number: int) -> bytes:
-    """Encode a non-negative integer as a protobuf varint."""
-    parts = bytearray()
-    while number >= 0x80:
-        parts.append(number & 0x7F | 0x80)
-        number >>= 7
-    parts.append(number)
-    return bytes(parts)
 
 
 class _Layout(NamedTuple):

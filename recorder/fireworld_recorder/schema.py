@@ -1,22 +1,27 @@
 """What travels in a log: one protobuf message per topic, derived from the field metadata of fireworld.records.
 
-`make docs` renews what is made from it: the binary descriptors that every log carries, and their readable form.
+Descriptors in binary form, as logs carry them, are made here; their readable form by `make docs`.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar, Final, NamedTuple
 
 from fireworld.records import STEP_TOPICS, Array, CityRecord, Snapshot, Wire, column, value
 
 PACKAGE: Final = "fireworld.log.v1"
-DESCRIPTORS: Final = Path(__file__).with_name("fireworld_log.binpb")
 PROTO: Final = Path(__file__).with_name("fireworld_log.proto")
+_TYPE_NUMBERS: Final = {
+    "double": 1, "float": 2, "fixed64": 6, "bool": 8, "string": 9, "bytes": 12, "uint32": 13, "sfixed32": 15,
+}  # fmt: skip
+"""Numbers of the types in protobuf's descriptor.proto."""
+_MESSAGE_TYPE, _SINGLE, _REPEATED = 11, 1, 3
 UNITS: Final = ("m", "m2", "m3", "litres")
 """Units that a name can end in."""
 COUNTS: Final[Mapping[str, str]] = {
@@ -26,8 +31,20 @@ COUNTS: Final[Mapping[str, str]] = {
     "civilian": "n_civilians",
     "site": "n_sites",
     "event": "n_events",
+    "scenario": "n_scenarios",
+    "candidate": "n_candidates",
+    "fire": "n_fires",
+    "weight": "n_weights",
 }
 """What the number of some kinds of entities is called in shapes."""
+
+
+class Channel(NamedTuple):
+    """A topic and the schema of its messages."""
+
+    topic: str
+    schema_name: str
+    schema: bytes
 
 
 @dataclass(frozen=True)
@@ -111,6 +128,55 @@ def message_of(record_type: type[Any]) -> Message:
         doc=" ".join((inspect.getdoc(record_type) or "").split()),
         fields=fields,
     )
+
+
+def channel_of(record_type: type[Any], package: str) -> Channel:
+    """Return the channel of a topic; its schema is a FileDescriptorSet, by protobuf's descriptor.proto."""
+    message = message_of(record_type)
+    body = _descriptor(message)
+    if record_type is Snapshot:  # the only message that is made of others
+        array = dataclasses.replace(message_of(NamedArray), name="Array")
+        kind = _number(5, _MESSAGE_TYPE) + _text(6, f".{package}.{message.name}.{array.name}")
+        arrays = _text(1, "arrays") + _number(3, 1) + _number(4, _REPEATED) + kind
+        body += _part(2, arrays) + _part(3, _descriptor(array))
+    name = f"{package.replace('.', '/')}/{message.topic.removeprefix('/')}.proto"
+    file = _text(1, name) + _text(2, package) + _part(4, body) + _text(12, "proto3")
+    return Channel(message.topic, f"{package}.{message.name}", _part(1, file))
+
+
+def _descriptor(message: Message) -> bytes:
+    """Return the DescriptorProto of a message of plain fields."""
+    fields = [
+        _text(1, item.name)
+        + _number(3, item.number)
+        + _number(4, _REPEATED if item.repeated else _SINGLE)
+        + _number(5, _TYPE_NUMBERS[item.proto_type.split()[-1]])
+        for item in message.fields
+    ]
+    return _text(1, message.name) + b"".join(_part(2, one) for one in fields)
+
+
+@functools.cache
+def varint(number: int) -> bytes:
+    """Encode a non-negative integer as a protobuf varint."""
+    parts = bytearray()
+    while number >= 0x80:
+        parts.append(number & 0x7F | 0x80)
+        number >>= 7
+    parts.append(number)
+    return bytes(parts)
+
+
+def _number(field_number: int, value: int) -> bytes:
+    return varint(field_number << 3) + varint(value)
+
+
+def _part(field_number: int, body: bytes) -> bytes:
+    return varint(field_number << 3 | 2) + varint(len(body)) + body
+
+
+def _text(field_number: int, text: str) -> bytes:
+    return _part(field_number, text.encode())
 
 
 def _unit_of(name: str) -> str:

@@ -4,35 +4,28 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import functools
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Final, NamedTuple, Protocol, Self
+from typing import Final, Protocol, Self
 
 from fireworld.errors import OutputError, expected
 from fireworld.files import check_output
 from fireworld.records import CityRecord, RunHeader, Snapshot, StepRecord
 from fireworld_recorder.chain import Chain, step_messages
-from fireworld_recorder.codec import encode, encode_snapshot, long_fields
+from fireworld_recorder.codec import encode, encode_snapshot
 from fireworld_recorder.container import CHUNK_BYTES_MAX
 from fireworld_recorder.container_writer import ContainerWriter
 from fireworld_recorder.header import PROFILE, to_metadata
 from fireworld_recorder.kind import RUN, LogKind
-from fireworld_recorder.schema import DESCRIPTORS, PACKAGE, TOPICS, Commit, message_of
+from fireworld_recorder.schema import PACKAGE, TOPICS, Channel, Commit, channel_of
 
 PARTIAL_SUFFIX: Final = ".partial"
 CHUNK_PAYLOAD_MAX: Final = CHUNK_BYTES_MAX - (1 << 20)
 """Bytes of the messages of a chunk; the rest is for their heads, and for the schemas in the first one."""
 _MEDIA_TYPES: Final = {".yaml": "application/yaml", ".json": "application/json"}
-
-
-class Channel(NamedTuple):
-    """A topic and the schema of its messages."""
-
-    topic: str
-    schema_name: str
-    schema: bytes
 
 
 class Scene(Protocol):
@@ -46,12 +39,10 @@ class Scene(Protocol):
         """Encode what is to be drawn of a step; steps come in rising order."""
 
 
-def own_channels() -> list[Channel]:
-    """List the channels of a new log, in their fixed order."""
-    # The file holds a set of one descriptor for each topic, one after another: a log carries each for its topic only.
-    data = DESCRIPTORS.read_bytes()
-    sets = zip(TOPICS, long_fields(data, 0), strict=True)
-    return [Channel(topic.topic, f"{PACKAGE}.{message_of(topic).name}", data[a:b]) for topic, (a, b) in sets]
+@functools.cache
+def own_channels() -> tuple[Channel, ...]:
+    """Return the channels of a new log, in their fixed order."""
+    return tuple(channel_of(topic, PACKAGE) for topic in TOPICS)
 
 
 class StepFile:
@@ -135,6 +126,13 @@ class StepFile:
             check_output(self.path, force=self._force)
             self.partial.replace(self.path)
             self._open = False
+
+    def keep_partial(self) -> None:
+        """From now on this is the partial log of its path, and is kept: what it took the place of was copied."""
+        partial = self.path.with_name(self.path.name + PARTIAL_SUFFIX)
+        with self._guard():
+            self.partial.replace(partial)
+        self.partial, self._keep_partial = partial, True
 
     def abort(self) -> None:
         """Stop here; the partial file stays if it holds a step."""

@@ -1,4 +1,4 @@
-"""What is made from the records: the descriptors of a log, their readable form, and the tables of docs/log-format.md.
+"""What is made from the records: their readable form, the tables of docs/log-format.md, descriptors to test against.
 
 `python -m tests.docs.log_format` renews them.
 """
@@ -10,7 +10,6 @@ from typing import Final
 
 from fireworld_recorder.schema import (
     COUNTS,
-    DESCRIPTORS,
     PACKAGE,
     PROTO,
     TOPICS,
@@ -30,7 +29,7 @@ END: Final = "<!-- end of the generated part -->\n"
 
 
 def build_descriptors() -> descriptor_pb2.FileDescriptorSet:
-    """Make the FileDescriptorSet that belongs to the records as they are now."""
+    """Make the FileDescriptorSet that belongs to the records as they are now, by the protobuf library."""
     kinds = descriptor_pb2.FieldDescriptorProto
     files = descriptor_pb2.FileDescriptorSet()
 
@@ -115,6 +114,5 @@ def with_generated_part(page: str) -> str:
 
 
 if __name__ == "__main__":
-    DESCRIPTORS.write_bytes(build_descriptors().SerializeToString(deterministic=True))
     PROTO.write_text(proto_text(), encoding="utf-8")
     PAGE.write_text(with_generated_part(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from fireworld_recorder import codec, schema
 from fireworld_recorder.schema import TOPICS, Commit, message_of
+from fireworld_recorder.writer import own_channels
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -49,11 +50,11 @@ def same(a, b):
 
 @pytest.fixture(scope="module")
 def protobuf_types():
-    """The protobuf library's message class of every record type, from the checked-in descriptors."""
+    """The protobuf library's message class of every record type, from the descriptors of a log."""
     pool = descriptor_pool.DescriptorPool()
     types = {}
-    for file in descriptor_pb2.FileDescriptorSet.FromString(schema.DESCRIPTORS.read_bytes()).file:
-        pool.Add(file)
+    for channel in own_channels():
+        pool.Add(descriptor_pb2.FileDescriptorSet.FromString(channel.schema).file[0])
     for topic in TOPICS:
         descriptor = pool.FindMessageTypeByName(f"{schema.PACKAGE}.{message_of(topic).name}")
         types[topic] = message_factory.GetMessageClass(descriptor)

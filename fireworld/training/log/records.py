@@ -1,0 +1,151 @@
+"""Everything that a training log holds: frozen records of arrays, as `fireworld.records` is for the log of a run.
+
+Schemas, docs and exported tables are derived from the field metadata here. A field number is for ever.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Final
+
+from fireworld_recorder.kind import LogKind
+from fireworld_recorder.schema import Channel, channel_of
+
+from fireworld.kernels.ranking import N_WEIGHTS
+from fireworld.records import ACTIONS, CHOICES, Array, column, value
+from fireworld.rewards import TERMS
+
+FORMAT: Final = "fireworld-training/1"
+PACKAGE: Final = "fireworld.training.v1"
+TERM_NAMES: Final = tuple(term.name for term in TERMS)
+
+
+@dataclass(frozen=True)
+class TrainingHeader:
+    """What identifies a training; recorded as the metadata `fireworld.training` and as attachments."""
+
+    method: str
+    curriculum: str
+    curriculum_digest: str
+    seed: int
+    fireworld_version: str
+    unit: str
+    """What a part of the training is: an episode, a generation."""
+    attachments: Mapping[str, bytes] = field(default_factory=dict)
+    """curriculum.json, method.json, scenarios/NUMBER-NAME.yaml of all that is learned in, cities/SHA256.json."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is learned in, scenario by scenario."""
+
+    topic: ClassVar[str] = "/plan"
+    stage: Array = column(1, "sfixed32", "number of its stage, from 0", per="scenario")
+    cooperation: Array = column(2, "uint8", "1 if brigades see what the others do", per="scenario")
+    n_brigades: Array = column(3, "sfixed32", "", per="scenario")
+    n_steps_max: Array = column(4, "sfixed32", "its last step", per="scenario")
+    digests: bytes = value(5, "bytes", "the scenarios' digests, 32 bytes each")
+
+
+@dataclass(frozen=True)
+class Episode:
+    """An episode that tables learned from: how it went, and what each brigade saw, chose and got in every step.
+
+    Columns over choices go brigade by brigade, and through the steps of the episode for each; where it was truncated,
+    they have one entry more: the choice that would come next, which the last update takes into account. TD errors and
+    the values before follow from these columns and the tables before: `fireworld.open_training` gives them.
+    """
+
+    topic: ClassVar[str] = "/episode"
+    scenario: int = value(1, "sfixed32", "its scenario, a position in /plan")
+    episode: int = value(2, "sfixed32", "its number in the scenario, from 0")
+    seed: int = value(3, "fixed64", "of its random draws")
+    epsilon: float = value(4, "double", "probability of exploring", unit="probability")
+    n_steps: int = value(5, "sfixed32", "steps that it took")
+    terminated: bool = value(6, "bool", "nothing burned any more; else it was truncated")
+    total_reward: float = value(7, "double", "undiscounted return")
+    score: float = value(8, "double", "official score of the paper's time, at the end")
+    score_max: float = value(9, "double", "number of civilians + 1")
+    n_burnt_out: int = value(10, "sfixed32", "buildings with code 8 at the end")
+    n_civilians_alive: int = value(11, "sfixed32", "civilians with HP > 0 at the end")
+    n_changed: int = value(12, "sfixed32", "states in which the greedy action of a brigade changed")
+    n_unchanged: int = value(13, "sfixed32", "episodes in a row without such a change")
+    n_visited: int = value(14, "sfixed32", "states visited so far, summed over the tables")
+    converged: bool = value(15, "bool", "the scenario ends because the policy has settled")
+    ended: bool = value(16, "bool", "the scenario ends")
+    drawn: int = value(17, "sfixed32", "the table that all brigades carry on to the next scenario; -1 none is drawn")
+    tables_digest: bytes = value(18, "bytes", "SHA-256 of the tables after it, before one is drawn: the team's digest")
+    state: Array = column(
+        19, "sfixed32", "what the brigade saw: 0..4319, the features in mixed radix; -1 it did not look", per="choice"
+    )
+    action: Array = column(20, "uint8", "what it did; 0 where it had no choice", per="choice", names=ACTIONS)
+    choice: Array = column(
+        21, "uint8", "how it came to that: 0 none, 1 greedy, 2 explored, 3 kept", per="choice", names=CHOICES
+    )
+    reward: Array = column(
+        22, "double", f"the team's reward, term by term through all steps: {', '.join(TERM_NAMES)}", per="step"
+    )
+
+
+@dataclass(frozen=True)
+class Tables:
+    """The tables whole: after the last episode of every scenario, and after every 50th."""
+
+    topic: ClassVar[str] = "/tables"
+    n_tables: int = value(1, "sfixed32", "tables: one for each brigade, or one for all")
+    n_states: int = value(2, "sfixed32", "states of a table: 4320, or 270 without what the others do")
+    values: Array = column(3, "double", "values, table by table, state by state, action by action", per="entry")
+    visits: Array = column(4, "fixed64", "how often each was learned", per="entry")
+
+
+@dataclass(frozen=True)
+class Generation:
+    """A generation of a search: the rankings that were tried, on which fires, and what came of it."""
+
+    topic: ClassVar[str] = "/generation"
+    generation: int = value(1, "sfixed32", "its number, from 0")
+    score_mean: float = value(2, "double", "of all rankings, as a share of the maximum")
+    score_best: float = value(3, "double", "of the best ones, on the fires by which they were found to be the best")
+    spread_mean: float = value(4, "double", "mean standard deviation of the weights from now on")
+    fire: Array = column(5, "sfixed32", "the scenario of each fire, a position in /plan", per="fire")
+    seed: Array = column(6, "fixed64", "of the random draws of each fire", per="fire")
+    weights: Array = column(7, "double", "of each ranking that was tried", per="candidate", width=N_WEIGHTS)
+    scores: Array = column(
+        8, "double", "of each ranking on each fire, ranking by ranking, as a share of the maximum", per="candidate"
+    )
+    best: Array = column(9, "sfixed32", "the rankings that the next are drawn around, the best first", per="axis")
+    mean: Array = column(10, "double", "of the weights from now on: those of the team", per="weight")
+    spread: Array = column(11, "double", "standard deviation of the weights from now on", per="weight")
+
+
+@dataclass(frozen=True)
+class PartCommit:
+    """The end of a part, an episode or a generation: without it the part does not count."""
+
+    topic: ClassVar[str] = "/commit"
+    step: int = value(1, "sfixed32", "number of the part, from 0")
+    done: bool = value(2, "bool", "the training is at its end")
+    hash: bytes = value(3, "bytes", "32 bytes, chained to the commit before: the digest of the training up to here")
+
+
+TRAINING: Final = LogKind(
+    format=FORMAT,
+    metadata_name="fireworld.training",
+    header_type=TrainingHeader,
+    commit_type=PartCommit,
+    first_type=Plan,
+    unchained=frozenset({Tables.topic}),
+    unit="part",
+    rescue="--resume to go on, or --force to begin again",
+    seconds=1,
+)
+
+
+def channels_of(topics: tuple[type[Any], ...]) -> list[Channel]:
+    """List the channels of a training log.
+
+    Args:
+        topics: the record types of a method's parts.
+    """
+    return [channel_of(record_type, PACKAGE) for record_type in (Plan, *topics, PartCommit)]
