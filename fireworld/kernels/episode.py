@@ -49,7 +49,7 @@ class EpisodeScratch(NamedTuple):
 
 
 @inner
-def run_steps(  # noqa: C901, PLR0912 - handing all arrays to functions of its own costs more than the loop
+def run_steps(  # noqa: C901, PLR0912, PLR0915 - handing all arrays to functions of its own costs more than the loop
     city: CityArrays,
     world: WorldState,
     constants: Constants,

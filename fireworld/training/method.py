@@ -152,12 +152,19 @@ class Trainer(ABC, Generic[AMethod, AReport]):
         plots: titles of what is drawn of every team, by name.
         unit: what is reported on, as in "episode".
         uses_workers: whether one training keeps all workers busy.
+        topics: record types of what a training log holds of a part, declared with `fireworld.records.column` and
+            `value`; none: trainings of this method cannot be recorded.
+        whole: the one of them that holds the whole team, after some parts at least.
+        recording: somebody will ask for `records` after each report.
     """
 
     report_type: ClassVar[type[Report]]
     plots: ClassVar[Mapping[str, str]]
     unit: ClassVar[str]
     uses_workers: ClassVar[bool] = False
+    topics: ClassVar[tuple[type[Any], ...]] = ()
+    whole: ClassVar[type[Any] | None] = None
+    recording: bool = False
 
     def __init__(self, curriculum: Curriculum, method: AMethod, *, seed: int) -> None:
         if not curriculum.n_scenarios:
@@ -216,6 +223,23 @@ class Trainer(ABC, Generic[AMethod, AReport]):
         Raises:
             TrainingError: they make no sense.
         """
+
+    def records(self) -> list[Any]:
+        """Return what the training log holds of the part last reported on: of each topic one record at most."""
+        return []
+
+    def follow(self, part: Mapping[type[Any], Any]) -> AReport:
+        """Go through a part that a training log holds instead of training it; return its report.
+
+        What comes of it is what came of the training. A part that holds the whole team can be the first one.
+
+        Args:
+            part: its records, by type.
+
+        Raises:
+            LogError: the part does not fit where this trainer stands.
+        """
+        raise NotImplementedError
 
     def own_plots(self) -> Mapping[str, str]:
         """Return the titles of what is drawn of this team alone, by name."""

@@ -10,8 +10,7 @@ from fireworld.errors import LogError
 from fireworld.records import PHASES
 from fireworld_recorder.chain import SCENE_PREFIX
 from fireworld_recorder.codec import parts, walk
-from fireworld_recorder.schema import TOPICS, Field, Message, NamedArray, message_of
-from fireworld_recorder.writer import Channel
+from fireworld_recorder.schema import TOPICS, Channel, Field, Message, NamedArray, message_of
 
 _SCALARS: Final[Mapping[int, str]] = {
     1: "double", 2: "float", 3: "int64", 4: "uint64", 5: "int32", 6: "fixed64", 7: "fixed32", 8: "bool", 9: "string",

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fireworld.records import STEP_SECONDS
-from fireworld_recorder.codec import parts, varint, walk
-from fireworld_recorder.writer import Channel
+from fireworld_recorder.codec import parts, walk
+from fireworld_recorder.schema import Channel, varint
 
 FRAME: Final = "city"
 """The one frame of reference: metres east, north and up, as the city has them."""

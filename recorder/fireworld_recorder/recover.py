@@ -9,7 +9,8 @@ from fireworld.errors import LogError
 from fireworld.files import check_output
 from fireworld_recorder.container import SchemaRecord
 from fireworld_recorder.reader import Log, open_log
-from fireworld_recorder.writer import Channel, StepFile
+from fireworld_recorder.schema import Channel
+from fireworld_recorder.writer import StepFile
 
 
 @dataclass(frozen=True)

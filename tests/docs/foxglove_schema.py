@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from fireworld_recorder import foxglove
-from fireworld_recorder.codec import varint
+from fireworld_recorder.schema import varint
 
 TIMESTAMP: Final = "google.protobuf.Timestamp"
 DURATION: Final = "google.protobuf.Duration"

@@ -18,9 +18,9 @@ from fireworld_recorder.diff import compare
 from fireworld_recorder.header import to_metadata
 from fireworld_recorder.reader import open_log
 from fireworld_recorder.recover import channels_of, recover
-from fireworld_recorder.schema import Commit, message_of
+from fireworld_recorder.schema import Channel, Commit, message_of
 from fireworld_recorder.totals import totals_of
-from fireworld_recorder.writer import Channel, StepFile, own_channels
+from fireworld_recorder.writer import StepFile, own_channels
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -6,8 +6,7 @@ import types
 
 import pytest
 from fireworld_recorder.header import to_metadata
-from fireworld_recorder.schema import PROTO
-from fireworld_recorder.writer import Channel
+from fireworld_recorder.schema import PROTO, Channel
 from google.protobuf import descriptor_pb2
 
 from fireworld.records import MemoryRecording

@@ -17,8 +17,8 @@ from fireworld_recorder.container import MAGIC
 from fireworld_recorder.header import to_metadata
 from fireworld_recorder.reader import open_log
 from fireworld_recorder.recover import recover
-from fireworld_recorder.schema import Commit
-from fireworld_recorder.writer import Channel, LogWriter, StepFile, own_channels
+from fireworld_recorder.schema import Channel, Commit
+from fireworld_recorder.writer import LogWriter, StepFile, own_channels
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 

@@ -165,7 +165,7 @@ def test_one_generation_by_hand(make, monkeypatch):
     searcher = make(n_generations=1, step=0.5, spread=2.0, spread_least=1.1)
     tried = {}
 
-    def fight(weights, fire):
+    def fight(weights, fire, _seed):
         tried[weights.tobytes()] = weights
         return weights[3] + fire
 

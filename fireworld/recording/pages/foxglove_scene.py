@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from fireworld_recorder import foxglove
 from fireworld_recorder.chain import SCENE_PREFIX
-from fireworld_recorder.writer import Channel
+from fireworld_recorder.schema import Channel
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import build_mesh
 from fireworld_viewer.story.narration import event_lines

@@ -5,16 +5,23 @@ Schemas, docs and exported tables are derived from the field metadata here. A fi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar, Final, Self
 
+import numpy as np
 from fireworld_recorder.kind import LogKind
 from fireworld_recorder.schema import Channel, channel_of
 
+from fireworld.errors import LogError
+from fireworld.kernels.arrays import Trace
+from fireworld.kernels.learning import EXPLORED, GREEDY, KEPT
 from fireworld.kernels.ranking import N_WEIGHTS
+from fireworld.policy.words import N_STATES
 from fireworld.records import ACTIONS, CHOICES, Array, column, value
 from fireworld.rewards import TERMS
+from fireworld.simulation.state import fresh_trace
 
 FORMAT: Final = "fireworld-training/1"
 PACKAGE: Final = "fireworld.training.v1"
@@ -87,6 +94,36 @@ class Episode:
         22, "double", f"the team's reward, term by term through all steps: {', '.join(TERM_NAMES)}", per="step"
     )
 
+    def trace(self, n_brigades: int) -> Trace:
+        """Return the columns as the kernels have them.
+
+        Raises:
+            LogError: they are not of that many brigades and of this number of steps.
+        """
+        n, n_rows = self.n_steps, self.n_steps + (0 if self.terminated else 1)
+        fits = n >= 1 and len(self.reward) == n * len(TERM_NAMES)
+        if not fits or any(len(one) != n_brigades * n_rows for one in (self.state, self.action, self.choice)):
+            raise LogError(f"episode {self.episode}: its columns are not those of {n_brigades} brigades and {n} steps")
+        if max(self.action, default=0) >= len(ACTIONS) or max(self.choice, default=0) >= len(CHOICES):
+            raise LogError(f"episode {self.episode}: an action or a choice that there is not")
+        looked = self.state[(self.choice == GREEDY) | (self.choice == EXPLORED)]
+        if len(looked) and not 0 <= looked.min() <= looked.max() < N_STATES:
+            raise LogError(f"episode {self.episode}: a choice in a state that there is not")
+        trace = fresh_trace(n_brigades, n)
+        for name in ("state", "action", "choice"):
+            getattr(trace, name)[:, :n_rows] = getattr(self, name).reshape(n_brigades, n_rows)
+        if ((trace.choice[:, -1] == KEPT) & ~((trace.state[:, -1] >= 0) & (trace.state[:, -1] < N_STATES))).any():
+            raise LogError(f"episode {self.episode}: a choice in a state that there is not")
+        trace.reward[:] = self.reward.reshape(len(TERM_NAMES), n)
+        return trace
+
+
+def trace_columns(trace: Trace, n_steps: int, *, terminated: bool) -> dict[str, Array]:
+    """Return a trace as the columns of an episode."""
+    n_rows = n_steps + (0 if terminated else 1)
+    columns = {name: getattr(trace, name)[:, :n_rows].ravel() for name in ("state", "action", "choice")}
+    return {**columns, "reward": trace.reward[:, :n_steps].ravel()}
+
 
 @dataclass(frozen=True)
 class Tables:
@@ -98,10 +135,29 @@ class Tables:
     values: Array = column(3, "double", "values, table by table, state by state, action by action", per="entry")
     visits: Array = column(4, "fixed64", "how often each was learned", per="entry")
 
+    @classmethod
+    def of(cls, tables: Array, visits: Array) -> Self:
+        """Make a record of tables and visits, (tables, states, 4)."""
+        return cls(tables.shape[0], tables.shape[1], tables.ravel(), visits.ravel().astype(np.uint64))
+
+    @property
+    def arrays(self) -> tuple[Array, Array]:
+        """(tables, states, 4) float64 values and int64 visits.
+
+        Raises:
+            LogError: they are not as many as the record says.
+        """
+        shape = (self.n_tables, self.n_states, len(ACTIONS))
+        if min(shape) < 1 or not len(self.values) == len(self.visits) == math.prod(shape):
+            raise LogError(f"tables of shape {shape} with {len(self.values)} values")
+        if not np.isfinite(self.values).all() or self.visits.max() > np.iinfo(np.int64).max:
+            raise LogError("tables with values that are no numbers")
+        return self.values.reshape(shape).copy(), self.visits.reshape(shape).astype(np.int64)
+
 
 @dataclass(frozen=True)
-class Generation:
-    """A generation of a search: the rankings that were tried, on which fires, and what came of it."""
+class Tried:
+    """What was tried in a generation of a search: the rankings that were tried, on which fires, and what came of it."""
 
     topic: ClassVar[str] = "/generation"
     generation: int = value(1, "sfixed32", "its number, from 0")
@@ -148,4 +204,5 @@ def channels_of(topics: tuple[type[Any], ...]) -> list[Channel]:
     Args:
         topics: the record types of a method's parts.
     """
-    return [channel_of(record_type, PACKAGE) for record_type in (Plan, *topics, PartCommit)]
+    record_types: tuple[type[Any], ...] = (Plan, *topics, PartCommit)
+    return [channel_of(record_type, PACKAGE) for record_type in record_types]

@@ -5,15 +5,16 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, ClassVar, Final, Literal, get_args
+from typing import Annotated, Any, ClassVar, Final, Literal, get_args
 
 import msgspec
 import numpy as np
 
 from fireworld.draws import EPISODE, TABLE, below, hash_key
-from fireworld.errors import TrainingError, expected
+from fireworld.errors import LogError, TrainingError, expected
 from fireworld.executors import Workers
-from fireworld.kernels.arrays import Array
+from fireworld.kernels.arrays import Array, Learner, PolicyArrays, Trace
+from fireworld.kernels.learning import learn_again
 from fireworld.policy.kernel import from_tables
 from fireworld.policy.teams.table_team import COMMIT_MAX, TableTeam
 from fireworld.policy.teams.team import Team
@@ -23,11 +24,19 @@ from fireworld.rewards import Kind
 from fireworld.scenario import Scenario
 from fireworld.scenario.document import with_kind
 from fireworld.simulation.built import BuiltScenario, CityCache
-from fireworld.simulation.state import fresh_learner
-from fireworld.training.curriculum import Curriculum, CurriculumStage
+from fireworld.simulation.state import fresh_learner, fresh_trace
+from fireworld.training.curriculum import Curriculum
+from fireworld.training.log.records import Episode, Tables, trace_columns
 from fireworld.training.method import Count, Limits, Method, NotNegative, Play, Report, Share, Trainer
 
 Rule = Literal["sarsa", "expected-sarsa", "q-learning"]
+REPORTED: Final = (
+    "episode", "epsilon", "n_steps", "score", "score_max", "total_reward", "n_burnt_out", "n_changed", "n_unchanged",
+    "converged",
+)  # fmt: skip
+"""What a report tells of the record of an episode."""
+TABLES_EVERY: Final = 50
+"""Episodes after which a training log holds the tables whole."""
 RULES: Final[tuple[str, ...]] = get_args(Rule)
 """In the order of the kernels' numbers."""
 Commit = Annotated[int, Limits(f"a whole number from 1 to {COMMIT_MAX}", 1, COMMIT_MAX)]
@@ -131,6 +140,8 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
 
     report_type: ClassVar[type[Report]] = EpisodeReport
     unit: ClassVar[str] = "episode"
+    topics: ClassVar[tuple[type[Any], ...]] = (Episode, Tables)
+    whole: ClassVar[type[Any] | None] = Tables
     plots: ClassVar[Mapping[str, str]] = {
         "return": "Return",
         "score": "Score, as a share of the best",
@@ -155,6 +166,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         shape = self.shape(0)
         untrained = Progress(tables=np.zeros(shape), visits=np.zeros(shape, dtype=np.int64))
         self.progress = progress if progress is not None else untrained
+        self._records: list[Any] = []
         self.graduate: TableTeam | None = None
         """The team at the end of the last scenario finished here, before one of its tables was drawn for all."""
 
@@ -169,10 +181,9 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         del workers
         while not self.done:
             number = self.progress.scenario_number
-            stage, scenario = self._plan[number]
-            built = self._build(scenario)
+            built = self._build(self._plan[number][1])
             while self.progress.scenario_number == number:
-                yield self._run_episode(stage, built)
+                yield self._run_episode(built)
 
     def team(self) -> TableTeam:
         """Return the team as it is now."""
@@ -203,6 +214,45 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
             raise TrainingError(expected(source, "tables", f"shape {self.shape(number)}", str(team.tables.shape)))
         self.progress = Progress(number, episode, n_unchanged, team.tables, team.visits)
 
+    def records(self) -> list[Any]:
+        """Return the last episode, and the tables after the last one of a scenario and after every 50th."""
+        return self._records
+
+    def follow(self, part: Mapping[type[Any], Any]) -> EpisodeReport:
+        """Go through an episode that a training log holds; see `Trainer.follow`."""
+        episode: Episode | None = part.get(Episode)
+        tables: Tables | None = part.get(Tables)
+        progress = self.progress
+        if episode is None or not 0 <= episode.scenario < len(self._plan):
+            raise LogError("a part holds no episode of a scenario of the plan")
+        if tables is not None:
+            progress.scenario_number, progress.episode = episode.scenario, episode.episode
+            progress.tables, progress.visits = tables.arrays
+        elif (episode.scenario, episode.episode) != (progress.scenario_number, progress.episode):
+            raise LogError(f"expected episode {progress.episode} of scenario {progress.scenario_number}")
+        else:
+            self.learn_from(episode)
+        if progress.tables.shape != self.shape(episode.scenario):
+            raise LogError(f"expected tables of shape {self.shape(episode.scenario)}, got {progress.tables.shape}")
+        return self._end_episode(episode)
+
+    def learn_from(self, episode: Episode) -> tuple[Array, Array]:
+        """Learn an episode from what is recorded of it, into the tables as they stand before it.
+
+        Returns:
+            (b, k + 1) the value that was updated in each step, before that, and the error of the update; the last
+            column has the updates that end the episode. nan where a brigade had none.
+
+        Raises:
+            LogError: the columns of the episode are not those of an episode of its scenario.
+        """
+        built = self._build(self._plan[episode.scenario][1])
+        policy, learner = self._learning(built.n_brigades, episode.epsilon, trace=episode.trace(built.n_brigades))
+        values, errors = np.empty((2, built.n_brigades, episode.n_steps + 1))
+        learn_again(policy.table_of, episode.epsilon, learner, episode.n_steps, episode.terminated, values, errors)
+        self.progress.tables = policy.tables
+        return values, errors
+
     def points(self, report: EpisodeReport) -> Mapping[str, Mapping[str, float]]:
         """Return what is drawn of the last episode."""
         values = report.as_dict()
@@ -231,59 +281,86 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         varied = msgspec.structs.replace(scenario, choices=self.method.choices)
         return self._cities.build(with_kind(varied, self.method.reward))
 
-    def _run_episode(self, stage: CurriculumStage, built: BuiltScenario) -> EpisodeReport:
+    def _learning(self, n_brigades: int, epsilon: float, *, trace: Trace) -> tuple[PolicyArrays, Learner]:
+        """Return what a team follows in an episode and what it learns with; both share the tables, a copy."""
         method, progress = self.method, self.progress
-        number, episode = progress.scenario_number, progress.episode
-        epsilon = _power(method.epsilon_decay, episode)
-        seed = hash_key(self.seed, EPISODE, number, 0 if method.fixed_noise else episode) >> 1
-        before = progress.tables.argmax(axis=2)
-        policy = from_tables(progress.tables, epsilon=epsilon, commit=method.commit).for_brigades(built.n_brigades)
+        policy = from_tables(progress.tables.copy(), epsilon=epsilon, commit=method.commit).for_brigades(n_brigades)
         learner = fresh_learner(
             policy.tables,
-            built.n_brigades,
+            n_brigades,
             rule=RULES.index(method.rule),
             alpha=method.alpha,
             alpha_decay=method.alpha_decay,
             gamma=method.gamma,
-        )._replace(visits=progress.visits)
+        )
+        return policy, learner._replace(visits=progress.visits, trace=trace)
+
+    def _run_episode(self, built: BuiltScenario) -> EpisodeReport:
+        method, progress = self.method, self.progress
+        number, episode = progress.scenario_number, progress.episode
+        epsilon = _power(method.epsilon_decay, episode)
+        seed = hash_key(self.seed, EPISODE, number, 0 if method.fixed_noise else episode) >> 1
         world = built.world(seed=seed)
+        trace = fresh_trace(built.n_brigades, world.n_steps_max if self.recording else 0)
+        policy, learner = self._learning(built.n_brigades, epsilon, trace=trace)
+        before = progress.tables.argmax(axis=2)
         n_steps = world.run(policy, learner)
         progress.tables = policy.tables
         n_changed = int((progress.tables.argmax(axis=2) != before).sum())
-        n_unchanged = progress.n_unchanged = 0 if n_changed else progress.n_unchanged + 1
-        progress.episode += 1
+        n_unchanged = 0 if n_changed else progress.n_unchanged + 1
         converged = n_unchanged >= method.n_episodes_unchanged
-        ended = converged or progress.episode >= method.n_episodes_max
-        if ended:
-            self._next_scenario()
+        ended = converged or episode + 1 >= method.n_episodes_max
+        has_next = number + 1 < len(self._plan)
         outcome = world.outcome
-        return EpisodeReport(
-            milestone=ended,
-            stage=stage.name,
-            scenario=built.scenario.name,
-            scenario_number=number,
+        record = Episode(
+            scenario=number,
             episode=episode,
+            seed=seed,
             epsilon=epsilon,
             n_steps=n_steps,
+            terminated=world.terminated,
+            total_reward=outcome.total_reward,
             score=outcome.score,
             score_max=outcome.score_max,
-            total_reward=outcome.total_reward,
             n_burnt_out=outcome.n_burnt_out,
+            n_civilians_alive=outcome.n_civilians_alive,
             n_changed=n_changed,
             n_unchanged=n_unchanged,
+            n_visited=int(progress.visits.any(axis=2).sum()) if self.recording else 0,
             converged=converged,
+            ended=ended,
+            drawn=below(self.seed, TABLE, number, 0, bound=len(progress.tables)) if ended and has_next else -1,
+            tables_digest=bytes.fromhex(self.team().digest) if self.recording else b"",
+            **trace_columns(trace, n_steps, terminated=world.terminated),
+        )
+        whole = self.recording and (ended or (episode + 1) % TABLES_EVERY == 0)
+        self._records = [record, *([Tables.of(progress.tables, progress.visits)] if whole else [])]
+        return self._end_episode(record)
+
+    def _end_episode(self, record: Episode) -> EpisodeReport:
+        """Go on to the next episode; return the report of this one."""
+        progress, (stage, scenario) = self.progress, self._plan[record.scenario]
+        progress.episode, progress.n_unchanged = record.episode + 1, record.n_unchanged
+        if record.ended:
+            self._next_scenario(record.drawn)
+        return EpisodeReport(
+            milestone=record.ended,
+            stage=stage.name,
+            scenario=scenario.name,
+            scenario_number=record.scenario,
+            **{name: getattr(record, name) for name in REPORTED},
         )
 
-    def _next_scenario(self) -> None:
+    def _next_scenario(self, drawn: int) -> None:
         """Begin the next scenario: one table, drawn at random among the brigades', for all of them."""
         progress = self.progress
-        number = progress.scenario_number
-        progress.scenario_number, progress.episode, progress.n_unchanged = number + 1, 0, 0
+        progress.scenario_number, progress.episode, progress.n_unchanged = progress.scenario_number + 1, 0, 0
         self.graduate = self.team()
         if self.done:
             return
         n_tables, n_states, _ = self.shape(progress.scenario_number)
-        drawn = below(self.seed, TABLE, number, 0, bound=len(progress.tables))
+        if not 0 <= drawn < len(progress.tables):
+            raise LogError(f"expected a table from 0 to {len(progress.tables) - 1}, got {drawn}")
         table, visits = progress.tables[drawn], progress.visits[drawn]
         if n_states > len(table):
             table = np.repeat(table, N_FLAG_VALUES, axis=0)  # the same for all values of the cooperation flags

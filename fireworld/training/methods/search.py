@@ -7,12 +7,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from threading import Event
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
 from fireworld.draws import EPISODE, FIRE, WEIGHT, hash_key
-from fireworld.errors import TrainingError, expected
+from fireworld.errors import LogError, TrainingError, expected
 from fireworld.executors import Workers
 from fireworld.kernels.arrays import Array
 from fireworld.kernels.draws import fill_normals
@@ -24,6 +24,7 @@ from fireworld.policy.teams.ranking_words import OF_ACTION, OF_BRIGADE, OF_BUILD
 from fireworld.policy.teams.team import Team
 from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.training.curriculum import Curriculum
+from fireworld.training.log.records import Tried
 from fireworld.training.method import Count, Method, Positive, PositiveShare, Report, Trainer
 
 SEED_BITS: Final = 32
@@ -132,12 +133,15 @@ class SearchTrainer(Trainer[Search, Generation]):
         "spread": "Spread: mean standard deviation of the weights",
     }
     uses_workers: ClassVar[bool] = True
+    topics: ClassVar[tuple[type[Any], ...]] = (Tried,)
+    whole: ClassVar[type[Any] | None] = Tried
 
     def __init__(self, curriculum: Curriculum, method: Search, *, seed: int, cities: CityCache | None = None) -> None:
         super().__init__(curriculum, method, seed=seed)
         self._cities = cities if cities is not None else CityCache()
         self._fires: list[BuiltScenario] = []
         self._free = self.free_weights()
+        self._tried: Tried | None = None
         self.progress = Progress(0, np.zeros(len(self._free)), np.where(self._free, method.spread, 0.0))
 
     @property
@@ -187,6 +191,18 @@ class SearchTrainer(Trainer[Search, Generation]):
         if not isinstance(team, RankingTeam):
             raise TrainingError(expected(source, "", RankingTeam.what, team.what))
         self.progress = Progress(int(generation[0]), team.weights[0].copy(), spread.copy())
+
+    def records(self) -> list[Any]:
+        """Return the last generation, with all that was tried in it."""
+        return [self._tried]
+
+    def follow(self, part: Mapping[type[Any], Any]) -> Generation:
+        """Go through a generation that a training log holds; see `Trainer.follow`."""
+        tried: Tried | None = part.get(Tried)
+        n_weights = len(self._free)
+        if tried is None or len(tried.mean) != n_weights or len(tried.spread) != n_weights:
+            raise LogError(f"a part holds no generation with {n_weights} weights")
+        return self._end_generation(tried)
 
     def own_plots(self) -> Mapping[str, str]:
         """Return a plot for every group of weights that are searched for."""
@@ -243,22 +259,41 @@ class SearchTrainer(Trainer[Search, Generation]):
         fill_normals(self.seed, WEIGHT, progress.generation, noise)
         candidates = progress.mean + progress.spread * noise
         fires = self._draw_fires()
+        seeds = [hash_key(self.seed, EPISODE, fire, progress.generation) >> (64 - SEED_BITS) for fire in fires]
         shares = pool.map(
-            lambda pair: math.nan if stop.is_set() else self._fight(*pair),
-            ((candidate, fire) for candidate in candidates for fire in fires),
+            lambda fight: math.nan if stop.is_set() else self._fight(*fight),
+            ((candidate, *fire) for candidate in candidates for fire in zip(fires, seeds, strict=True)),
         )
         scores = np.array(list(shares)).reshape(len(candidates), len(fires))
         if np.isnan(scores).any():
             return None
         means = [math.fsum(row) / len(fires) for row in scores]  # fsum: the same sum whatever the machine
         best = sorted(range(len(means)), key=lambda k: -means[k])[: method.n_best]
-        self.progress = _moved(progress, candidates[best], method, self._free)
-        return Generation(
+        moved = _moved(progress, candidates[best], method, self._free)
+        self._tried = Tried(
             generation=progress.generation,
-            n_generations=method.n_generations,
             score_mean=math.fsum(means) / len(means),
             score_best=math.fsum(means[k] for k in best) / len(best),
-            spread=math.fsum(self.progress.spread[self._free]) / int(self._free.sum()),
+            spread_mean=math.fsum(moved.spread[self._free]) / int(self._free.sum()),
+            fire=np.array(fires),
+            seed=np.array(seeds, dtype=np.uint64),
+            weights=candidates.ravel(),
+            scores=scores.ravel(),
+            best=np.array(best),
+            mean=moved.mean,
+            spread=moved.spread,
+        )
+        return self._end_generation(self._tried)
+
+    def _end_generation(self, tried: Tried) -> Generation:
+        """Go on to the next generation; return the report of this one."""
+        self.progress = Progress(tried.generation + 1, tried.mean.copy(), tried.spread.copy())
+        return Generation(
+            generation=tried.generation,
+            n_generations=self.method.n_generations,
+            score_mean=tried.score_mean,
+            score_best=tried.score_best,
+            spread=tried.spread_mean,
         )
 
     def _draw_fires(self) -> list[int]:
@@ -267,10 +302,9 @@ class SearchTrainer(Trainer[Search, Generation]):
         order = sorted(range(len(self._fires)), key=lambda fire: hash_key(self.seed, FIRE, fire, generation))
         return order[: self.method.n_fires]
 
-    def _fight(self, weights: Array, fire: int) -> float:
+    def _fight(self, weights: Array, fire: int, seed: int) -> float:
         """Return the score of a ranking on a fire, as a share of the maximum."""
-        key = hash_key(self.seed, EPISODE, fire, self.progress.generation)
-        world = self._fires[fire].world(seed=key >> (64 - SEED_BITS))
+        world = self._fires[fire].world(seed=seed)
         world.run(self.policy_of(weights).for_brigades(world.n_brigades))
         return world.outcome.score_share
 
