@@ -1,4 +1,4 @@
-"""Kinds of logs: what tells the log of a run from that of a training; container, chain and guard are one."""
+"""Kinds of logs: how the log of a training differs from that of a run; container, chain and guard are one."""
 
 from __future__ import annotations
 

@@ -190,7 +190,7 @@ class Fires:
         self.fought = []
         monkeypatch.setattr(searcher, "_fight", self)
 
-    def __call__(self, weights, fire):
+    def __call__(self, weights, fire, seed):
         self.fought.append(fire)
         return 0.0
 

@@ -70,7 +70,7 @@ def test_between_scenarios_one_table_is_drawn_for_all(make_trainer):
     for seed in range(40):
         trainer = make_trainer(seed)
         tables = with_tables(trainer, 2, 3, 4320)
-        trainer._next_scenario()
+        trainer._next_scenario(trainer._draw_table())
         progress = trainer.progress
         assert (progress.scenario_number, progress.episode, progress.n_unchanged) == (3, 0, 0)
         number = below(seed, TABLE, 2, 0, bound=3)
@@ -86,7 +86,7 @@ def test_between_scenarios_one_table_is_drawn_for_all(make_trainer):
 def test_what_was_learned_alone_holds_whatever_the_others_do(make_trainer):
     trainer = make_trainer()
     tables = with_tables(trainer, 1, 1, 270)
-    trainer._next_scenario()
+    trainer._next_scenario(trainer._draw_table())
     progress = trainer.progress
     assert progress.tables.shape == (3, 4320, 4)
     for state in (0, 15, 16, 1193, 4319):

@@ -193,7 +193,7 @@ TRAINING: Final = LogKind(
     first_type=Plan,
     unchained=frozenset({Tables.topic}),
     unit="part",
-    rescue="--resume to go on, or --force to begin again",
+    rescue="--resume to continue, or --force to begin again",
     seconds=1,
 )
 

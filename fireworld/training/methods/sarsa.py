@@ -34,7 +34,7 @@ REPORTED: Final = (
     "episode", "epsilon", "n_steps", "score", "score_max", "total_reward", "n_burnt_out", "n_changed", "n_unchanged",
     "converged",
 )  # fmt: skip
-"""What a report tells of the record of an episode."""
+"""What a report shares with the record of an episode."""
 TABLES_EVERY: Final = 50
 """Episodes after which a training log holds the tables whole."""
 RULES: Final[tuple[str, ...]] = get_args(Rule)
@@ -310,7 +310,6 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         n_unchanged = 0 if n_changed else progress.n_unchanged + 1
         converged = n_unchanged >= method.n_episodes_unchanged
         ended = converged or episode + 1 >= method.n_episodes_max
-        has_next = number + 1 < len(self._plan)
         outcome = world.outcome
         record = Episode(
             scenario=number,
@@ -329,7 +328,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
             n_visited=int(progress.visits.any(axis=2).sum()) if self.recording else 0,
             converged=converged,
             ended=ended,
-            drawn=below(self.seed, TABLE, number, 0, bound=len(progress.tables)) if ended and has_next else -1,
+            drawn=self._draw_table() if ended and number + 1 < len(self._plan) else -1,
             tables_digest=bytes.fromhex(self.team().digest) if self.recording else b"",
             **trace_columns(trace, n_steps, terminated=world.terminated),
         )
@@ -351,8 +350,13 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
             **{name: getattr(record, name) for name in REPORTED},
         )
 
+    def _draw_table(self) -> int:
+        """Draw the table that all brigades take into the next scenario."""
+        progress = self.progress
+        return below(self.seed, TABLE, progress.scenario_number, 0, bound=len(progress.tables))
+
     def _next_scenario(self, drawn: int) -> None:
-        """Begin the next scenario: one table, drawn at random among the brigades', for all of them."""
+        """Begin the next scenario with the table that was drawn, for all brigades."""
         progress = self.progress
         progress.scenario_number, progress.episode, progress.n_unchanged = progress.scenario_number + 1, 0, 0
         self.graduate = self.team()
