@@ -39,8 +39,8 @@ ACTION_NAMES: Final = (*ACTIONS, "own-target")
 """All actions: the paper's four, and a target that the policy names itself. Recorded as the index here, -1 is none."""
 
 CHOICES: Final = ("none", "greedy", "explored", "kept")
-"""How a brigade that learns came to its action: it had no choice, took the best by its table, or one at random, or went
-on with what it had chosen before."""
+"""How a brigade that learns came to its action: it had no choice, took the best by its table, or one at random, or
+repeated what it had chosen before."""
 
 ACTIVITIES: Final = ("idle", "driving", "spraying", "driving-to-refuge", "refilling", "dead")
 """What a brigade did in a step."""

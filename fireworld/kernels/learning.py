@@ -116,7 +116,7 @@ def note_reward(row: int, reward: Array, learner: Learner) -> None:
 
 @kernel
 def learn_again(
-    table_of: Array, epsilon: float, learner: Learner, n_steps: int, terminated: bool, values: Array, errors: Array
+    table_of: Array, epsilon: float, learner: Learner, n_steps: int, terminated: bool, updates: Array
 ) -> None:
     """Learn an episode from its trace, without a world: the same updates in the same order.
 
@@ -126,13 +126,13 @@ def learn_again(
         learner: tables as they were before, memory, and the trace; tables, visits and memory change.
         n_steps: steps of the episode.
         terminated: it ended because nothing burned any more.
-        values: (b, n_steps + 1), becomes the value that was updated in each step, before that: the value of the choice
-            before. nan where there was no update. The last column has the updates that end an episode.
-        errors: (b, n_steps + 1), becomes the errors of these updates.
+        updates: (3, b, n_steps + 1), becomes the value that was updated in each step, which is that of the choice
+            before; the error; and the value after. nan where there was no update. The last column has the updates that
+            end an episode.
     """
     forget(learner)
     trace, n_states = learner.trace, learner.tables.shape[1]
-    values[:], errors[:] = np.nan, np.nan
+    updates[:] = np.nan
     for row in range(n_steps + 1):
         over = row == n_steps
         for brigade in range(len(table_of)):
@@ -150,7 +150,8 @@ def learn_again(
                 else:
                     choose_and_learn(brigade, table, state, action, epsilon, learner)
             if row_before >= 0:
-                values[brigade, row], errors[brigade, row] = value, learner.td_error[brigade]
+                updates[0, brigade, row], updates[1, brigade, row] = value, learner.td_error[brigade]
+                updates[2, brigade, row] = learner.tables[table, row_before, action_before]
         if not over:
             total = 0.0
             for term in range(TOTAL):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -98,9 +99,14 @@ class BareCity:
 
 
 class CityCache:
-    """The cities built so far, by what makes them: scenarios in one city build it once."""
+    """The cities built so far, by what makes them: scenarios in one city build it once.
 
-    def __init__(self) -> None:
+    Args:
+        files: contents of city files by their SHA-256, where scenarios come from a recording; others are read.
+    """
+
+    def __init__(self, files: Mapping[str, bytes] | None = None) -> None:
+        self._files = files or {}
         self._built: dict[str, BareCity] = {}
 
     def build(self, scenario: Scenario, *, city_json: bytes | None = None) -> BuiltScenario:
@@ -117,6 +123,7 @@ class CityCache:
         key = repr((scenario.city, scenario.city_sha256, scenario.resolved_parameters.fire))
         bare = self._built.get(key)
         if bare is None:
+            city_json = city_json or self._files.get(scenario.city_sha256 or "")
             bare = self._built[key] = _build_bare_city(scenario, city_json=city_json)
         return BuiltScenario(
             scenario=scenario, city=bare.city, city_arrays=bare.arrays, placement=place(scenario, bare.plan)

@@ -39,6 +39,35 @@ def open_log(path: Path | str, *, partial: bool = False) -> Log:
     return log
 
 
+def raw_commits(path: Path, found: Scan, first: int = 0) -> Iterator[RawStep]:
+    """Yield the commits of a log, of whatever kind, as they lie in the file.
+
+    Args:
+        path: the log.
+        found: what its scan has found.
+        first: position of the commit to begin with.
+
+    Raises:
+        LogError: the log changed since it was scanned.
+    """
+    raw, left = RawStep(), len(found.steps) - first
+    if left == 0:
+        return
+    try:
+        with path.open("rb") as file:
+            for topic, payload in messages(file, found.n_bytes, found.starts[first], found.channels):
+                raw.append((topic, payload))
+                if topic == found.kind.commit_type.topic:
+                    yield raw
+                    raw, left = RawStep(), left - 1
+                    if left == 0:
+                        return
+    except OSError as error:
+        raise LogError(f"{path}: cannot be read: {error.strerror}") from error
+    except LogError as error:
+        raise LogError(f"{path}: {error}; it has changed since it was opened") from error
+
+
 class Log(RecordingBase):
     """A recorded run, a `fireworld.records.StoredRun`. Made by `open_log`.
 
@@ -96,23 +125,7 @@ class Log(RecordingBase):
         Raises:
             LogError: the log changed since it was opened.
         """
-        found, raw = self.found, RawStep()
-        left = len(found.steps) - first
-        if left == 0:
-            return
-        try:
-            with self.path.open("rb") as file:
-                for topic, payload in messages(file, found.n_bytes, found.starts[first], found.channels):
-                    raw.append((topic, payload))
-                    if topic == Commit.topic:
-                        yield raw
-                        raw, left = RawStep(), left - 1
-                        if left == 0:
-                            return
-        except OSError as error:
-            raise LogError(f"{self.path}: cannot be read: {error.strerror}") from error
-        except LogError as error:
-            raise LogError(f"{self.path}: {error}; it has changed since it was opened") from error
+        return raw_commits(self.path, self.found, first)
 
     def _record(self, raw: RawStep) -> StepRecord:
         payloads = dict(raw)

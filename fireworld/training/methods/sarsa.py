@@ -236,22 +236,22 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
             raise LogError(f"expected tables of shape {self.shape(episode.scenario)}, got {progress.tables.shape}")
         return self._end_episode(episode)
 
-    def learn_from(self, episode: Episode) -> tuple[Array, Array]:
+    def learn_from(self, episode: Episode) -> Array:
         """Learn an episode from what is recorded of it, into the tables as they stand before it.
 
         Returns:
-            (b, k + 1) the value that was updated in each step, before that, and the error of the update; the last
-            column has the updates that end the episode. nan where a brigade had none.
+            (3, b, k + 1): the value that was updated in each step, the error, and the value after; the last column has
+            the updates that end the episode. nan where a brigade had none.
 
         Raises:
             LogError: the columns of the episode are not those of an episode of its scenario.
         """
         built = self._build(self._plan[episode.scenario][1])
         policy, learner = self._learning(built.n_brigades, episode.epsilon, trace=episode.trace(built.n_brigades))
-        values, errors = np.empty((2, built.n_brigades, episode.n_steps + 1))
-        learn_again(policy.table_of, episode.epsilon, learner, episode.n_steps, episode.terminated, values, errors)
+        updates = np.empty((3, built.n_brigades, episode.n_steps + 1))
+        learn_again(policy.table_of, episode.epsilon, learner, episode.n_steps, episode.terminated, updates)
         self.progress.tables = policy.tables
-        return values, errors
+        return updates
 
     def points(self, report: EpisodeReport) -> Mapping[str, Mapping[str, float]]:
         """Return what is drawn of the last episode."""
@@ -337,7 +337,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         return self._end_episode(record)
 
     def _end_episode(self, record: Episode) -> EpisodeReport:
-        """Go on to the next episode; return the report of this one."""
+        """Continue with the next episode; return the report of this one."""
         progress, (stage, scenario) = self.progress, self._plan[record.scenario]
         progress.episode, progress.n_unchanged = record.episode + 1, record.n_unchanged
         if record.ended:

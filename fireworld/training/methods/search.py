@@ -286,7 +286,7 @@ class SearchTrainer(Trainer[Search, Generation]):
         return self._end_generation(self._tried)
 
     def _end_generation(self, tried: Tried) -> Generation:
-        """Go on to the next generation; return the report of this one."""
+        """Continue with the next generation; return the report of this one."""
         self.progress = Progress(tried.generation + 1, tried.mean.copy(), tried.spread.copy())
         return Generation(
             generation=tried.generation,

@@ -1,0 +1,351 @@
+"""Read a training log: its parts, the trainer at any of them, and episodes with all that was learned in them."""
+
+from __future__ import annotations
+
+import json
+import os
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from fireworld_recorder.codec import decode
+from fireworld_recorder.reader import RawStep, raw_commits
+from fireworld_recorder.scan import TopicSize, scan
+
+from fireworld.arguments import path_of
+from fireworld.errors import FireworldError, LogError, expected, one_line
+from fireworld.policy.teams.team import Team
+from fireworld.records import Array
+from fireworld.scenario import Scenario, parse_scenario
+from fireworld.simulation.built import CityCache
+from fireworld.training.curriculum import Curriculum, CurriculumStage
+from fireworld.training.log.records import TRAINING, Episode, PartCommit, Plan, TrainingHeader
+from fireworld.training.log.writer import CITY_FOLDER, CURRICULUM_ATTACHMENT, METHOD_ATTACHMENT
+from fireworld.training.method import Method, Report, Trainer
+from fireworld.training.methods import find_method
+from fireworld.training.methods.sarsa import SarsaTrainer
+
+if TYPE_CHECKING:
+    import pandas
+
+Part = Mapping[type[Any], Any]
+"""The records of a part by type."""
+
+
+def open_training(path: str | os.PathLike[str], *, partial: bool = False) -> TrainingLog:
+    """Open a training log; its hashes are checked now, its parts are read when they are asked for.
+
+    Args:
+        path: the log.
+        partial: accept a log that was cut off or damaged; it ends at its last good part, and `damage` is not None.
+
+    Raises:
+        LogError: it is not the log of a training, or (unless `partial`) is cut off or damaged.
+        TrainingError: its method is not known here.
+        ArgumentError: it is no path.
+    """
+    log = TrainingLog(path_of("path", path))
+    if log.damage is not None and not partial:
+        raise LogError(f"{path}: {log.damage}; continue the training with --resume, or try `fireworld recover {path}`")
+    return log
+
+
+class TrainingLog:
+    """A recorded training. Made by `fireworld.open_training`.
+
+    It holds no more in memory than one part at a time, and a line of each.
+
+    Attributes:
+        path: the file.
+        header: what identifies the training.
+        plan: what is learned in.
+        digest: of the training: the hash of its last part, 64 hexadecimal digits.
+        state: complete, partial (cut off, or under way) or damaged.
+        damage: what is wrong and how far the log is good; None if nothing is.
+        topics: messages and bytes by topic.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.found = scan(path, TRAINING)
+        self.header: TrainingHeader = self.found.header
+        self.plan: Plan = decode(Plan, self.found.first)
+        self.digest = self.found.hash.hex()
+        self.state = self.found.state
+        self.damage = self.found.damage
+        self.topics: Mapping[str, TopicSize] = self.found.topics
+        try:
+            self.method, self.curriculum, self._cities = _setting(self.header)
+        except LogError as error:
+            raise LogError(f"{path}: {error}") from None
+        self._topics = self.trainer().topics
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What decides what comes of the training, as `Trainer.identity` has it."""
+        return {**self.trainer().identity, "fireworld": self.header.fireworld_version}
+
+    @cached_property
+    def done(self) -> bool:
+        """Whether the training is at its end."""
+        if not len(self):
+            return False
+        return decode(PartCommit, next(self.raw_parts(len(self) - 1))[-1][1]).done
+
+    def __len__(self) -> int:
+        return len(self.found.steps)
+
+    def raw_parts(self, first: int = 0) -> Iterator[RawStep]:
+        """Yield the parts as they lie in the file: topic and payload of every message, /commit last."""
+        return raw_commits(self.path, self.found, first)
+
+    def parts(self, first: int = 0) -> Iterator[Part]:
+        """Yield the parts: records by type.
+
+        Raises:
+            LogError: the log changed since it was opened, or a part holds nothing of its method.
+        """
+        for number, raw in enumerate(self.raw_parts(first), first):
+            payloads = dict(raw)
+            try:
+                yield {one: decode(one, payloads[one.topic]) for one in self._topics if one.topic in payloads}
+            except LogError as error:
+                raise LogError(f"{self.path}: part {number}: {error}") from error
+
+    def __iter__(self) -> Iterator[Part]:
+        return self.parts()
+
+    def trainer(self) -> Trainer[Any, Any]:
+        """Return a trainer of this training, before its first part."""
+        return self.method.trainer(self.curriculum, seed=self.header.seed, cities=self._cities)
+
+    def trainer_before(self, number: int) -> Trainer[Any, Any]:
+        """Return a trainer that stands before a part; `len(log)` is behind the last.
+
+        Raises:
+            LogError: there is no such part, or the parts before do not fit each other.
+        """
+        if not 0 <= number <= len(self):
+            raise LogError(expected(str(self.path), "part", f"one from 0 to {len(self)}", number))
+        trainer = self.trainer()
+        place = bisect_right(self._wholes, number - 1) - 1
+        first = self._wholes[place] if place >= 0 else 0
+        for (part,) in zip(self.parts(first), strict=False) if first < number else ():
+            self.follow(trainer, part, first)
+            first += 1
+            if first == number:
+                break
+        return trainer
+
+    def follow(self, trainer: Trainer[Any, Any], part: Part, number: int) -> Report:
+        """Let a trainer go through a part of this log; return its report."""
+        try:
+            report: Report = trainer.follow(part)
+        except LogError as error:
+            raise LogError(f"{self.path}: part {number}: {error}") from None
+        return report
+
+    def reports(self) -> Iterator[tuple[Trainer[Any, Any], Report]]:
+        """Yield the report of every part, with the trainer as it stands after it: the same object each time."""
+        trainer = self.trainer()
+        for number, part in enumerate(self.parts()):
+            yield trainer, self.follow(trainer, part, number)
+
+    def team(self) -> Team:
+        """Return the team as it is after the last part."""
+        team: Team = self.trainer_before(len(self)).team()
+        return team
+
+    @cached_property
+    def lines(self) -> list[Any]:
+        """The first record of every part without its columns: `Episode` or `Tried`, say."""
+        return self._index[0]
+
+    @property
+    def _wholes(self) -> list[int]:
+        """Parts that hold the whole team."""
+        return self._index[1]
+
+    @cached_property
+    def _index(self) -> tuple[list[Any], list[int]]:
+        lines, wholes, whole = [], [], self.trainer().whole
+        for number, part in enumerate(self.parts()):
+            record = next(iter(part.values()), None)
+            if record is None:
+                raise LogError(f"{self.path}: part {number}: it holds nothing of the method {self.method.name}")
+            lines.append(_without_columns(record))
+            if whole in part:
+                wholes.append(number)
+        return lines, wholes
+
+    @property
+    def scenarios(self) -> list[Scenario]:
+        """What is learned in, in the order of the plan."""
+        return [scenario for stage in self.curriculum.stages for scenario in stage.scenarios]
+
+    def position(self, scenario: str | int, episode: int) -> int:
+        """Return the number of the part that an episode is.
+
+        Args:
+            scenario: its name, or its position in the plan.
+            episode: its number in the scenario, from 0; -1 is the last.
+
+        Raises:
+            LogError: there is no such episode, or the method has none.
+        """
+        if not issubclass(self._topics[0], Episode):
+            raise LogError(expected(str(self.path), "method", "one that learns in episodes", self.method.name))
+        names = [one.name for one in self.scenarios]
+        if isinstance(scenario, str) and scenario not in names:
+            raise LogError(expected(str(self.path), "scenario", f"one of {', '.join(names)}", scenario))
+        wanted = names.index(scenario) if isinstance(scenario, str) else scenario
+        found = [k for k, line in enumerate(self.lines) if line.scenario == wanted]
+        if not found:
+            raise LogError(expected(str(self.path), "scenario", "one that has begun", scenario))
+        numbers = [self.lines[k].episode for k in found]
+        number = numbers[-1] if episode == -1 else episode
+        if number not in numbers:
+            held = f"one from {numbers[0]} to {numbers[-1]} of {names[wanted]}"
+            raise LogError(expected(str(self.path), "episode", held, episode))
+        return found[numbers.index(number)]
+
+    def episode(self, scenario: str | int, episode: int) -> LearnedEpisode:
+        """Return an episode with all that was learned in it; arguments and errors as for `position`."""
+        return self.episode_at(self.position(scenario, episode))
+
+    def episode_at(self, number: int) -> LearnedEpisode:
+        """Return the episode that is a part; errors as for `trainer_before`."""
+        trainer = self.trainer_before(number)
+        part = next(self.parts(number), None)
+        if part is None or Episode not in part or not isinstance(trainer, SarsaTrainer):
+            raise LogError(expected(str(self.path), "part", "an episode", number))
+        try:
+            return learned(trainer, part[Episode], self.scenarios[part[Episode].scenario])
+        except LogError as error:
+            raise LogError(f"{self.path}: part {number}: {error}") from None
+
+    def __repr__(self) -> str:
+        header = self.header
+        what = f"{header.method} in {header.curriculum}, seed {header.seed}"
+        return one_line(f"<TrainingLog {what}: {len(self)} {header.unit}s, {self.state}, digest {self.digest[:12]}>")
+
+
+@dataclass(frozen=True)
+class LearnedEpisode:
+    """An episode of a training with all that was learned in it; b brigades, k choices of each.
+
+    There is a choice for every step, and where the episode was truncated one more: that which would come next.
+
+    Attributes:
+        scenario: in which it took place.
+        record: as it is recorded.
+        tables: (tables, states, 4) before it.
+        visits: the same shape: how often each value was learned before it.
+        state: (b, k) what each brigade saw, -1 where it did not look.
+        action: (b, k) what it did.
+        choice: (b, k) how it came to that, a position in `fireworld.records.CHOICES`.
+        reward: (terms, steps) of the team, by term.
+        value_before: (b, steps + 1) the value that was updated in each step: that of the choice before; nan where there
+            was no update. The last column has the updates that end the episode.
+        td_error: (b, steps + 1) the error of the update.
+        value_after: (b, steps + 1).
+        tables_after: as `tables`.
+    """
+
+    scenario: Scenario
+    record: Episode
+    tables: Array
+    visits: Array
+    state: Array
+    action: Array
+    choice: Array
+    reward: Array
+    value_before: Array
+    td_error: Array
+    value_after: Array
+    tables_after: Array
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a row for each step and brigade."""
+        import pandas as pd
+
+        n, k = self.state.shape
+        pad = np.full((n, self.td_error.shape[1]), np.nan)
+        columns = {"step": np.tile(np.arange(1, pad.shape[1] + 1), n), "brigade": np.repeat(np.arange(n), pad.shape[1])}
+        for name in ("state", "action", "choice"):
+            whole = np.full(pad.shape, -1 if name == "state" else 0)
+            whole[:, :k] = getattr(self, name)
+            columns[name] = whole.ravel()
+        for name in ("value_before", "td_error", "value_after"):
+            columns[name] = getattr(self, name).ravel()
+        return pd.DataFrame(columns)
+
+
+def learned(trainer: SarsaTrainer, record: Episode, scenario: Scenario) -> LearnedEpisode:
+    """Let a trainer that stands before an episode learn it, and return all about it.
+
+    Raises:
+        LogError: what is recorded of it cannot be.
+    """
+    before, visits = trainer.progress.tables, trainer.progress.visits.copy()
+    trace = record.trace(scenario.brigades.n)
+    updates = trainer.learn_from(record)
+    n_rows = record.n_steps + (0 if record.terminated else 1)
+    return LearnedEpisode(
+        scenario=scenario,
+        record=record,
+        tables=before,
+        visits=visits,
+        state=trace.state[:, :n_rows],
+        action=trace.action[:, :n_rows],
+        choice=trace.choice[:, :n_rows],
+        reward=trace.reward,
+        value_before=updates[0],
+        td_error=updates[1],
+        value_after=updates[2],
+        tables_after=trainer.progress.tables,
+    )
+
+
+def _setting(header: TrainingHeader) -> tuple[Method, Curriculum, CityCache]:
+    """Return the method and the curriculum that a header carries, and its cities."""
+    files = header.attachments
+    for name in (METHOD_ATTACHMENT, CURRICULUM_ATTACHMENT):
+        if name not in files:
+            raise LogError(expected("attachments", "", name, ", ".join(sorted(files)) or "none"))
+    try:
+        method = json.loads(files[METHOD_ATTACHMENT])
+        name = method.pop("name")
+        made = find_method(name).with_settings(method)
+        text = json.loads(files[CURRICULUM_ATTACHMENT])
+        stages = tuple(
+            CurriculumStage(
+                stage["name"],
+                bool(stage["cooperation"]),
+                tuple(parse_scenario(files[one], source=f"training: {one}") for one in stage["scenarios"]),
+            )
+            for stage in text["stages"]
+        )
+        curriculum = Curriculum(str(text["name"]), stages)
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise LogError(f"attachments: {CURRICULUM_ATTACHMENT} and {METHOD_ATTACHMENT} make no sense: {error}") from None
+    except FireworldError as error:
+        raise LogError(f"attachments: {error}") from None
+    if curriculum.digest != header.curriculum_digest:
+        raise LogError(expected("attachments", "curriculum", f"digest {header.curriculum_digest}", curriculum.digest))
+    cities = {
+        name.removeprefix(CITY_FOLDER).removesuffix(".json"): data
+        for name, data in files.items()
+        if name.startswith(CITY_FOLDER)
+    }
+    return made, curriculum, CityCache(cities)
+
+
+def _without_columns(record: Any) -> Any:
+    """Return a record with its columns left empty."""
+    empty = np.zeros(0)
+    return replace(record, **{item.name: empty for item in fields(record) if "per" in item.metadata})
