@@ -55,6 +55,18 @@ if TYPE_CHECKING:
     type=click.Path(path_type=Path),
     help="Write a line for every episode, or whatever the method reports.",
 )
+@click.option(
+    "--record",
+    metavar="F.mcap",
+    type=click.Path(path_type=Path),
+    help="Record every step that is learned from in a training log, which is the checkpoint too.",
+)
+@click.option(
+    "--full-every",
+    metavar="N",
+    type=click.IntRange(min=1),
+    help="Record every N-th episode as a whole run too; --record then names an existing folder.",
+)
 @click.option("--resume", is_flag=True, help="Continue from the checkpoint of an interrupted training.")
 @click.option("--force", is_flag=True, help="Replace existing files, checkpoints too.")
 @view_options
@@ -71,6 +83,8 @@ def command(
     repetitions: int,
     jobs: int | None,
     log: Path | None,
+    record: Path | None,
+    full_every: int | None,
     resume: bool,
     force: bool,
     view: bool,
@@ -88,11 +102,13 @@ def command(
     fireworld train -o team.npz --set alpha=0.1 --seed 7
     fireworld train test-1 -o team.npz                   in a single scenario
     fireworld train -o best.npz --method search          a ranking of targets
+    fireworld train -o team.npz --record training.mcap   every step on record
     fireworld train -o team.npz --view                   curves while it learns, a fire after every stage
     fireworld run test-2 --policy team.npz               let it fight a fire
 
     The same seed gives the same team. Ctrl-C leaves a checkpoint, TEAM.npz.checkpoint, from which --resume continues
-    bit for bit.
+    bit for bit. With --record the log under way is the checkpoint, after a kill too; `info`, `verify`, `diff`, `view`,
+    `report` and `export` read it, and `replay` writes any of its episodes as the log of a run.
 
     Exit code: 0 trained, 2 could not train, 130 interrupted.
     """
@@ -111,6 +127,8 @@ def command(
         stages=stages,
         output=output,
         log=log,
+        record=record,
+        full_every=full_every,
         resume=resume,
         force=force,
     )

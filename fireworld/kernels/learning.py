@@ -52,7 +52,7 @@ def update(brigade: int, table: int, next_value: float, learner: Learner) -> Non
     learner.td_error[brigade] = error
 
 
-@inner
+@kernel
 def choose_and_learn(brigade: int, table: int, state: int, action: int, epsilon: float, learner: Learner) -> None:
     """Learn from the choice before, now that the next is known, and remember this one.
 
@@ -80,7 +80,7 @@ def go_on_and_learn(brigade: int, table: int, state: int, action: int, learner: 
     update(brigade, table, learner.tables[table, state, action], learner)
 
 
-@inner
+@kernel
 def take_reward(reward: float, learner: Learner) -> None:
     """Give the step's reward to every brigade that waits for what comes of its choice."""
     for brigade in range(len(learner.state)):

@@ -34,9 +34,11 @@ from fireworld.records import CityRecord, MemoryRecording, RunHeader, StepRecord
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.prepared_run import PreparedRun
 from fireworld.simulation.world import World
+from fireworld.training.log.episode_run import LEARNING_ATTACHMENT
 from fireworld.version import __version__
 
 FORK_ATTACHMENT: Final = "fork.json"
+OF_POLICY: Final = (TEAM_ATTACHMENT, LEARNING_ATTACHMENT)
 """Name of the attachment that lists the forks a recording comes from, the oldest first."""
 RECORDED: Final = "recorded"
 """Names the policy that decides as is recorded, whatever happens."""
@@ -272,7 +274,7 @@ def _header(run: StoredRun, change: ForkChange, step: int) -> RunHeader:
     except ValueError:
         before = []
     forks = [*before, made] if isinstance(before, list) else [made]
-    attachments = {name: data for name, data in header.attachments.items() if name != TEAM_ATTACHMENT}
+    attachments = {name: data for name, data in header.attachments.items() if name not in OF_POLICY}
     return replace(
         header,
         policy=named.name,

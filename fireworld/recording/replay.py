@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 
 from fireworld.errors import LogError, expected
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
@@ -23,6 +24,7 @@ from fireworld.scenario import Scenario, parse_scenario
 from fireworld.simulation.built import BuiltScenario, build_scenario
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.placement import CITY_ATTACHMENT, SCENARIO_ATTACHMENT
+from fireworld.training.log.episode_run import LEARNING_ATTACHMENT, recorded_learning
 
 
 class RecordedPolicy(Policy):
@@ -106,8 +108,11 @@ class Replay:
         return self._recording.steps
 
     def __iter__(self) -> Iterator[StepRecord]:
-        """Yield the recorded steps, computed again with the recorded decisions."""
+        """Yield the recorded steps, computed again with the recorded decisions; what was learned is learned again."""
         header = self.header
+        if LEARNING_ATTACHMENT in header.attachments:
+            yield from islice(recorded_learning(header, self._built), len(self.steps))
+            return
         world = self._built.world(seed=header.seed, n_steps_max=header.n_steps_max)
         observer = Observer(world)
         policy = RecordedPolicy(self._recording)

@@ -16,6 +16,7 @@ from fireworld.simulation.built import BuiltScenario
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.state import copy_into, copy_world, restore_snapshot
 from fireworld.simulation.world import World
+from fireworld.training.log.episode_run import LEARNING_ATTACHMENT
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,11 @@ def recorded_policy(header: RunHeader, *, source: str) -> NamedPolicy:
         PolicyError: it cannot be loaded, or it is not what it was when the run was recorded.
     """
     name = header.policy
+    if LEARNING_ATTACHMENT in header.attachments:
+        hint = "name one with --policy, as in --policy recorded or a team file"
+        raise PolicyError(
+            expected(source, "policy", "one that does not change", "a team that learned in this run", hint)
+        )
     try:
         named = refind_policy(header)
     except FireworldError as error:
@@ -137,6 +143,9 @@ def _steps_again(world: World, decider: Policy, records: Sequence[StepRecord]) -
         first = records[0]
         start = replace(start, observations=first.observations, decisions=first.decisions, events=first.events)
     again = [start]
+    recorded = {record.step: record.decisions for record in records}
     while world.step_number < records[-1].step and not (world.terminated or world.truncated):
-        again.append(observer.record(world.step(decider)))
+        record = observer.record(world.step(decider))
+        errors = recorded[record.step].td_error  # given, as values are: nothing is learned here
+        again.append(replace(record, decisions=replace(record.decisions, td_error=errors)))
     return again

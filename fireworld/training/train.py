@@ -7,18 +7,20 @@ from pathlib import Path
 from typing import Final
 
 from fireworld.arguments import SEED_MAX, path_of, seed_of, settings_of, whole_number
-from fireworld.errors import TrainingError, expected
+from fireworld.errors import OutputError, TrainingError, expected
 from fireworld.interrupt import Interrupted
 from fireworld.policy.teams.team import Team
 from fireworld.scenario import Scenario
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import Curriculum, find_curriculum
-from fireworld.training.method import Method
+from fireworld.training.log.episode_run import FullEpisodes
+from fireworld.training.method import COUNT_MAX, Method
 from fireworld.training.methods import find_method
 from fireworld.training.training import Callback, Training, train_all
 
 REPETITIONS_MAX: Final = 10_000
 JOBS_MAX: Final = 1000
+TRAINING_FILE: Final = "training.mcap"
 
 
 def train(
@@ -29,6 +31,8 @@ def train(
     set: Mapping[str, object] | None = None,
     stages: str | Sequence[str] | None = None,
     output: str | Path | None = None,
+    record: str | Path | None = None,
+    full_every: int | None = None,
     log: str | Path | None = None,
     resume: bool = False,
     force: bool = False,
@@ -47,6 +51,10 @@ def train(
         set: hyperparameters of the method by name, as in {"alpha": 0.1}.
         stages: the curriculum's stages to train in, by name: a list, or text as in "alone,together". None: all.
         output: the team file to write. While the training is unfinished, a checkpoint stands beside it.
+        record: the training log to write, with every step that is learned from; it is the checkpoint too. With
+            `full_every` an existing folder.
+        full_every: write every so many episodes of each scenario as the log of a run, with everything about every
+            step, into the folder `record`, as train-3-0040.mcap; the training log is training.mcap there.
         log: a CSV file to write, with a line for every report.
         resume: continue from the checkpoint of `output`; or, if its training is done, return that team.
         force: replace existing files, checkpoints too.
@@ -77,6 +85,8 @@ def train(
         set=set,
         stages=stages,
         output=output,
+        record=record,
+        full_every=full_every,
         log=log,
         resume=resume,
         force=force,
@@ -96,6 +106,8 @@ def prepare_trainings(
     set: Mapping[str, object] | None = None,
     stages: str | Sequence[str] | None = None,
     output: str | Path | None = None,
+    record: str | Path | None = None,
+    full_every: int | None = None,
     log: str | Path | None = None,
     resume: bool = False,
     force: bool = False,
@@ -112,8 +124,10 @@ def prepare_trainings(
         raise TrainingError(expected("--repetitions", "", f"seeds up to {SEED_MAX}", got))
     if resume and force:
         raise TrainingError("--force and --resume exclude each other")
-    if resume and output is None:
-        raise TrainingError(expected("--resume", "", "an output whose checkpoint to continue from", "none"))
+    if resume and output is None and record is None:
+        raise TrainingError(expected("--resume", "", "an output or a record to continue from", "none"))
+    folder = None if full_every is None else _full_folder(record)
+    every = 0 if full_every is None else whole_number("full_every", full_every, least=1, most=COUNT_MAX)
     way = find_method(method) if isinstance(method, str) else method
     if not isinstance(way, Method):
         raise TrainingError(expected("--method", "", "a name or a Method", type(way).__name__))
@@ -126,11 +140,16 @@ def prepare_trainings(
         Training(
             trainer=way.trainer(chosen, seed=seed + number - 1, cities=cities),
             path=_numbered("output", output, number, repetitions),
+            record=_numbered("record", record if folder is None else folder / TRAINING_FILE, number, repetitions),
+            full=folder and FullEpisodes(_numbered_folder(folder, number, repetitions), every, force),
             log_path=_numbered("log", log, number, repetitions),
             force=force,
         )
         for number in range(1, repetitions + 1)
     ]
+    for training in trainings:
+        if training.full is not None:
+            training.full.begin(training.trainer)
     if not resume:
         for training in trainings:
             training.begin()
@@ -140,6 +159,27 @@ def prepare_trainings(
         got = f"no {trainings[0].checkpoint}"
         raise TrainingError(expected("--resume", "", "a checkpoint to continue from", got, "leave out --resume"))
     return trainings
+
+
+def _full_folder(record: str | Path | None) -> Path:
+    """Return the folder that whole episodes are written to."""
+    folder = None if record is None else path_of("record", record)
+    if folder is None or not folder.is_dir():
+        got = "none" if folder is None else f"{folder}, which is none"
+        raise OutputError(expected("--full-every", "", "an existing folder as --record", got, "make it first"))
+    return folder
+
+
+def _numbered_folder(folder: Path, number: int, repetitions: int) -> Path:
+    """Return the folder for the episodes of one of several trainings; it is made if it is not there."""
+    if repetitions == 1:
+        return folder
+    own = folder / f"episodes-{number}"
+    try:
+        own.mkdir(exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{own}: cannot be made: {error.strerror}") from None
+    return own
 
 
 def _numbered(name: str, path: str | Path | None, number: int, repetitions: int) -> Path | None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from fireworld_recorder.writer import PARTIAL_SUFFIX
 
 from fireworld.errors import OutputError, TrainingError, expected
 from fireworld.executors import Workers, threads
@@ -19,6 +21,11 @@ from fireworld.interrupt import gentle_interrupt
 from fireworld.policy.teams.npz import SUFFIX
 from fireworld.policy.teams.team import Team, read_team, write_team
 from fireworld.training.method import Report, Trainer
+
+if TYPE_CHECKING:
+    from fireworld.training.log.episode_run import FullEpisodes
+    from fireworld.training.log.reader import TrainingLog
+    from fireworld.training.log.writer import TrainingWriter
 
 CHECKPOINT_SUFFIX: Final = ".checkpoint"
 HINT: Final = "name what it was begun with, or begin again with --force"
@@ -35,7 +42,9 @@ class Training:
     Attributes:
         trainer: trains it.
         path: the team file; None: nowhere, and then there is no checkpoint either.
-        log_path: the log, a CSV line for every report; None: nowhere.
+        log_path: the table of reports, a CSV line for each; None: nowhere.
+        record: the training log, which is the checkpoint too; None: nowhere.
+        full: writes some episodes as run logs of their own; None: none.
         force: existing files are replaced.
         team: the trained team, once it is done and its file written.
         n_reports: how often it has reported, interrupted trainings before this one included.
@@ -46,6 +55,8 @@ class Training:
     trainer: Trainer[Any, Any]
     path: Path | None = None
     log_path: Path | None = None
+    record: Path | None = None
+    full: FullEpisodes | None = None
     force: bool = False
     team: Team | None = None
     n_reports: int = 0
@@ -53,6 +64,7 @@ class Training:
     stopped: bool = False
     log: str = field(default="", repr=False)
     error: Exception | None = field(default=None, repr=False)
+    _before: TrainingLog | None = field(default=None, repr=False)
 
     @property
     def seed(self) -> int:
@@ -61,7 +73,9 @@ class Training:
 
     @property
     def checkpoint(self) -> Path | None:
-        """The checkpoint's file."""
+        """The checkpoint's file: the training log while it is partial, if there is one."""
+        if self.record is not None:
+            return self.record.with_name(self.record.name + PARTIAL_SUFFIX)
         return self.path and self.path.with_name(self.path.name + CHECKPOINT_SUFFIX)
 
     @property
@@ -76,7 +90,8 @@ class Training:
         Raises:
             OutputError: a file is in the way, or a folder is missing.
         """
-        check_outputs([path for path in (self.path, self.log_path) if path is not None], force=self.force)
+        outputs = [path for path in (self.path, self.log_path, self.record) if path is not None]
+        check_outputs(outputs, force=self.force)
         if self.path is not None:
             check_output(self.path, force=self.force, endings=(SUFFIX,))
         if self.checkpoint is not None and self.checkpoint.exists() and not self.force:
@@ -95,11 +110,15 @@ class Training:
             self.team = read_team(self.path)[0]
             check_same(self.team.short_provenance, self.trainer.identity, self.path)
             return True
+        if self.record is not None and self.record.exists():  # the team file alone is missing
+            return self._resume_from(self.record)
         if self.checkpoint is None or not self.checkpoint.exists():
             self.begin()
             return False
         if self.log_path is not None:
             check_output(self.log_path)
+        if self.record is not None:
+            return self._resume_from(self.checkpoint)
         source = str(self.checkpoint)
         team, state = read_team(self.checkpoint)
         check_same(team.short_provenance, self.trainer.identity, self.checkpoint)
@@ -111,6 +130,18 @@ class Training:
             raise TrainingError(expected(source, "log", "text", "other bytes")) from None
         self.n_reports = len([*csv.reader(io.StringIO(self.log))])
         self.has_checkpoint = True
+        return True
+
+    def _resume_from(self, path: Path) -> bool:
+        """Continue where a training log ends."""
+        from fireworld.training.log.reader import open_training
+
+        before = open_training(path, partial=True)
+        check_same(before.identity, self.trainer.identity, path)
+        for number, part in enumerate(before.parts()):
+            self._report(before.follow(self.trainer, part, number))
+        self.has_checkpoint = True
+        self._before = before
         return True
 
     def run(self, workers: Workers, callbacks: Sequence[Callback] = ()) -> None:
@@ -132,27 +163,47 @@ class Training:
     def _run(self, workers: Workers, callbacks: Sequence[Callback]) -> None:
         if self.team is not None or workers.stop.is_set():
             return
-        for report in self.trainer.run(workers):
-            self.n_reports += 1
-            self.log += _csv_line(report.as_dict().values())
-            try:
-                for callback in callbacks:
-                    callback(self, report)
-            except StopTraining:
-                self.stopped = True
-            if report.milestone:
-                self._write_checkpoint()
-            if self.stopped or workers.stop.is_set():
-                break
-        if self.trainer.done:
-            self._finish()
-            return
+        with self._recorder() as recorder:
+            for report in self.trainer.run(workers):
+                if recorder is not None:
+                    recorder.write()
+                    self.has_checkpoint = True
+                self._report(report)
+                if self.full is not None:
+                    self.full.write(self.trainer)
+                try:
+                    for callback in callbacks:
+                        callback(self, report)
+                except StopTraining:
+                    self.stopped = True
+                if report.milestone:
+                    self._write_checkpoint()
+                if self.stopped or workers.stop.is_set():
+                    break
+            if self.trainer.done:
+                if recorder is not None:
+                    recorder.close()
+                self._finish()
+                return
         self._write_checkpoint()
         if self.path is None:
             self._write_log()
 
+    def _recorder(self) -> AbstractContextManager[TrainingWriter | None]:
+        """Return what records the training, if anything does and it is not recorded whole already."""
+        if self.record is None or (self._before is not None and self._before.path == self.record):
+            return nullcontext()
+        from fireworld.training.log.writer import TrainingWriter
+
+        before = None if self._before is None else self._before.raw_parts()
+        return TrainingWriter(self.record, self.trainer, force=self.force, before=before)
+
+    def _report(self, report: Report) -> None:
+        self.n_reports += 1
+        self.log += _csv_line(report.as_dict().values())
+
     def _write_checkpoint(self) -> None:
-        if self.checkpoint is None:
+        if self.checkpoint is None or self.record is not None:
             return
         log = np.frombuffer(self.log.encode(), dtype=np.uint8)
         try:
@@ -174,7 +225,7 @@ class Training:
                 raise
         except OutputError as error:
             raise self._with_checkpoint(error) from None
-        if self.checkpoint is not None:
+        if self.checkpoint is not None and self.record is None:
             self.checkpoint.unlink(missing_ok=True)
         self.team, self.has_checkpoint = team, False
 

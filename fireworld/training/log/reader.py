@@ -132,13 +132,10 @@ class TrainingLog:
         if not 0 <= number <= len(self):
             raise LogError(expected(str(self.path), "part", f"one from 0 to {len(self)}", number))
         trainer = self.trainer()
-        place = bisect_right(self._wholes, number - 1) - 1
-        first = self._wholes[place] if place >= 0 else 0
-        for (part,) in zip(self.parts(first), strict=False) if first < number else ():
-            self.follow(trainer, part, first)
-            first += 1
-            if first == number:
-                break
+        n_wholes = bisect_right(self._wholes, number - 1)
+        first = self._wholes[n_wholes - 1] if n_wholes else 0
+        for place, part in zip(range(first, number), self.parts(first) if first < number else (), strict=False):
+            self.follow(trainer, part, place)
         return trainer
 
     def follow(self, trainer: Trainer[Any, Any], part: Part, number: int) -> Report:

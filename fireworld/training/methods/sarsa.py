@@ -167,6 +167,10 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         untrained = Progress(tables=np.zeros(shape), visits=np.zeros(shape, dtype=np.int64))
         self.progress = progress if progress is not None else untrained
         self._records: list[Any] = []
+        self.full_every = 0
+        """Every so many episodes of a scenario `start` is kept; 0: never."""
+        self.start: tuple[Array, Array] | None = None
+        """Tables and visits before the last episode, if it is one of these."""
         self.graduate: TableTeam | None = None
         """The team at the end of the last scenario finished here, before one of its tables was drawn for all."""
 
@@ -181,7 +185,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         del workers
         while not self.done:
             number = self.progress.scenario_number
-            built = self._build(self._plan[number][1])
+            built = self.build(self._plan[number][1])
             while self.progress.scenario_number == number:
                 yield self._run_episode(built)
 
@@ -246,7 +250,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         Raises:
             LogError: the columns of the episode are not those of an episode of its scenario.
         """
-        built = self._build(self._plan[episode.scenario][1])
+        built = self.build(self._plan[episode.scenario][1])
         policy, learner = self._learning(built.n_brigades, episode.epsilon, trace=episode.trace(built.n_brigades))
         updates = np.empty((3, built.n_brigades, episode.n_steps + 1))
         learn_again(policy.table_of, episode.epsilon, learner, episode.n_steps, episode.terminated, updates)
@@ -277,7 +281,12 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         n_tables = 1 if self.method.shared_table else scenario.brigades.n
         return n_tables, N_STATES if stage.cooperation else N_STATES_ALONE, len(ACTIONS)
 
-    def _build(self, scenario: Scenario) -> BuiltScenario:
+    def scenario(self, number: int) -> Scenario:
+        """Return a scenario of the curriculum by its position."""
+        return self._plan[number][1]
+
+    def build(self, scenario: Scenario) -> BuiltScenario:
+        """Build a scenario as it is learned in: with the choices and the reward of the method."""
         varied = msgspec.structs.replace(scenario, choices=self.method.choices)
         return self._cities.build(with_kind(varied, self.method.reward))
 
@@ -304,6 +313,8 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         trace = fresh_trace(built.n_brigades, world.n_steps_max if self.recording else 0)
         policy, learner = self._learning(built.n_brigades, epsilon, trace=trace)
         before = progress.tables.argmax(axis=2)
+        keeps = self.full_every > 0 and episode % self.full_every == 0
+        self.start = (progress.tables, progress.visits.copy()) if keeps else None
         n_steps = world.run(policy, learner)
         progress.tables = policy.tables
         n_changed = int((progress.tables.argmax(axis=2) != before).sum())
