@@ -60,9 +60,8 @@ def recorded_policy(header: RunHeader, *, source: str) -> NamedPolicy:
     name = header.policy
     if LEARNING_ATTACHMENT in header.attachments:
         hint = "name one with --policy, as in --policy recorded or a team file"
-        raise PolicyError(
-            expected(source, "policy", "one that does not change", "a team that learned in this run", hint)
-        )
+        wanted, got = "a policy that does not change", "a team that learned in this run"
+        raise PolicyError(expected(source, "policy", wanted, got, hint))
     try:
         named = refind_policy(header)
     except FireworldError as error:

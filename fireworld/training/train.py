@@ -127,7 +127,6 @@ def prepare_trainings(
     if resume and output is None and record is None:
         raise TrainingError(expected("--resume", "", "an output or a record to continue from", "none"))
     folder = None if full_every is None else _full_folder(record)
-    every = 0 if full_every is None else whole_number("full_every", full_every, least=1, most=COUNT_MAX)
     way = find_method(method) if isinstance(method, str) else method
     if not isinstance(way, Method):
         raise TrainingError(expected("--method", "", "a name or a Method", type(way).__name__))
@@ -141,15 +140,12 @@ def prepare_trainings(
             trainer=way.trainer(chosen, seed=seed + number - 1, cities=cities),
             path=_numbered("output", output, number, repetitions),
             record=_numbered("record", record if folder is None else folder / TRAINING_FILE, number, repetitions),
-            full=folder and FullEpisodes(_numbered_folder(folder, number, repetitions), every, force),
+            full=_full_episodes(folder, full_every, number, repetitions, force=force),
             log_path=_numbered("log", log, number, repetitions),
             force=force,
         )
         for number in range(1, repetitions + 1)
     ]
-    for training in trainings:
-        if training.full is not None:
-            training.full.begin(training.trainer)
     if not resume:
         for training in trainings:
             training.begin()
@@ -170,16 +166,21 @@ def _full_folder(record: str | Path | None) -> Path:
     return folder
 
 
-def _numbered_folder(folder: Path, number: int, repetitions: int) -> Path:
-    """Return the folder for the episodes of one of several trainings; it is made if it is not there."""
+def _full_episodes(
+    folder: Path | None, every: int | None, number: int, repetitions: int, *, force: bool
+) -> FullEpisodes | None:
+    """Return what writes whole episodes of one of several trainings; each has a folder, which is made."""
+    if folder is None:
+        return None
+    every = whole_number("full_every", every, least=1, most=COUNT_MAX)
     if repetitions == 1:
-        return folder
+        return FullEpisodes(folder, every, force)
     own = folder / f"episodes-{number}"
     try:
         own.mkdir(exist_ok=True)
     except OSError as error:
         raise OutputError(f"{own}: cannot be made: {error.strerror}") from None
-    return own
+    return FullEpisodes(own, every, force)
 
 
 def _numbered(name: str, path: str | Path | None, number: int, repetitions: int) -> Path | None:

@@ -163,21 +163,14 @@ class Training:
     def _run(self, workers: Workers, callbacks: Sequence[Callback]) -> None:
         if self.team is not None or workers.stop.is_set():
             return
+        if self.full is not None:
+            self.full.begin(self.trainer)
         with self._recorder() as recorder:
             for report in self.trainer.run(workers):
                 if recorder is not None:
                     recorder.write()
                     self.has_checkpoint = True
-                self._report(report)
-                if self.full is not None:
-                    self.full.write(self.trainer)
-                try:
-                    for callback in callbacks:
-                        callback(self, report)
-                except StopTraining:
-                    self.stopped = True
-                if report.milestone:
-                    self._write_checkpoint()
+                self._take(report, callbacks)
                 if self.stopped or workers.stop.is_set():
                     break
             if self.trainer.done:
@@ -197,6 +190,19 @@ class Training:
 
         before = None if self._before is None else self._before.raw_parts()
         return TrainingWriter(self.record, self.trainer, force=self.force, before=before)
+
+    def _take(self, report: Report, callbacks: Sequence[Callback]) -> None:
+        """Do all there is to do after a report, but the training log."""
+        self._report(report)
+        if self.full is not None:
+            self.full.write(self.trainer)
+        try:
+            for callback in callbacks:
+                callback(self, report)
+        except StopTraining:
+            self.stopped = True
+        if report.milestone:
+            self._write_checkpoint()
 
     def _report(self, report: Report) -> None:
         self.n_reports += 1

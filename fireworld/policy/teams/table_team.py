@@ -22,6 +22,13 @@ from fireworld.shown import SHOWN_MAX, Block, TextTable
 COMMIT_MAX: Final = 1_000_000
 
 
+def tables_digest(tables: Array) -> bytes:
+    """Return the SHA-256 of tables, (tables, states, 4)."""
+    content = hashlib.sha256(repr(tables.shape).encode())
+    content.update(np.ascontiguousarray(tables, dtype="<f8"))
+    return content.digest()
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class TableTeam(Team):
     """Tables that brigades follow, one each (or one for all), and where they come from."""
@@ -37,7 +44,7 @@ class TableTeam(Team):
     @property
     def digest(self) -> str:
         """SHA-256 of the tables."""
-        return hashlib.sha256(repr(self.tables.shape).encode() + self.arrays()["tables"].tobytes()).hexdigest()
+        return tables_digest(self.tables).hex()
 
     @property
     def summary(self) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from fireworld_recorder.writer import PARTIAL_SUFFIX, LogWriter
 
 from fireworld.errors import LogError, TrainingError, expected
-from fireworld.kernels.arrays import TOTAL, Array, Learner
+from fireworld.kernels.arrays import TOTAL, Array, Learner, Trace
 from fireworld.kernels.choice import table_state
 from fireworld.kernels.learning import EXPLORED, GREEDY, choose_and_learn, take_reward
 from fireworld.policy.kernel import KernelPolicy, from_tables
@@ -179,33 +179,40 @@ def replay_episode(log: TrainingLog, number: int, output: Path, *, force: bool =
     if not isinstance(trainer, SarsaTrainer):
         raise LogError(expected(str(log.path), "method", "one that learns in episodes", log.method.name))
     run = episode_run(trainer, found.record, found.tables, found.visits)
-    return _write_run(run, output, force=force, expected_of=found.record, source=str(log.path))
+    return _write_run(run, output, found.record, force=force, source=str(log.path))
 
 
-def _write_run(run: LearningRun, output: Path, *, force: bool, expected_of: Episode, source: str) -> str:
-    """Write a run that is known in outline; where it comes out otherwise, nothing stays of it."""
-    trace = expected_of.trace(len(run.city.brigade_tank_litres))
-    n_steps = 0
+def _write_run(run: LearningRun, output: Path, episode: Episode, *, force: bool, source: str) -> str:
+    """Write an episode that is known in outline; where it comes out otherwise, nothing stays of it."""
     try:
         with LogWriter(output, run.header, run.city, force=force) as writer:
-            for record in run:
-                if record.step > 0:
-                    n_steps = record.step
-                    _check_step(record, trace, expected_of, source=source)
+            for record in _checked(run, episode, source=source):
                 writer.write(record)
-            if n_steps != expected_of.n_steps:
-                raise LogError(_differs(source, expected_of, n_steps, f"{expected_of.n_steps} steps", f"{n_steps}"))
             return writer.digest
     except LogError:
         output.with_name(output.name + PARTIAL_SUFFIX).unlink(missing_ok=True)
         raise
 
 
-def _check_step(record: StepRecord, trace: Any, episode: Episode, *, source: str) -> None:
+def _checked(run: LearningRun, episode: Episode, *, source: str) -> Iterator[StepRecord]:
+    """Yield the steps of a run; raise LogError at the first that is not what the training log has of it."""
+    trace = episode.trace(len(run.city.brigade_tank_litres))
+    n_steps = -1
+    for record in run:
+        n_steps += 1
+        if n_steps > episode.n_steps:
+            break
+        if n_steps > 0:
+            _check_step(record, trace, episode, source=source)
+        yield record
+    if n_steps != episode.n_steps:
+        got = "more" if n_steps > episode.n_steps else str(n_steps)
+        raise LogError(_differs(source, episode, n_steps, f"{episode.n_steps} steps", got))
+
+
+def _check_step(record: StepRecord, trace: Trace, episode: Episode, *, source: str) -> None:
     """Compare a step that was computed again with what the training log has of it."""
     row, decisions = record.step - 1, record.decisions
-    if row >= trace.reward.shape[1]:
-        raise LogError(_differs(source, episode, record.step, f"{episode.n_steps} steps", "more"))
     chose = trace.choice[:, row]
     looked = (chose == GREEDY) | (chose == EXPLORED)
     pairs: Mapping[str, tuple[Array, Array]] = {
@@ -255,7 +262,7 @@ class FullEpisodes:
         episode: Episode = trainer.records()[0]
         name = episode_file(trainer.scenario(episode.scenario).name, episode.episode)
         run = episode_run(trainer, episode, *trainer.start)
-        _write_run(run, self.folder / name, force=self.force, expected_of=episode, source="training")
+        _write_run(run, self.folder / name, episode, force=self.force, source="training")
 
 
 def episode_file(scenario: str, episode: int) -> str:

@@ -16,7 +16,7 @@ from fireworld.executors import Workers
 from fireworld.kernels.arrays import Array, Learner, PolicyArrays, Trace
 from fireworld.kernels.learning import learn_again
 from fireworld.policy.kernel import from_tables
-from fireworld.policy.teams.table_team import COMMIT_MAX, TableTeam
+from fireworld.policy.teams.table_team import COMMIT_MAX, TableTeam, tables_digest
 from fireworld.policy.teams.team import Team
 from fireworld.policy.words import N_FLAG_VALUES, N_STATES, N_STATES_ALONE
 from fireworld.records import ACTIONS
@@ -340,7 +340,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
             converged=converged,
             ended=ended,
             drawn=self._draw_table() if ended and number + 1 < len(self._plan) else -1,
-            tables_digest=bytes.fromhex(self.team().digest) if self.recording else b"",
+            tables_digest=tables_digest(progress.tables) if self.recording else b"",
             **trace_columns(trace, n_steps, terminated=world.terminated),
         )
         whole = self.recording and (ended or (episode + 1) % TABLES_EVERY == 0)
