@@ -25,7 +25,7 @@ COMMIT_MAX: Final = 1_000_000
 def tables_digest(tables: Array) -> bytes:
     """Return the SHA-256 of tables, (tables, states, 4)."""
     content = hashlib.sha256(repr(tables.shape).encode())
-    content.update(np.ascontiguousarray(tables, dtype="<f8"))
+    content.update(np.ascontiguousarray(tables, dtype="<f8").data)
     return content.digest()
 
 
