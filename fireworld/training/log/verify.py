@@ -1,0 +1,119 @@
+"""Verify a training log: learn it all again, and compare every part."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fireworld.errors import LogError, TrainingError, expected
+from fireworld.executors import Workers, threads
+from fireworld.policy.teams.team import read_team
+from fireworld.scenario import Scenario
+from fireworld.training.log.difference import AnyTraining, TrainingDifference, compare_trainings
+from fireworld.training.log.reader import Part, TrainingLog, open_training
+from fireworld.training.log.records import TrainingHeader
+from fireworld.training.method import Method, Trainer
+
+
+class TrainedAgain:
+    """A recorded training, trained again: a `fireworld.training.log.difference.Trained`."""
+
+    def __init__(self, log: TrainingLog, workers: Workers) -> None:
+        self._log, self._workers = log, workers
+        self.header: TrainingHeader = log.header
+        self.method: Method = log.method
+        self.scenarios: list[Scenario] = log.scenarios
+
+    def trainer(self) -> Trainer[Any, Any]:
+        """Return a trainer of it, before the first part."""
+        return self._log.trainer()
+
+    def parts(self) -> Iterator[Part]:
+        """Train, as far as the log goes, and yield each part."""
+        trainer = self.trainer()
+        trainer.recording = True
+        for n_parts, _ in enumerate(trainer.run(self._workers), 1):
+            yield {type(record): record for record in trainer.records()}
+            if n_parts >= len(self._log) and not self._log.done:
+                return
+
+
+@dataclass(frozen=True, repr=False)
+class TrainingVerification:
+    """Whether a recorded training is still what this fireworld learns; true if it is.
+
+    Attributes:
+        name: the log's file.
+        digest: of the training.
+        team_digest: of the team at its end.
+        n_parts: episodes or generations in the log.
+        unit: what a part is.
+        difference: how the training differs when it is repeated, the log's values as `a`; None if it does not.
+    """
+
+    name: str
+    digest: str
+    team_digest: str
+    n_parts: int
+    unit: str
+    difference: TrainingDifference | None
+
+    @property
+    def same(self) -> bool:
+        """Whether every part comes out as it is recorded."""
+        return self.difference is None
+
+    def __bool__(self) -> bool:
+        return self.same
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as plain values, as `fireworld verify --json` writes it."""
+        known = {"same": self.same, "digest": self.digest, "team_digest": self.team_digest, "unit": self.unit}
+        return {**known, "n_parts": self.n_parts, **({} if self.difference is None else self.difference.to_dict())}
+
+    def __repr__(self) -> str:
+        if self.difference is None or self.difference.first is None:
+            what = f"the same training, {self.n_parts} {self.unit}s, digest {self.digest}"
+            return f"{self.name}: {what}; its team {self.team_digest}"
+        return f"{self.name}: learned again it differs: {self.difference.first.sentence}"
+
+
+def verify_training(
+    log: AnyTraining,
+    *,
+    team: Path | str | None = None,
+    jobs: int | None = None,
+    on_part: Callable[[], object] = lambda: None,
+) -> TrainingVerification:
+    """Learn everything again that a training log holds, and compare every part.
+
+    Args:
+        log: the path of a training log, or one that is open.
+        team: the team file that came of it, to be compared too.
+        jobs: fights at a time, where the method has many at once; None: as many as there are cores.
+        on_part: called after each part.
+
+    Raises:
+        LogError: the log cannot be read.
+        TrainingError: the team is not that of the log.
+    """
+    opened = log if isinstance(log, TrainingLog) else open_training(log)
+    if not len(opened):
+        raise LogError(f"{opened.path}: it holds no {opened.header.unit}s; there is nothing to verify")
+    digest = opened.team().digest
+    if team is not None:
+        found = read_team(Path(team))[0].digest
+        if found != digest:
+            raise TrainingError(expected(str(team), "", f"the team of {opened.path}, digest {digest}", found))
+    again = TrainedAgain(opened, threads(jobs))
+    difference = compare_trainings(opened, again, names=(str(opened.path), "again"), on_part=on_part)
+    return TrainingVerification(
+        name=str(opened.path),
+        digest=opened.digest,
+        team_digest=digest,
+        n_parts=len(opened),
+        unit=opened.header.unit,
+        difference=None if difference.same else difference,
+    )
