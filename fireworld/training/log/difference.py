@@ -255,20 +255,18 @@ def diff_trainings(
 
 
 def compare_trainings(
-    a: Trained, b: Trained, *, names: tuple[str, str], on_part: Callable[[], object] = lambda: None
+    a: TrainingLog, b: Trained, *, names: tuple[str, str], on_part: Callable[[], object] = lambda: None
 ) -> TrainingDifference:
     """Compare trainings part by part, each read once; arguments and errors as for `diff_trainings`."""
     _check_comparable(a, b, names)
     first: FirstDifference | None = None
     spread = Spread()
-    n_parts, before = 0, a.trainer()
+    n_parts = 0
     for one, other in zip_longest(a.parts(), b.parts()):
         same = one is not None and other is not None and _messages(one) == _messages(other)
         if not same and first is None:
-            first = _first_difference(a, b, n_parts, one, other, before)
+            first = _first_difference(a, b, n_parts, one, other)
         spread.add(one, other, same=same)
-        if same and first is None and isinstance(before, SarsaTrainer):
-            before.follow(one)
         n_parts += 1
         on_part()
     found = spread.scenarios([scenario.name for scenario in a.scenarios])
@@ -305,18 +303,16 @@ def _header(a: Trained, b: Trained) -> dict[str, tuple[Any, Any]]:
     return {key: (values[0].get(key), values[1].get(key)) for key in keys if values[0].get(key) != values[1].get(key)}
 
 
-def _first_difference(
-    a: Trained, b: Trained, number: int, one: Part | None, other: Part | None, before: Trainer[Any, Any]
-) -> FirstDifference:
-    """Describe the first part that is not the same; `before` stands before it, by both trainings."""
+def _first_difference(a: TrainingLog, b: Trained, number: int, one: Part | None, other: Part | None) -> FirstDifference:
+    """Describe the first part that is not the same."""
     if one is None or other is None:
         there = one if one is not None else other
         assert there is not None  # noqa: S101 - zip_longest yields one of them
         record = next(iter(there.values()))
         words = ("is there", "is not") if other is None else ("is not", "is there")
         return _place(a, number, record, phase="end", what="", a_b=words)
-    if Episode in one and Episode in other and isinstance(before, SarsaTrainer):
-        return _in_episode(a, b, number, (one[Episode], other[Episode]), before)
+    if Episode in one and Episode in other:
+        return _in_episode(a, b, number, (one[Episode], other[Episode]))
     for kind, record in one.items():
         for item in fields(record):
             x, y = getattr(record, item.name), getattr(other.get(kind, record), item.name)
@@ -326,7 +322,7 @@ def _first_difference(
 
 
 def _place(
-    a: Trained,
+    of: Trained,
     number: int,
     record: Any,
     *,
@@ -341,7 +337,7 @@ def _place(
     rest = {"step": None, "brigade": None, "state": None, **values, **rest}
     return FirstDifference(
         part=number,
-        scenario=a.scenarios[record.scenario].name if is_episode else "",
+        scenario=of.scenarios[record.scenario].name if is_episode else "",
         number=record.episode if is_episode else getattr(record, "generation", number),
         phase=phase,
         what=what,
@@ -367,15 +363,14 @@ def _in_generation(a: Trained, number: int, record: Any, name: str, x: Any, y: A
     return _place(a, number, record, phase=PHASE_OF.get(name, "end"), what=what, a_b=pair)
 
 
-def _in_episode(
-    a: Trained, b: Trained, number: int, pair: tuple[Episode, Episode], before: SarsaTrainer
-) -> FirstDifference:
+def _in_episode(a: TrainingLog, b: Trained, number: int, pair: tuple[Episode, Episode]) -> FirstDifference:
     """Name the first step, brigade and state in which two episodes differ that begin with the same tables."""
     one, other = pair
     for name in ("scenario", "episode", "seed", "epsilon"):
         x, y = getattr(one, name), getattr(other, name)
         if x != y:
             return _place(a, number, one, phase="draw", what=name, a_b=(f"{x:.12g}", f"{y:.12g}"))
+    before = a.trainer_before(number)  # and that of B: the parts before are the same
     x, y = (_learned_by(side, before, record) for side, record in zip((a, b), pair, strict=True))
     entries = _entries(x.tables_after, y.tables_after)
     found = _first_in_steps(x, y)
@@ -396,10 +391,11 @@ def _in_episode(
     return _place(a, number, one, **found)
 
 
-def _learned_by(side: Trained, before: SarsaTrainer, record: Episode) -> LearnedEpisode:
+def _learned_by(side: Trained, before: Trainer[Any, Any], record: Episode) -> LearnedEpisode:
     """Return an episode as a training learned it, from the tables that both had."""
     trainer = side.trainer()
-    assert isinstance(trainer, SarsaTrainer)  # noqa: S101 - their methods are the same
+    if not isinstance(trainer, SarsaTrainer) or not isinstance(before, SarsaTrainer):
+        raise LogError(expected("method", "", "one that learns in episodes", side.method.name))
     progress = before.progress
     trainer.progress = Progress(record.scenario, record.episode, 0, progress.tables.copy(), progress.visits.copy())
     return learned(trainer, record, side.scenarios[record.scenario])
