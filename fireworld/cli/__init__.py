@@ -23,6 +23,7 @@ COMMANDS: Final = {
     "diff": "Compare two recordings step by step.",
     "fork": "Branch off from a recorded step.",
     "explain": "Find the decisions that made one run better than another.",
+    "replay": "Write an episode of a training as the log of a run.",
     "verify": "Replay a recording and compare every step.",
     "export": "Write a recording as tables for data tools.",
     "golden": "Run golden recordings again and compare.",

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import click
 
 from fireworld.cli.installed import check_matplotlib
+from fireworld.cli.tables import print_blocks
 
 if TYPE_CHECKING:
     from fireworld_recorder.diff import RunComparison
@@ -62,6 +63,9 @@ def command(
     differ, and how the difference spread: how many buildings, brigades and civilians it had reached at which step.
     Everything is compared exactly, unless there is a tolerance for it.
 
+    Of two training logs the first episode, step, brigade and state are named in which they differ, then how that spread
+    from scenario to scenario: returns, scores, and how often the final tables prefer the same action.
+
     \b
     fireworld diff golden.mcap new.mcap
     fireworld diff golden.mcap new.mcap --tolerance buildings.temperature=1e-6 --ignore draws
@@ -72,6 +76,7 @@ def command(
     """
     from fireworld.files import check_outputs, write_file
     from fireworld.recording.difference import diff
+    from fireworld.recording.inputs import is_training
 
     outputs = [path for path in (junit, html) if path is not None]
     if force and not outputs:
@@ -79,6 +84,10 @@ def command(
     check_outputs(outputs, force=force, inputs=(first, second))
     if html is not None:
         check_matplotlib("diff --html")
+    if is_training(first) and is_training(second):
+        if any((tolerances, ignore, first_step is not None, last_step is not None, any_scenario, outputs)):
+            raise click.UsageError("Of two trainings --partial and --json are all there is to ask for.")
+        _diff_trainings(context, first, second, partial=partial, as_json=as_json)
     difference = diff(
         first,
         second,
@@ -104,6 +113,18 @@ def command(
         click.echo(str(difference))
     else:
         show_difference(difference.found, names=difference.names)
+    context.exit(0 if difference.same else 1)
+
+
+def _diff_trainings(context: click.Context, first: Path, second: Path, *, partial: bool, as_json: bool) -> NoReturn:
+    """Compare two training logs."""
+    from fireworld.training.log.difference import diff_trainings
+
+    difference = diff_trainings(first, second, partial=partial)
+    if as_json:
+        click.echo(json.dumps(difference.to_dict(), indent=2))
+    else:
+        print_blocks(difference.describe())
     context.exit(0 if difference.same else 1)
 
 

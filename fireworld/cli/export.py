@@ -23,7 +23,8 @@ from fireworld.cli.progress import bar
 @click.option(
     "--tables",
     metavar="NAMES",
-    help="Only these: city, buildings, brigades, decisions, civilians, sites, events, steps; separated by commas.",
+    help="Only these: city, buildings, brigades, decisions, civilians, sites, events, steps; of a training episodes, "
+    "steps, tables; of a search generations, candidates, fights. Separated by commas.",
 )
 @click.option("--force", is_flag=True, help="Replace an earlier export.")
 @click.option("--json", "as_json", is_flag=True, help="Write what was exported as JSON.")
@@ -41,14 +42,15 @@ def command(*, log: Path, folder: Path, tables: str | None, force: bool, as_json
     Exit code: 0 exported, 2 could not export, 130 interrupted (nothing is left of it).
     """
     from fireworld.recording.export import export
-    from fireworld.recording.inputs import open_run
+    from fireworld.recording.inputs import is_training, open_run
+    from fireworld.training.log.reader import open_training
 
     chosen = None if tables is None else [name.strip() for name in tables.split(",")]
-    recording = open_run(log, partial=True)
+    recording = open_training(log, partial=True) if is_training(log) else open_run(log, partial=True)
     with bar("export", len(recording), quiet=as_json) as advance:
         n_rows = export(recording, folder, tables=chosen, force=force, on_step=lambda _: advance())
     if recording.damage is not None:
-        click.echo(f"{log}: {recording.damage}; exported {len(recording)} committed steps", err=True)
+        click.echo(f"{log}: {recording.damage}; exported {len(recording)} that were committed", err=True)
     if as_json:
         known = {key: getattr(recording, key) for key in ("state", "damage", "digest")}
         known = {"folder": str(folder), **known, "n_steps": len(recording), "n_rows": n_rows}

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
+from fireworld.cli.tables import print_blocks
+
 if TYPE_CHECKING:
     from fireworld_recorder.reader import Log
+
+    from fireworld.training.log.reader import TrainingLog
 
 
 @click.command()
@@ -21,6 +25,8 @@ if TYPE_CHECKING:
 def command(context: click.Context, *, log: Path | None, as_json: bool, schema: bool, proto: bool) -> None:
     """Show what LOG recorded, what it holds and how far it is good.
 
+    LOG is the recording of a run or of a training.
+
     \b
     fireworld info run.mcap             header, outcome, size of each topic
     fireworld info run.mcap --schema    its topics and fields, those of a later version too
@@ -31,12 +37,15 @@ def command(context: click.Context, *, log: Path | None, as_json: bool, schema: 
     from fireworld_recorder.reader import open_log
     from fireworld_recorder.schema import PROTO
 
+    from fireworld.recording.inputs import is_training
     from fireworld.recording.summary import summary
 
     if schema and proto:
         raise click.UsageError("--schema and --proto exclude each other.")
     if log is None and not (schema or proto):
         raise click.UsageError("Missing argument 'LOG'; only --schema and --proto do without.")
+    if log is not None and is_training(log):
+        _show_training(context, Path(log), as_json=as_json, schema=schema or proto)
     recording = None if log is None else open_log(log, partial=True)
     if proto:
         click.echo(PROTO.read_text(encoding="utf-8"), nl=False)
@@ -50,24 +59,42 @@ def command(context: click.Context, *, log: Path | None, as_json: bool, schema: 
     context.exit(0 if recording is None or recording.damage is None else 1)
 
 
-def _show_schema(log: Log | None, *, as_json: bool) -> None:
+def _show_training(context: click.Context, path: Path, *, as_json: bool, schema: bool) -> NoReturn:
+    """Print what a training log holds."""
+    from fireworld.training.log.reader import open_training
+    from fireworld.training.log.summary import describe_training, training_summary
+
+    log = open_training(path, partial=True)
+    if schema:
+        _show_schema(log, as_json=as_json)
+    elif as_json:
+        click.echo(json.dumps(training_summary(log), indent=2))
+    else:
+        print_blocks(describe_training(log))
+    context.exit(0 if log.damage is None else 1)
+
+
+def _show_schema(log: Log | TrainingLog | None, *, as_json: bool) -> None:
     """Print the messages of a log, or those that this version writes."""
     from fireworld_recorder.describe import describe
     from fireworld_recorder.recover import channels_of
+    from fireworld_recorder.schema import TOPICS
     from fireworld_recorder.totals import plain
     from fireworld_recorder.writer import own_channels
 
     from fireworld.errors import LogError, one_line
     from fireworld.records import FORMAT
 
+    known = TOPICS if log is None else log.found.kind.topics
     try:
-        topics = describe(own_channels() if log is None else channels_of(log))
+        topics = describe(own_channels() if log is None else channels_of(log.found), known)
     except LogError as error:
         raise LogError(f"{log.path}: {error}" if log is not None else str(error)) from None
+    name = FORMAT if log is None else log.found.kind.format
     if as_json:
-        click.echo(json.dumps({"format": FORMAT, "topics": plain(topics)}, indent=2))
+        click.echo(json.dumps({"format": name, "topics": plain(topics)}, indent=2))
         return
-    click.echo(FORMAT)
+    click.echo(name)
     for topic in topics:
         phase = f" Phase: {topic.phase}." if topic.phase else ""
         click.echo(f"\n{one_line(topic.topic)}  {topic.doc or 'Not known to this version; skipped.'}{phase}")

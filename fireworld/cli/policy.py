@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import click
 
-from fireworld.cli.tables import print_table
-
-if TYPE_CHECKING:
-    from fireworld.shown import Block
+from fireworld.cli.tables import print_blocks, print_table
 
 SHOWN_OPTION = click.option(
     "--limit",
@@ -75,7 +70,7 @@ def show(*, team: str, states: tuple[str, ...], limit: int, as_json: bool) -> No
         click.echo(json.dumps(loaded.as_dict(states=states, limit=limit), indent=2))
         return
     blocks = [*loaded.describe(states=states, limit=limit)]
-    _print([f"{team}: {blocks[0]}", *blocks[1:]])
+    print_blocks([f"{team}: {blocks[0]}", *blocks[1:]])
 
 
 @command.command()
@@ -104,13 +99,5 @@ def diff(context: click.Context, *, first: str, second: str, actions_only: bool,
         details = difference.as_dict(limit=limit)
         click.echo(json.dumps({"same": same, "digests": [a.digest, b.digest], **details}, indent=2))
     else:
-        _print(difference.describe(limit=limit))
+        print_blocks(difference.describe(limit=limit))
     context.exit(0 if same else 1)
-
-
-def _print(blocks: Iterable[Block]) -> None:
-    for block in blocks:
-        if isinstance(block, str):
-            click.echo(block)
-        else:
-            print_table(block.heads, block.rows, left=range(block.n_left), whole=(0,))

@@ -44,12 +44,12 @@ def bars(*columns: str, quiet: bool = False) -> Iterator[Progress]:
 
 
 @contextmanager
-def bar(what: str, total: int, *columns: str, quiet: bool = False) -> Iterator[Callable[[], None]]:
+def bar(what: str, total: int | None, *columns: str, quiet: bool = False) -> Iterator[Callable[[], None]]:
     """Show one bar, as `bars`, and give what is to be called after each of its parts.
 
     Args:
         what: its description.
-        total: how many parts it has.
+        total: how many parts it has; None: nobody knows.
         columns: as for `bars`.
         quiet: show nothing in any case.
     """

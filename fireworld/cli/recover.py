@@ -17,4 +17,5 @@ def command(*, log: Path, output: Path, force: bool) -> None:
 
     recovery = recover(log, output, force=force)
     click.echo(f"{log}: {recovery.damage or 'it was complete'}")
-    click.echo(f"{output}: {recovery.n_steps} steps, up to step {recovery.last_step}, digest {recovery.digest}")
+    n, unit = recovery.n_steps, recovery.unit
+    click.echo(f"{output}: {n} {unit}s, up to {unit} {recovery.last_step}, digest {recovery.digest}")

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fireworld.shown import Block
 
 
 def print_table(
@@ -32,3 +36,14 @@ def print_table(
     for row in rows:
         table.add_row(*row)
     Console(highlight=False, markup=False).print(table)
+
+
+def print_blocks(blocks: Iterable[Block]) -> None:
+    """Print what an object shows of itself: lines and tables."""
+    import click
+
+    for block in blocks:
+        if isinstance(block, str):
+            click.echo(block)
+        else:
+            print_table(block.heads, block.rows, left=range(block.n_left), whole=(0,))

@@ -7,11 +7,11 @@ import os
 from collections.abc import Collection, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 from fireworld.errors import LogError, expected
 from fireworld.files import check_output, write_file
-from fireworld.recording.inputs import AnyRun, open_run, run_name
+from fireworld.recording.inputs import AnyRun, is_training, open_run, run_name
 from fireworld.records import StoredRun
 from fireworld.shown import text_table
 
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from fireworld_recorder.spread import Spread, SpreadRow
     from fireworld_recorder.step_difference import FirstDifference
     from fireworld_recorder.totals import Totals
+
+    from fireworld.training.log.difference import TrainingDifference
+    from fireworld.training.log.reader import TrainingLog
 
 
 class Difference:
@@ -153,6 +156,9 @@ class Difference:
         return "\n".join(difference_body(self, {}))
 
 
+@overload
+def diff(a: TrainingLog, b: TrainingLog) -> TrainingDifference: ...
+@overload
 def diff(
     a: AnyRun,
     b: AnyRun,
@@ -163,8 +169,22 @@ def diff(
     last_step: int | None = None,
     any_scenario: bool = False,
     partial: bool = False,
-) -> Difference:
+) -> Difference: ...
+def diff(
+    a: AnyRun | TrainingLog,
+    b: AnyRun | TrainingLog,
+    *,
+    tolerances: Mapping[str, float] | None = None,
+    ignore: Collection[str] = (),
+    first_step: int | None = None,
+    last_step: int | None = None,
+    any_scenario: bool = False,
+    partial: bool = False,
+) -> Difference | TrainingDifference:
     """Compare run B with run A, step by step, exactly unless something else is asked for.
+
+    Two trainings are compared part by part, as `fireworld.training.log.difference.diff_trainings` does; of what can be
+    asked for they know `partial` alone.
 
     Args:
         a: the run that is right, or came first: a recording's path, or a run.
@@ -179,6 +199,14 @@ def diff(
     Raises:
         LogError: a recording cannot be read, the runs cannot be compared, or a field or range of steps does not exist.
     """
+    if is_training(a) and is_training(b):
+        asked = (tolerances, ignore, first_step is not None, last_step is not None, any_scenario)
+        if any(asked):
+            wanted = "no tolerance, ignored field, range of steps or other scenario"
+            raise LogError(expected("diff of trainings", "", wanted, "one of these"))
+        from fireworld.training.log.difference import diff_trainings
+
+        return diff_trainings(a, b, partial=partial)
     if first_step is not None and last_step is not None and first_step > last_step:
         raise LogError(expected("--from and --to", "", "a range of steps", f"{first_step} to {last_step}"))
     runs = _open_both(a, b, partial=partial)
@@ -204,7 +232,7 @@ def diff(
     return difference
 
 
-def _open_both(a: AnyRun, b: AnyRun, *, partial: bool) -> tuple[StoredRun, StoredRun]:
+def _open_both(a: object, b: object, *, partial: bool) -> tuple[StoredRun, StoredRun]:
     """Open what has to be opened; files of the same bytes are read once."""
     runs: list[StoredRun] = []
     for given in (a, b):

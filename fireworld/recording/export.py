@@ -5,32 +5,38 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fireworld_recorder.recover import Recovery
 from fireworld_recorder.recover import recover as recover_file
 from fireworld_recorder.tables import TABLES, find_table
 
 from fireworld.errors import OutputError
-from fireworld.recording.inputs import AnyRun, open_run
+from fireworld.recording.inputs import AnyRun, is_training, open_run
 from fireworld.records import StepRecord
+
+if TYPE_CHECKING:
+    from fireworld.training.log.reader import TrainingLog
 
 
 def export(
-    log: AnyRun,
+    log: AnyRun | TrainingLog,
     folder: Path | str,
     *,
     tables: Collection[str] | None = None,
     force: bool = False,
-    on_step: Callable[[StepRecord], object] = lambda _: None,
+    on_step: Callable[[StepRecord | None], object] = lambda _: None,
 ) -> dict[str, int]:
     """Write a recording as a folder of Parquet files, a file for each table, for pandas, polars, DuckDB and the like.
+
+    A training has other tables than a run; see `fireworld.training.log.export.TABLES`.
 
     Args:
         log: the path of a recording, or a run; one that was cut off or damaged is exported as far as it is good.
         folder: the folder to make.
         tables: names of the tables to write; None: all.
         force: replace an earlier export.
-        on_step: called after each step.
+        on_step: called after each step, or part of a training.
 
     Returns:
         Rows by table.
@@ -41,6 +47,12 @@ def export(
     """
     if find_spec("pyarrow") is None:
         raise OutputError("export: pyarrow is not installed; try pip install 'fireworld[archive]'")
+    if is_training(log):
+        from fireworld.training.log.export import export_training
+        from fireworld.training.log.reader import TrainingLog, open_training
+
+        training = log if isinstance(log, TrainingLog) else open_training(log, partial=True)
+        return export_training(training, Path(folder), tables=tables, force=force, on_part=lambda: on_step(None))
     for name in tables or ():
         find_table(name)
     run = open_run(log, partial=True)
@@ -65,4 +77,8 @@ def recover(log: Path | str, output: Path | str, *, force: bool = False) -> Reco
         LogError: the recording holds no good step, or cannot be read at all.
         OutputError: the output exists, its folder does not, or it cannot be written.
     """
+    if is_training(log):
+        from fireworld.training.log.records import TRAINING
+
+        return recover_file(log, output, force=force, kind=TRAINING)
     return recover_file(log, output, force=force)

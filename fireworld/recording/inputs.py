@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 from fireworld.errors import LogError, expected
 from fireworld.records import Recording, Steps, StoredRun
+
+if TYPE_CHECKING:
+    from fireworld.training.log.reader import TrainingLog
 
 AnyRun = str | os.PathLike[str] | StoredRun
 """The path of a recording, or a run."""
@@ -18,7 +21,16 @@ AnyRecording = str | os.PathLike[str] | Recording
 _WANTED = "the path of a recording, or a run"
 
 
-def open_run(given: AnyRun, *, partial: bool = False) -> StoredRun:
+def is_training(given: object) -> TypeGuard[str | os.PathLike[str] | TrainingLog]:
+    """Return whether a training log is given, or the path of one."""
+    if isinstance(given, str | os.PathLike):
+        from fireworld_recorder.kind import noun_of
+
+        return noun_of(Path(given)) == "training"
+    return hasattr(given, "raw_parts")
+
+
+def open_run(given: object, *, partial: bool = False) -> StoredRun:
     """Return a run; open it if a path is given.
 
     Args:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
-from fireworld.recording.inputs import AnyRun, open_run, run_name
+from fireworld.recording.inputs import AnyRun, is_training, open_run, run_name
 
 if TYPE_CHECKING:
     from fireworld_recorder.diff import RunComparison
+
+    from fireworld.training.log.reader import TrainingLog
+    from fireworld.training.log.verify import TrainingVerification
 
 
 @dataclass(frozen=True, repr=False)
@@ -45,15 +48,25 @@ class Verification:
         return f"{self.name}: the replay differs: {self.difference.first.sentence}"
 
 
-def verify(log: AnyRun) -> Verification:
+@overload
+def verify(log: TrainingLog) -> TrainingVerification: ...
+@overload
+def verify(log: AnyRun) -> Verification: ...
+def verify(log: AnyRun | TrainingLog) -> Verification | TrainingVerification:
     """Compute every step of a recording again, from its scenario, seed and decisions, and compare.
 
+    A team that learned in the run learns again; a training is trained again, as `verify_training` does.
+
     Args:
-        log: the path of a recording, or a run.
+        log: the path of a recording of a run or a training, or one that is open.
 
     Raises:
         LogError: the recording cannot be read, or lacks its scenario.
     """
+    if is_training(log):
+        from fireworld.training.log.verify import verify_training
+
+        return verify_training(log)
     from fireworld_recorder.diff import compare
 
     from fireworld.recording.replay import Replay

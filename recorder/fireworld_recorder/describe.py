@@ -21,7 +21,6 @@ _REPEATED: Final = 3
 _OF_ARRAYS: Final = {item.number: item for item in message_of(NamedArray).fields}
 """Of a snapshot's arrays, the only message inside another that there is."""
 _OF_SCENE: Final = "Drawn by other tools; derived from the step, and no part of the digest."
-_KNOWN: Final = {record_type.topic: message_of(record_type) for record_type in TOPICS}
 
 
 @dataclass(frozen=True)
@@ -50,18 +49,19 @@ class TopicWords:
     fields: tuple[FieldWords, ...]
 
 
-def describe(channels: Iterable[Channel]) -> list[TopicWords]:
+def describe(channels: Iterable[Channel], topics: Iterable[type[Any]] = TOPICS) -> list[TopicWords]:
     """Describe the topics of a log.
 
     Args:
         channels: topics and schemas, as `writer.own_channels` and `recover.channels_of` list them.
+        topics: record types that this version knows of this kind of log.
 
     Raises:
         LogError: a schema is not a protobuf descriptor.
     """
-    described = []
+    described, ours = [], {record_type.topic: message_of(record_type) for record_type in topics}
     for channel in channels:
-        known = _KNOWN.get(channel.topic)
+        known = ours.get(channel.topic)
         try:
             fields = tuple(_fields(channel, known))
         except (LogError, UnicodeDecodeError, TypeError) as error:  # a text that is none, a number where bytes belong

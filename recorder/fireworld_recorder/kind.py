@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from fireworld.records import FORMAT, STEP_SECONDS, CityRecord, RunHeader, Snapshot
 from fireworld_recorder.container import MAGIC
-from fireworld_recorder.schema import Commit
+from fireworld_recorder.schema import TOPICS, Commit
 
 NOUNS: Final = {"fireworld-log": "run", "fireworld-training": "training"}
 """What there are logs of, by the name of the format."""
@@ -26,6 +26,7 @@ class LogKind:
         header_type: a dataclass of texts and whole numbers, and `attachments` by name.
         commit_type: the record that ends a commit; it has a `step`, its number, and a `hash`.
         first_type: the record that comes before all commits.
+        topics: record types of all topics that this version knows.
         unchained: topics that follow from others, and are no part of the digest.
         unit: what a commit holds.
         seconds: of log time from one commit to the next.
@@ -37,6 +38,7 @@ class LogKind:
     header_type: type[Any]
     commit_type: type[Any]
     first_type: type[Any]
+    topics: tuple[type[Any], ...]
     unchained: frozenset[str]
     unit: str
     seconds: int
@@ -54,6 +56,7 @@ RUN: Final = LogKind(
     header_type=RunHeader,
     commit_type=Commit,
     first_type=CityRecord,
+    topics=TOPICS,
     unchained=frozenset({Snapshot.topic}),
     unit="step",
     seconds=STEP_SECONDS,

@@ -8,7 +8,9 @@ from pathlib import Path
 from fireworld.errors import LogError
 from fireworld.files import check_output
 from fireworld_recorder.container import SchemaRecord
-from fireworld_recorder.reader import Log, open_log
+from fireworld_recorder.kind import RUN, LogKind
+from fireworld_recorder.reader import raw_commits
+from fireworld_recorder.scan import Scan, scan
 from fireworld_recorder.schema import Channel
 from fireworld_recorder.writer import StepFile
 
@@ -22,9 +24,10 @@ class Recovery:
     damage: str | None
     """What was wrong; None if the log was good already."""
     digest: str
+    unit: str = "step"
 
 
-def recover(path: Path | str, output: Path | str, *, force: bool = False) -> Recovery:
+def recover(path: Path | str, output: Path | str, *, force: bool = False, kind: LogKind = RUN) -> Recovery:
     """Copy the committed steps of a log, byte for byte, into a log of their own.
 
     The new log is what a run that ended there would have written.
@@ -33,32 +36,34 @@ def recover(path: Path | str, output: Path | str, *, force: bool = False) -> Rec
         path: the log, whatever its state.
         output: the log to make.
         force: replace an existing output.
+        kind: of the log.
 
     Raises:
         LogError: the log holds no good step, or cannot be read at all.
         OutputError: the output exists, its folder does not, or it cannot be written.
     """
     check_output(Path(output), force=force)
-    log = open_log(path, partial=True)
-    if not len(log):
-        raise LogError(f"{path}: {log.damage or 'it holds no steps'}; there is nothing to recover")
+    found = scan(Path(path), kind)
+    if not found.steps:
+        raise LogError(f"{path}: {found.damage or f'it holds no {kind.unit}s'}; there is nothing to recover")
     copy = StepFile(
         Path(output),
-        metadata=log.found.metadata,
-        attachments=log.header.attachments,
-        channels=channels_of(log),
-        city=log.found.first,
+        metadata=found.metadata,
+        attachments=found.header.attachments,
+        channels=channels_of(found),
+        city=found.first,
         force=force,
+        kind=kind,
         scratch_suffix=".recovering",
     )
     with copy:
-        for step, raw in zip(log.found.steps, log.raw_steps(), strict=True):
+        for step, raw in zip(found.steps, raw_commits(Path(path), found), strict=True):
             copy.commit(step, [(topic, bytes(payload)) for topic, payload in raw])
-    return Recovery(n_steps=len(log), last_step=log.found.steps[-1], damage=log.damage, digest=log.digest)
+    return Recovery(len(found.steps), found.steps[-1], found.damage, found.hash.hex(), kind.unit)
 
 
-def channels_of(log: Log) -> list[Channel]:
+def channels_of(found: Scan) -> list[Channel]:
     """List the topics of a log with their schemas as it carries them, those of a later version too."""
     none = SchemaRecord(0, "", "", b"")
-    pairs = [(item, log.found.schemas.get(item.schema_id, none)) for _, item in sorted(log.found.channels.items())]
+    pairs = [(item, found.schemas.get(item.schema_id, none)) for _, item in sorted(found.channels.items())]
     return [Channel(item.topic, schema.name, schema.data) for item, schema in pairs]

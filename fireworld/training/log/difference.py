@@ -14,6 +14,7 @@ from fireworld_recorder.codec import encode
 
 from fireworld.errors import LogError, expected
 from fireworld.kernels.learning import EXPLORED, GREEDY
+from fireworld.policy.teams.table_words import first_state
 from fireworld.records import ACTIONS, CHOICES, Array
 from fireworld.scenario import Scenario
 from fireworld.shown import SHOWN_MAX, Block, Shown, TextTable
@@ -68,7 +69,8 @@ class FirstDifference:
         what: differs.
         a: the value in the first training, in words.
         b: in the second.
-        entries: of the tables after the episode that differ: (table, state, action, value in A, value in B).
+        entries: of the tables after the episode that differ: (table, state, action, value in A, value in B); of states
+            that a table takes for one the first.
         n_entries: how many there are.
     """
 
@@ -369,7 +371,7 @@ def _in_episode(a: TrainingLog, b: Trained, number: int, pair: tuple[Episode, Ep
     for name in ("scenario", "episode", "seed", "epsilon"):
         x, y = getattr(one, name), getattr(other, name)
         if x != y:
-            return _place(a, number, one, phase="draw", what=name, a_b=(f"{x:.12g}", f"{y:.12g}"))
+            return _place(a, number, one, phase="draw", what=name, a_b=(f"{x}", f"{y}"))
     before = a.trainer_before(number)  # and that of B: the parts before are the same
     x, y = (_learned_by(side, before, record) for side, record in zip((a, b), pair, strict=True))
     entries = _entries(x.tables_after, y.tables_after)
@@ -462,7 +464,10 @@ def _entries(a: Array, b: Array) -> tuple[tuple[int, int, str, float, float], ..
     if a.shape != b.shape:
         return ()
     places = np.argwhere(a != b)
-    found = [(int(t), int(s), ACTIONS[k], float(a[t, s, k]), float(b[t, s, k])) for t, s, k in places]
+    n_states = a.shape[1]
+    found = [
+        (int(t), first_state(int(s), n_states), ACTIONS[k], float(a[t, s, k]), float(b[t, s, k])) for t, s, k in places
+    ]
     return tuple(sorted(found, key=lambda entry: (-abs(entry[3] - entry[4]), entry[:2])))
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+import os
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -12,7 +13,9 @@ import msgspec
 import numpy as np
 from fireworld_recorder.writer import PARTIAL_SUFFIX, LogWriter
 
-from fireworld.errors import LogError, TrainingError, expected
+from fireworld.arguments import path_of, whole_number
+from fireworld.errors import LogError, OutputError, TrainingError, expected
+from fireworld.files import check_output
 from fireworld.kernels.arrays import TOTAL, Array, Learner, Trace
 from fireworld.kernels.choice import table_state
 from fireworld.kernels.learning import EXPLORED, GREEDY, choose_and_learn, take_reward
@@ -25,9 +28,9 @@ from fireworld.records import CityRecord, RunHeader, StepRecord
 from fireworld.simulation.built import BuiltScenario
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.state import fresh_learner
-from fireworld.training.log.reader import TrainingLog
+from fireworld.training.log.reader import TrainingLog, open_training
 from fireworld.training.log.records import TERM_NAMES, Episode
-from fireworld.training.method import Trainer
+from fireworld.training.method import COUNT_MAX, Trainer
 from fireworld.training.methods.sarsa import RULES, Sarsa, SarsaTrainer
 
 LEARNING_ATTACHMENT: Final = "learning.json"
@@ -158,12 +161,20 @@ def episode_run(trainer: SarsaTrainer, episode: Episode, tables: Array, visits: 
     return LearningRun(trainer.build(scenario), seed=episode.seed, team=team, learning=learning)
 
 
-def replay_episode(log: TrainingLog, number: int, output: Path, *, force: bool = False) -> str:
+def replay_episode(
+    log: str | os.PathLike[str] | TrainingLog,
+    scenario: str | int,
+    episode: int,
+    output: str | os.PathLike[str],
+    *,
+    force: bool = False,
+) -> str:
     """Write an episode of a training as the log of a run, worked out by replay and compared with the training log.
 
     Args:
-        log: of the training.
-        number: of the part that the episode is; see `TrainingLog.position`.
+        log: the path of a training log, or one that is open; as far as it is good.
+        scenario: of the episode: its name, or its position in the plan.
+        episode: its number in the scenario, from 0; -1 is the last.
         output: the log to write.
         force: replace an existing one.
 
@@ -174,6 +185,57 @@ def replay_episode(log: TrainingLog, number: int, output: Path, *, force: bool =
         LogError: there is no such episode, or this fireworld computes another one.
         OutputError: the output cannot be written.
     """
+    opened = log if isinstance(log, TrainingLog) else open_training(log, partial=True)
+    return _replay(opened, opened.position(scenario, episode), path_of("output", output), force=force)
+
+
+def replay_every(
+    log: str | os.PathLike[str] | TrainingLog,
+    every: int,
+    folder: str | os.PathLike[str],
+    *,
+    scenario: str | None = None,
+    force: bool = False,
+    on_written: Callable[[], object] = lambda: None,
+) -> dict[Path, str]:
+    """Write every so many episodes of a training as `replay_episode` does.
+
+    Args:
+        log: the path of a training log, or one that is open.
+        every: episodes of a scenario, from its first on.
+        folder: the existing folder for them: SCENARIO-EPISODE.mcap.
+        scenario: of this scenario alone, by its name.
+        force: replace existing logs.
+        on_written: called after each.
+
+    Returns:
+        The digests of the runs by their logs.
+
+    Raises:
+        LogError: there are no such episodes, or this fireworld computes another one.
+        OutputError: one cannot be written; those before are there.
+    """
+    opened = log if isinstance(log, TrainingLog) else open_training(log, partial=True)
+    every, place = whole_number("every", every, least=1, most=COUNT_MAX), path_of("folder", folder)
+    if not place.is_dir():
+        raise OutputError(expected(str(place), "", "an existing folder", "none", "make it first"))
+    names = [one.name for one in opened.scenarios]
+    opened.position(scenario if scenario is not None else opened.lines[0].scenario if len(opened) else 0, -1)
+    chosen = {
+        number: place / episode_file(names[line.scenario], line.episode)
+        for number, line in enumerate(opened.lines)
+        if line.episode % every == 0 and scenario in (None, names[line.scenario])
+    }
+    for path in chosen.values():
+        check_output(path, force=force)
+    written = {}
+    for number, path in chosen.items():
+        written[path] = _replay(opened, number, path, force=force)
+        on_written()
+    return written
+
+
+def _replay(log: TrainingLog, number: int, output: Path, *, force: bool) -> str:
     found = log.episode_at(number)
     trainer = log.trainer()
     if not isinstance(trainer, SarsaTrainer):

@@ -17,7 +17,7 @@ from fireworld_recorder.reader import RawStep, raw_commits
 from fireworld_recorder.scan import TopicSize, scan
 
 from fireworld.arguments import path_of
-from fireworld.errors import FireworldError, LogError, expected, one_line
+from fireworld.errors import FireworldError, LogError, OutputError, expected, one_line
 from fireworld.policy.teams.team import Team
 from fireworld.records import Array
 from fireworld.scenario import Scenario, parse_scenario
@@ -179,6 +179,25 @@ class TrainingLog:
                 wholes.append(number)
         return lines, wholes
 
+    def to_pandas(self, table: str = "") -> pandas.DataFrame:
+        """Return a table of the training as a data frame.
+
+        Args:
+            table: as `fireworld export` writes them: episodes, steps, tables; of a search generations, candidates,
+                fights. "": the first of these.
+
+        Raises:
+            LogError: there is no such table.
+            OutputError: pandas is not installed.
+        """
+        try:
+            import pandas as pd
+        except ImportError:
+            raise OutputError("to_pandas: pandas is not installed; try pip install pandas") from None
+        from fireworld.training.log.export import table_arrays, tables_of
+
+        return pd.DataFrame(table_arrays(self, table or tables_of(self)[0]))
+
     @property
     def scenarios(self) -> list[Scenario]:
         """What is learned in, in the order of the plan."""
@@ -265,21 +284,6 @@ class LearnedEpisode:
     td_error: Array
     value_after: Array
     tables_after: Array
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return a row for each step and brigade."""
-        import pandas as pd
-
-        n, k = self.state.shape
-        pad = np.full((n, self.td_error.shape[1]), np.nan)
-        columns = {"step": np.tile(np.arange(1, pad.shape[1] + 1), n), "brigade": np.repeat(np.arange(n), pad.shape[1])}
-        for name in ("state", "action", "choice"):
-            whole = np.full(pad.shape, -1 if name == "state" else 0)
-            whole[:, :k] = getattr(self, name)
-            columns[name] = whole.ravel()
-        for name in ("value_before", "td_error", "value_after"):
-            columns[name] = getattr(self, name).ravel()
-        return pd.DataFrame(columns)
 
 
 def learned(trainer: SarsaTrainer, record: Episode, scenario: Scenario) -> LearnedEpisode:

@@ -191,6 +191,7 @@ TRAINING: Final = LogKind(
     header_type=TrainingHeader,
     commit_type=PartCommit,
     first_type=Plan,
+    topics=(Plan, Episode, Tables, Tried, PartCommit),
     unchained=frozenset({Tables.topic}),
     unit="part",
     rescue="--resume to continue, or --force to begin again",

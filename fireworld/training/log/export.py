@@ -1,0 +1,260 @@
+"""A training as tables: which there are, and the rows that each part adds to them; as Parquet files or in memory."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import fields
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from fireworld.errors import LogError, OutputError, expected, nearest
+from fireworld.files import new_folder
+from fireworld.policy.teams.ranking_words import WEIGHTS
+from fireworld.policy.teams.table_words import first_state
+from fireworld.records import ACTIONS, CHOICES, Array
+from fireworld.rewards import TERMS
+from fireworld.training.log.reader import LearnedEpisode, Part, TrainingLog, learned
+from fireworld.training.log.records import Episode, Tables, Tried
+from fireworld.training.methods.sarsa import SarsaTrainer
+
+SUFFIX: Final = ".parquet"
+ROWS_PER_GROUP: Final = 1 << 17
+Rows = dict[str, Array]
+"""Columns by name, all of one length."""
+
+TABLES: Final[Mapping[str, str]] = {
+    "episodes": "an episode that tables learned from: how it went and how the policy changed",
+    "steps": "a brigade in a step of an episode: what it saw, chose and got, and what its choice before taught",
+    "tables": "a state of a table that was visited by then: after every scenario and every 50th episode",
+    "generations": "a generation of a search: how its rankings fared",
+    "candidates": "a ranking that was tried in a generation: its weights and its score",
+    "fights": "a ranking on a fire of its generation",
+}
+"""What a row of each table is."""
+OF_KIND: Final[Mapping[type[Any], tuple[str, ...]]] = {
+    Episode: ("episodes", "steps", "tables"),
+    Tried: ("generations", "candidates", "fights"),
+}
+
+
+def tables_of(log: TrainingLog) -> tuple[str, ...]:
+    """Return the names of the tables that a training has."""
+    return next((names for kind, names in OF_KIND.items() if kind in log.trainer().topics), ())
+
+
+def rows_of(log: TrainingLog, names: Collection[str]) -> Iterator[tuple[str, Rows]]:
+    """Yield table and rows, part by part.
+
+    Args:
+        log: the training.
+        names: of the tables wanted.
+
+    Raises:
+        LogError: there is no such table, or the log changed since it was opened.
+    """
+    known = tables_of(log)
+    for name in names:
+        if name not in known:
+            raise LogError(expected("table", "", f"one of {', '.join(known)}", name, nearest(name, known)))
+    trainer = log.trainer()
+    scenarios = [one.name for one in log.scenarios]
+    for number, part in enumerate(log.parts()):
+        if Episode in part:
+            yield from _episode_rows(log, trainer, number, part, scenarios, names)
+        elif Tried in part:
+            yield from _generation_rows(part[Tried], scenarios, names)
+
+
+def table_arrays(log: TrainingLog, name: str) -> Rows:
+    """Return a table whole, in memory; errors as for `rows_of`."""
+    found = [rows for _, rows in rows_of(log, [name])]
+    return {key: np.concatenate([rows[key] for rows in found]) for key in found[0]} if found else {}
+
+
+def _episode_rows(
+    log: TrainingLog, trainer: Any, number: int, part: Part, scenarios: list[str], names: Collection[str]
+) -> Iterator[tuple[str, Rows]]:
+    episode: Episode = part[Episode]
+    place = {"part": number, "scenario": scenarios[episode.scenario], "episode": episode.episode}
+    if "episodes" in names:
+        values = {item.name: getattr(episode, item.name) for item in fields(episode) if "per" not in item.metadata}
+        values |= {"tables_digest": episode.tables_digest.hex()}
+        yield "episodes", {key: np.array([value]) for key, value in {**values, **place}.items()}
+    if "steps" in names:
+        if not isinstance(trainer, SarsaTrainer):
+            raise LogError(expected(str(log.path), "method", "one that learns in episodes", log.method.name))
+        before = trainer.progress.tables, trainer.progress.visits.copy()
+        found = learned(trainer, episode, log.scenarios[episode.scenario])
+        trainer.progress.tables, trainer.progress.visits = before
+        yield "steps", _step_rows(place, found)
+        log.follow(trainer, part, number)
+    if "tables" in names and Tables in part:
+        yield "tables", _table_rows(place, part[Tables])
+
+
+def _step_rows(place: Mapping[str, Any], found: LearnedEpisode) -> Rows:
+    n_brigades, n_rows = found.td_error.shape
+    n_choices, n = found.state.shape[1], n_brigades * n_rows
+    padded = {"state": -1, "action": 0, "choice": 0}
+    columns: Rows = {key: np.full(n, value) for key, value in place.items()}
+    columns["step"] = np.tile(np.arange(1, n_rows + 1, dtype=np.int32), n_brigades)
+    columns["brigade"] = np.repeat(np.arange(n_brigades, dtype=np.int32), n_rows)
+    for name, nothing in padded.items():
+        whole = np.full((n_brigades, n_rows), nothing, dtype=np.int32)
+        whole[:, :n_choices] = getattr(found, name)
+        columns[name] = whole.ravel()
+    chose = columns["choice"]
+    columns["action"] = np.where(chose > 0, np.array(ACTIONS, dtype=object)[columns["action"]], "")
+    columns["choice"] = np.array(CHOICES, dtype=object)[chose]
+    rewards = np.full((len(TERMS), n_rows), np.nan)
+    rewards[:, : found.reward.shape[1]] = found.reward
+    for term, values in zip(TERMS, rewards, strict=True):
+        columns[f"reward_{term.name}"] = np.tile(values, n_brigades)
+    for name in ("value_before", "td_error", "value_after"):
+        columns[name] = getattr(found, name).ravel()
+    return columns
+
+
+def _table_rows(place: Mapping[str, Any], record: Tables) -> Rows:
+    values, visits = record.arrays
+    table, state = np.nonzero(visits.any(axis=2))
+    columns: Rows = {key: np.full(len(table), value) for key, value in place.items()}
+    columns["table"] = table.astype(np.int32)
+    columns["state"] = np.array([first_state(int(row), record.n_states) for row in state], dtype=np.int32)
+    for k, action in enumerate(ACTIONS):
+        name = action.replace("-", "_")
+        columns[f"q_{name}"] = values[table, state, k]
+        columns[f"visits_{name}"] = visits[table, state, k]
+    return columns
+
+
+def _generation_rows(tried: Tried, scenarios: list[str], names: Collection[str]) -> Iterator[tuple[str, Rows]]:
+    n_weights, n_fires = len(tried.mean), len(tried.fire)
+    n = len(tried.weights) // n_weights
+    weights, scores = tried.weights.reshape(n, n_weights), tried.scores.reshape(n, n_fires)
+    if "generations" in names:
+        columns: Rows = {
+            name: np.array([getattr(tried, name)]) for name in ("generation", "score_mean", "score_best", "spread_mean")
+        }
+        for k, weight in enumerate(WEIGHTS):
+            columns[f"mean_{weight.name}"] = tried.mean[k : k + 1]
+            columns[f"spread_{weight.name}"] = tried.spread[k : k + 1]
+        yield "generations", columns
+    if "candidates" in names:
+        rank = {int(candidate): place for place, candidate in enumerate(tried.best)}
+        yield (
+            "candidates",
+            {
+                "generation": np.full(n, tried.generation),
+                "candidate": np.arange(n),
+                "score": scores.mean(axis=1),
+                "place_among_best": np.array([rank.get(k, -1) for k in range(n)]),
+                **{weight.name: weights[:, k] for k, weight in enumerate(WEIGHTS)},
+            },
+        )
+    if "fights" in names:
+        yield (
+            "fights",
+            {
+                "generation": np.full(n * n_fires, tried.generation),
+                "candidate": np.repeat(np.arange(n), n_fires),
+                "scenario": np.tile([scenarios[k] for k in tried.fire], n),
+                "seed": np.tile(tried.seed, n),
+                "score": scores.ravel(),
+            },
+        )
+
+
+def export_training(
+    log: TrainingLog,
+    folder: Path,
+    *,
+    tables: Collection[str] | None = None,
+    force: bool = False,
+    on_part: Callable[[], object] = lambda: None,
+) -> dict[str, int]:
+    """Write a training as a folder of Parquet files, which is there only once it is complete.
+
+    Args:
+        log: the training, as far as it is good.
+        folder: the folder to make.
+        tables: names of the tables to write; None: all that it has.
+        force: replace an earlier export.
+        on_part: called after each part.
+
+    Returns:
+        Rows by table.
+
+    Raises:
+        LogError: there is no such table, or the log changed since it was opened.
+        OutputError: pyarrow is not installed, or the folder exists or cannot be written.
+    """
+    if find_spec("pyarrow") is None:
+        raise OutputError("export: pyarrow is not installed; try pip install 'fireworld[archive]'")
+    names = tables_of(log) if tables is None else tuple(tables)
+    with new_folder(folder, own={f"{name}{SUFFIX}" for name in TABLES}, force=force) as scratch:
+        files = {name: _File(name, scratch, log) for name in names}
+        try:
+            part = 0
+            for name, rows in rows_of(log, names):
+                files[name].add(rows)
+                if name == names[0]:
+                    part += 1
+                    on_part()
+            return {name: file.finish() for name, file in files.items()}
+        finally:
+            for file in files.values():
+                file.close()
+
+
+class _File:
+    """Writes one table, a group of rows after the other."""
+
+    def __init__(self, name: str, folder: Path, log: TrainingLog) -> None:
+        header = log.header
+        facts = {"table": TABLES.get(name, ""), "digest": log.digest, "state": log.state, "damage": log.damage or ""}
+        facts |= {"method": json.dumps({"name": log.method.name, **log.method.as_dict()}), "seed": str(header.seed)}
+        facts |= {"curriculum": header.curriculum, "curriculum_digest": header.curriculum_digest}
+        self._facts = {f"fireworld.{key}": text for key, text in facts.items()}
+        self._path = folder / f"{name}{SUFFIX}"
+        self._held: list[Rows] = []
+        self._n_held = self._n_rows = 0
+        self._writer: Any = None
+
+    def add(self, rows: Rows) -> None:
+        self._held.append(rows)
+        self._n_held += len(next(iter(rows.values())))
+        if self._n_held >= ROWS_PER_GROUP:
+            self._flush()
+
+    def finish(self) -> int:
+        """Write what is held; return the number of rows."""
+        self._flush()
+        return self._n_rows
+
+    def close(self) -> None:
+        if self._writer is not None:
+            self._writer.close()
+
+    def _flush(self) -> None:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        if not self._held:
+            return
+        arrays = {key: np.concatenate([rows[key] for rows in self._held]) for key in self._held[0]}
+        table = pa.table({key: pa.array(_texts(values)) for key, values in arrays.items()})
+        if self._writer is None:
+            schema = table.schema.with_metadata(self._facts)
+            self._writer = pq.ParquetWriter(self._path, schema, compression="zstd")
+        self._writer.write_table(table.replace_schema_metadata(self._facts))
+        self._n_rows += self._n_held
+        self._held, self._n_held = [], 0
+
+
+def _texts(values: Array) -> Any:
+    return values.tolist() if values.dtype.kind in "UO" else values

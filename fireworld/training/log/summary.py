@@ -1,0 +1,109 @@
+"""Summary: what a training log holds and how far it is good, as plain values and in lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import Any
+
+from fireworld.shown import SHOWN_MAX, Block, TextTable
+from fireworld.training.log.reader import TrainingLog
+from fireworld.training.log.records import FORMAT, Episode
+
+
+def training_summary(log: TrainingLog) -> dict[str, Any]:
+    """Return a training's header, state, course and sizes, as `fireworld info --json` writes them.
+
+    Raises:
+        LogError: the log changed since it was opened.
+    """
+    header = log.header
+    return {
+        "path": str(log.path),
+        "format": FORMAT,
+        "state": log.state,
+        "damage": log.damage,
+        "digest": log.digest,
+        "method": {"name": log.method.name, **log.method.as_dict()},
+        "curriculum": {"name": header.curriculum, "digest": header.curriculum_digest},
+        "seed": header.seed,
+        "fireworld_version": header.fireworld_version,
+        "unit": header.unit,
+        "n_parts": len(log),
+        "done": log.done,
+        "team_digest": log.team().digest if len(log) else None,
+        "scenarios": list(_scenarios(log)),
+        "attachments": {name: len(data) for name, data in header.attachments.items()},
+        "n_bytes": log.found.n_bytes,
+        "topics": {topic: asdict(size) for topic, size in log.topics.items()},
+    }
+
+
+def _scenarios(log: TrainingLog) -> Iterator[dict[str, Any]]:
+    """Yield how far each scenario that has begun has come; nothing of a search."""
+    names = [one.name for one in log.scenarios]
+    lines = [line for line in log.lines if isinstance(line, Episode)]
+    for number, name in enumerate(names):
+        mine = [line for line in lines if line.scenario == number]
+        if mine:
+            last = mine[-1]
+            yield {
+                "name": name,
+                "n_episodes": len(mine),
+                "n_steps": sum(line.n_steps for line in mine),
+                "ended": last.ended,
+                "converged": last.converged,
+                "return": last.total_reward,
+                "score": last.score,
+                "score_max": last.score_max,
+                "n_visited": last.n_visited,
+                "drawn": last.drawn,
+            }
+
+
+def describe_training(log: TrainingLog, *, limit: int = SHOWN_MAX) -> Iterator[Block]:
+    """Yield what there is to see of a training: its header, then a table of its scenarios or generations."""
+    found = training_summary(log)
+    method = ", ".join(f"{key} {value}" for key, value in found["method"].items() if key != "name")
+    lines = {
+        "training": f"{log.path}, {found['n_bytes']:,} bytes, {found['format']}",
+        "state": found["damage"]
+        or ("complete" if log.done else "complete as far as it goes: the training is not done"),
+        "method": f"{found['method']['name']}: {method}",
+        "curriculum": f"{found['curriculum']['name']} ({found['curriculum']['digest'][:12]}), seed {found['seed']}",
+        "fireworld": found["fireworld_version"],
+        "digest": found["digest"],
+        "team": found["team_digest"] or "none",
+        log.header.unit + "s": f"{len(log):,}",
+    }
+    for label, text in lines.items():
+        yield f"{label:<12} {text}"
+    rows = found["scenarios"]
+    if rows:
+        yield ""
+        heads = ["scenario", "episodes", "steps", "ends", "return", "score", "states visited"]
+        shown = rows if len(rows) <= limit else [*rows[: limit // 2], *rows[-(limit - limit // 2) :]]
+        yield TextTable(heads, [_cells(row) for row in shown])
+        if len(rows) > len(shown):
+            yield f"{len(rows) - len(shown)} scenarios between these; --json has all"
+    elif len(log):
+        yield ""
+        table = [
+            [str(line.generation), f"{line.score_mean:.3f}", f"{line.score_best:.3f}", f"{line.spread_mean:.2f}"]
+            for line in log.lines[-limit:]
+            if hasattr(line, "generation")
+        ]
+        yield TextTable(["generation", "score", "of the best", "spread"], table)
+
+
+def _cells(row: dict[str, Any]) -> list[str]:
+    ends = "settled" if row["converged"] else "not settled" if row["ended"] else "under way"
+    return [
+        row["name"],
+        str(row["n_episodes"]),
+        f"{row['n_steps']:,}",
+        ends,
+        f"{row['return']:,.0f}",
+        f"{row['score']:.2f} of {row['score_max']:.0f}",
+        str(row["n_visited"]),
+    ]
