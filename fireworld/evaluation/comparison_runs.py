@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from fireworld.errors import PolicyError
 from fireworld.evaluation.results import Result, Results, RunKey, simulator_version
-from fireworld.evaluation.runs import Outcomes, Row, outcomes, row_of, run_compiled, run_step_by_step
+from fireworld.evaluation.runs import Outcomes, Row, row_of, run_compiled, run_step_by_step
 from fireworld.executors import AnyExecutor, Workers, n_cores, processes, threads, workers_for
 from fireworld.interrupt import Interrupted
 from fireworld.policy.asking import describe
@@ -141,7 +141,7 @@ class ComparisonRuns:
         """Return how a policy's runs came out, by scenario; all of them must be known."""
         known = self.results.by_run
         return {
-            label: outcomes(self.seeds, [known[key].row for key in self._keys(policy, built)])
+            label: Outcomes(self.seeds, [known[key].row for key in self._keys(policy, built)])
             for label, built in self.built.items()
         }
 

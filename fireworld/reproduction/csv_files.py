@@ -98,10 +98,9 @@ def _episodes_file(curves: Iterable[LearningCurve]) -> str:
     for (team, scenario), group in groups.items():
         for episode in range(max(curve.n_episodes for curve in group)):
             in_it = [curve for curve in group if curve.n_episodes > episode]
-            rewards = [float(curve.total_reward[episode]) for curve in in_it]
-            changes = [int(curve.n_changed[episode]) for curve in in_it]
-            n = len(in_it)
-            rows.append((team, scenario, episode, n, math.fsum(rewards) / n, sum(changes) / n))
+            mean_return = math.fsum(float(curve.total_reward[episode]) for curve in in_it) / len(in_it)
+            mean_changes = sum(int(curve.n_changed[episode]) for curve in in_it) / len(in_it)
+            rows.append((team, scenario, episode, len(in_it), mean_return, mean_changes))
     return _csv(("team", "scenario", "episode", "repetitions", "mean_return", "mean_policy_changes"), rows)
 
 
@@ -110,8 +109,8 @@ def _runs_file(study: Study) -> str:
     for scenario, teams in study.outcomes.items():
         for team, repetitions in teams.items():
             for number, outcomes in enumerate(repetitions, 1):
-                values = zip(outcomes.seed.tolist(), outcomes.rows, strict=True)
-                rows += [(scenario, team, number, seed, *row) for seed, row in values]
+                of_seeds = zip(outcomes.seeds, outcomes.rows, strict=True)
+                rows += [(scenario, team, number, seed, *row) for seed, row in of_seeds]
     return _csv(("scenario", "team", "repetition", "seed", *COLUMNS), rows)
 
 

@@ -93,19 +93,11 @@ class PaperTables:
     """Share of the repetitions in which the policy settled, by rows of Table 1."""
     tests: Sequence[PaperPair]
     more_brigades: Sequence[PaperPair]
-    shares: Sequence[TeamShare]
-    """Over the tests of Table 2."""
-    shares_more_brigades: Sequence[TeamShare]
-    """Over the tests of Table 3."""
-    comparisons: Sequence[TeamComparison]
-    """Over the tests of Table 2."""
+    shares: Sequence[TeamShare]  # over the tests of Table 2
+    shares_more_brigades: Sequence[TeamShare]  # over the tests of Table 3
+    comparisons: Sequence[TeamComparison]  # over the tests of Table 2
     agreement: Estimate
     """Share of the states met in which all brigades of the cooperative team prefer the same action."""
-
-    @property
-    def cells(self) -> list[PaperCell]:
-        """Every value of the paper."""
-        return [*self.trainings, *cells_of([*self.tests, *self.more_brigades])]
 
 
 def make_tables(study: Study) -> PaperTables:
