@@ -29,43 +29,23 @@ RUNS_WORTH_A_PROCESS: Final = 8
 
 @dataclass(frozen=True)
 class RunnablePolicy:
-    """A policy of a comparison.
-
-    Attributes:
-        given: what it is made of, anew for every run; of a policy that runs in compiled code, the policy itself.
-        named: the policy, made once.
-        name: as it was asked for: two team files may have one name in two folders.
-        identity: digest of what it does; empty if that is not known.
-        key: the identity; where there is none, its place among the policies.
-    """
+    """A policy of a comparison."""
 
     given: Any
-    named: NamedPolicy
-    name: str
-    identity: str
-    key: str
-
-    @property
-    def compiled(self) -> bool:
-        """Whether it runs in compiled code."""
-        return isinstance(self.given, KernelPolicy)
-
-    @property
-    def portable(self) -> bool:
-        """Whether other processes can make it."""
-        return self.compiled or self.named.can_be_found_again
+    """What it is made of, anew for every run; of a policy that runs in compiled code, the policy itself."""
+    named: NamedPolicy  # made once
+    name: str  # as it was asked for: two team files may have one name in two folders
+    key: str  # its identity; where there is none, its place among the policies
 
 
 def runnable(given: Any, place: int) -> RunnablePolicy:
     """Find a policy by its name, file, class, object, or function; errors as for `find_policy`."""
     named = find_policy(given)
-    identity = named.identity
     return RunnablePolicy(
         given=named.policy if isinstance(named.policy, KernelPolicy) else given,
         named=named,
         name=str(given) if isinstance(given, str | os.PathLike) else named.name,
-        identity=identity,
-        key=identity or f"policy {place}",
+        key=named.identity or f"policy {place}",
     )
 
 
@@ -159,8 +139,10 @@ class ComparisonRuns:
         anywhere, sent, here = list[RunKey](), list[RunKey](), list[RunKey]()
         chosen = not (executor is None or isinstance(executor, int))
         for key, (policy, _, _) in self.missing.items():
-            share = anywhere if chosen or policy.compiled else sent if policy.portable else here
-            share.append(key)
+            if chosen or isinstance(policy.given, KernelPolicy):
+                anywhere.append(key)
+            else:
+                (sent if policy.named.can_be_found_again else here).append(key)
         yield anywhere, workers_for(executor, stop=stop)
         n = min(executor if isinstance(executor, int) else _n_processes(), len(sent) // RUNS_WORTH_A_PROCESS)
         yield sent, processes(n, stop=stop) if n > 1 else threads(1, stop=stop)

@@ -158,13 +158,7 @@ class Pairing:
 def compare_outcomes(
     of_a: Mapping[str, Outcomes], of_b: Mapping[str, Outcomes], *, same_policy: bool = False
 ) -> list[Pairing]:
-    """Compare two policies, scenario by scenario and then over all; all metrics of each.
-
-    Args:
-        of_a: the reference's runs by scenario, the same seeds in each.
-        of_b: the new policy's, of the same scenarios and seeds.
-        same_policy: the two are one policy.
-    """
+    """Compare the runs of two policies, by scenario and of the same seeds: in each scenario, then over all."""
     everything: list[tuple[str | None, list[str]]] = [*((name, [name]) for name in of_a), (None, list(of_a))]
     return [
         _pair(scenario, metric, *([of[name] for name in within] for of in (of_a, of_b)), same_policy=same_policy)
@@ -179,13 +173,9 @@ def over_all(pairings: Sequence[Pairing], metric: str = METRICS[0].name) -> Pair
 
 
 def judge(pairing: Pairing, *, margin: float = 0.0) -> Judgement:
-    """Judge whether B is not worse than A.
+    """Judge whether B is not worse than A; `margin`, in the metric's unit, is a loss that does not matter.
 
     Not worse: the interval of the gain does not reach below -margin. Worse: it does, and lies wholly below zero.
-
-    Args:
-        pairing: what was measured.
-        margin: loss that does not matter, in the metric's unit; >= 0.
     """
     if pairing.verdict == "the same policy":
         return "not worse"

@@ -34,7 +34,7 @@ class DifferencePanel:
     label: str
     unit: str
     higher_is_better: bool | None  # None: neither is better
-    lines: Mapping[str, tuple[Array, tuple[float, float, float]]]
+    lines: Mapping[str, tuple[Array, Sequence[float]]]
     """By scenario, the last over all if there are several: (seeds,) B - A; its mean, and the ends of its interval."""
 
 
