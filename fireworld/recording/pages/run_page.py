@@ -44,15 +44,8 @@ _TARGETS_SHOWN: Final = 12
 def report(logs: AnyRun | Sequence[AnyRun], output: Path | str, *, force: bool = False) -> None:
     """Write one recording, or two of one city, as an HTML page that needs no other file.
 
-    Args:
-        logs: paths of recordings, or runs; those that were cut off or damaged are reported as far as they are good.
-        output: a .html file.
-        force: replace an existing file.
-
-    Raises:
-        OutputError: the file cannot be written.
-        ViewError: matplotlib is not installed, a recording has no steps, or the cities differ.
-        LogError: a recording cannot be read.
+    Recordings are paths or runs; those that were cut off or damaged are reported as far as they are good. Errors:
+    OutputError, LogError, or ViewError if there is no matplotlib, no step, or if the cities differ.
     """
     check_output(Path(output), endings=ENDINGS, force=force)
     runs = open_one_or_two(logs)
@@ -62,16 +55,11 @@ def report(logs: AnyRun | Sequence[AnyRun], output: Path | str, *, force: bool =
             "curves": png_bytes(draw_curves(runs)),
             "timeline": png_bytes(draw_timeline(runs)),
         }
-    write_file(Path(output), run_page(runs, images).encode())
+    write_file(Path(output), _run_page(runs, images).encode())
 
 
-def run_page(logs: Sequence[StoredRun], images: Mapping[str, bytes]) -> str:
-    """Write the page; it needs no other file.
-
-    Args:
-        logs: one recording, or two of the same city; with steps.
-        images: PNG files: "maps", "curves", "timeline".
-    """
+def _run_page(logs: Sequence[StoredRun], images: Mapping[str, bytes]) -> str:
+    """Write the page, with PNG files of the "maps", "curves" and "timeline" of all runs."""
     names = _names(logs)
     headers = [log.header for log in logs]
     title = " against ".join(f"{one_line(one.scenario)}, {one_line(one.policy)}, seed {one.seed}" for one in headers)

@@ -32,23 +32,11 @@ def view(
 ) -> None:
     """Show one recording, or two of one city side by side, in Rerun; return when its window is closed.
 
-    Args:
-        logs: paths of recordings, or runs; those that were cut off or damaged are shown as far as they are good.
-        save: write a Rerun file instead.
-        force: replace an existing file.
-        web: serve the view to browsers on this machine instead, until Ctrl-C.
-        port: of the page that `web` serves.
-        announce: called with the address of that page.
-        focus: ids of buildings whose temperatures are plotted; by default, those that burn first.
-        first_step: first step to show.
-        last_step: last step to show.
-        every: show every n-th step.
-        air: show the heat of the air at every step, which is computed by a replay.
-
-    Raises:
-        ViewError: there is no Rerun or no display, the cities differ, or there is no such step or building.
-        OutputError: the file cannot be written.
-        LogError: a recording cannot be read, or does not replay to what is recorded.
+    Recordings are paths or runs; those that were cut off or damaged are shown as far as they are good. With `save` a
+    Rerun file is written instead; with `web` the view is served to browsers on this machine until Ctrl-C, and
+    `announce` called with its address. `focus`: ids of buildings whose temperatures are plotted, by default those that
+    burn first. `air`: show its heat at every step, which is computed by a replay. Errors: OutputError, LogError, or
+    ViewError if there is no Rerun, no display, no such step or building, or if the cities differ.
     """
     held = open_to_show(logs)
     names = [run_name(recording) for recording in held]
