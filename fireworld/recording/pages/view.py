@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -46,12 +47,13 @@ def view(
         held = [replay_with_air(recording, source=name) for recording, name in zip(held, names, strict=True)]
     shown = [select_steps(one, first=first_step, last=last_step, every=every) for one in held]
     outcome = _outcome([Path(name).name for name in names], shown)
+    write = functools.partial(app.save, shown, focus=focus, outcome=outcome)
     if save is not None:
-        app.save(shown, Path(save), focus=focus, outcome=outcome, force=force)
+        write(Path(save), force=force)
     elif web:
-        app.serve(shown, focus=focus, outcome=outcome, port=port or app.WEB_PORT, announce=announce)
+        app.serve(write, port=port or app.WEB_PORT, announce=announce)
     else:
-        app.show(shown, focus=focus, outcome=outcome)
+        app.show(write)
 
 
 def _outcome(heads: Sequence[str], recordings: Sequence[Recording]) -> OutcomePage:

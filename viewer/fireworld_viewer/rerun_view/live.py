@@ -27,11 +27,7 @@ Screen = Callable[[], ViewerProcess]
 
 
 def own_window() -> Screen:
-    """Return a window of Rerun's viewer, which stays when the run has ended.
-
-    Raises:
-        ViewError: there is no display, or no viewer.
-    """
+    """Return a window of Rerun's viewer, which stays when the run has ended; ViewError without display or viewer."""
     program = str(app.viewer_executable())
     app.check_display("--view", "--view-url of a viewer that runs, or --record and `fireworld view`")
     options = ("--bind", app.LOCALHOST, "--port", str(app.free_port()), "--hide-welcome-screen", "--expect-data-soon")
@@ -39,13 +35,9 @@ def own_window() -> Screen:
 
 
 def running_viewer(url: str) -> Screen:
-    """Return a viewer, or a server of one, that runs on this machine.
+    """Return a viewer, or a server of one, that runs on this machine, by its rerun+http://127.0.0.1:9876/proxy.
 
-    Args:
-        url: as the viewer shows it, rerun+http://127.0.0.1:9876/proxy.
-
-    Raises:
-        ViewError: another kind of address, or nothing listens there, or Rerun is missing.
+    ViewError for another kind of address, or if nothing listens there, or Rerun is missing.
     """
     try:
         parts = urlsplit(url)
@@ -64,10 +56,7 @@ def running_viewer(url: str) -> Screen:
 
 
 class RunEncoder:
-    """Encodes the steps of one run, as they come, as bytes that Rerun reads.
-
-    The viewer calls the run by the title; by scenario, policy and seed if it is left out.
-    """
+    """Encodes the steps of one run, as they come, as bytes that Rerun reads; without a title it is named by itself."""
 
     def __init__(self, header: RunHeader, city: CityRecord, *, title: str = "") -> None:
         self._header, self._city, self._title = header, city, title

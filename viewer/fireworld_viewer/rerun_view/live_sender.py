@@ -23,12 +23,7 @@ _PIECE_BYTES: Final = 1 << 16
 class ViewerProcess:
     """A process of Rerun's program that reads its standard input: the viewer itself, or a relay to one that runs.
 
-    Args:
-        command: the program and its arguments.
-        stays: whether it stays when the input ends, as a window does that somebody still looks at.
-
-    Raises:
-        ViewError: it cannot be started.
+    It may stay when the input ends, as a window does that somebody still looks at. ViewError if it cannot be started.
     """
 
     def __init__(self, command: Sequence[str], *, stays: bool) -> None:
@@ -49,11 +44,7 @@ class ViewerProcess:
         self._input = self._process.stdin
 
     def write(self, content: bytes) -> int:
-        """Write a piece, waiting while the viewer is busy, and return the number of bytes written, some or all.
-
-        Raises:
-            OSError: the viewer is closed.
-        """
+        """Write some or all, waiting while the viewer is busy; return how many bytes. OSError if it is closed."""
         return self._input.write(content[:_PIECE_BYTES]) or 0
 
     def close(self, *, finished: bool) -> bool:
@@ -78,11 +69,8 @@ class ViewerProcess:
 class BackgroundSender(Generic[Item]):
     """Sends items in batches. `put` never waits; if too many items wait, every second of them is left out.
 
-    Args:
-        encode: makes the bytes of a batch, in the sender's thread.
-        process: where they go.
-        n_waiting_max: items that may wait, which bounds the memory.
-        warn: called at most once, with a line on what the viewer does not show and why.
+    `encode` makes the bytes of a batch, in the sender's thread. `n_waiting_max` bounds the memory. `warn` is called at
+    most once, with a line on what the viewer does not show and why.
     """
 
     def __init__(
