@@ -156,7 +156,7 @@ def test_web_and_window_get_what_they_are_told(logs, monkeypatch: pytest.MonkeyP
         write(Path("served"))
         served.append(port)
 
-    monkeypatch.setattr(app, "save", lambda recordings, path, *, focus, **_: saved.append((len(recordings), focus)))
+    monkeypatch.setattr(app, "save", lambda recordings, _, *, focus, **__: saved.append((len(recordings), focus)))
     monkeypatch.setattr(app, "show", lambda write: write(Path("shown")))
     monkeypatch.setattr(app, "serve", serve)
     assert view("a.mcap", "b.mcap").exit_code == 0

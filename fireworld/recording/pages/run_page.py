@@ -11,12 +11,11 @@ from typing import Final
 
 import numpy as np
 from fireworld_recorder.totals import final_outcome
-from fireworld_viewer.pictures.curves import draw_curves
-from fireworld_viewer.pictures.decision_timeline import draw_timeline
+from fireworld_viewer.pictures.curves import draw_curves, draw_timeline
 from fireworld_viewer.pictures.figure_files import plain_style, png_bytes
 from fireworld_viewer.pictures.maps import draw_steps
-from fireworld_viewer.story.counts import Counts, count_choices
 from fireworld_viewer.story.narration import event_lines
+from fireworld_viewer.story.series import Counts, count_choices
 from fireworld_viewer.story.steps import evenly_spaced
 
 from fireworld.errors import one_line

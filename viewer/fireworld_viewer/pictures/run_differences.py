@@ -73,13 +73,9 @@ def draw_difference_curves(
     *,
     first_step: int | None,
 ) -> Figure:
-    """Draw three curves of both runs, and how many buildings differ.
+    """Draw three curves of A and of B by title, those after the first counts, and how many buildings differ by label.
 
-    Args:
-        steps: of the numbers.
-        curves: by title: of A and of B; those after the first are counts.
-        n_buildings: by label: how many buildings differ, in anything and in fieryness.
-        first_step: of the first difference; None for none.
+    All numbers are over the steps; `first_step` is that of the first difference.
     """
     figure = new_figure(12.0, 6.4, dpi=110, paper="white", layout="constrained")
     panels = figure.subplots(2, 2, sharex=True).ravel()
