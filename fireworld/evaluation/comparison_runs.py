@@ -23,8 +23,7 @@ from fireworld.scenario import Scenario
 from fireworld.simulation.built import BuiltScenario, build_scenario
 
 SAVE_EVERY_RUNS: Final = 100
-RUNS_WORTH_A_PROCESS: Final = 8
-"""A process takes about as long to start as these."""
+RUNS_WORTH_A_PROCESS: Final = 8  # a process takes about as long to start as these
 
 
 @dataclass(frozen=True)
@@ -54,8 +53,7 @@ class PolicyRun:
     """A run to be made, here or in another process."""
 
     built: BuiltScenario
-    label: str
-    """The scenario as errors name it."""
+    label: str  # the scenario as errors name it
     policy: Any
     seed: int
 

@@ -26,10 +26,8 @@ Judgement = Literal["not worse", "worse", "cannot tell"]
 
 N_SEEDS_MIN: Final = 6
 """Seeds that must differ for a verdict: five all of one sign come by chance once in sixteen times."""
-N_SEEDS_ENOUGH: Final = 20
-"""Below it intervals are too narrow."""
-N_SEEDS_MAX: Final = 10_000
-"""Where more would be needed, the difference is too small for a verdict."""
+N_SEEDS_ENOUGH: Final = 20  # below it intervals are too narrow
+N_SEEDS_MAX: Final = 10_000  # where more would be needed, the difference is too small for a verdict
 _POWER: Final = 7.849
 """(1.960 + 0.842)^2: an interval of 95 % that leaves out zero four times in five."""
 
@@ -52,13 +50,11 @@ class Side:
 class Pairing:
     """One metric in one scenario, or over all."""
 
-    scenario: str | None
-    """None: over all."""
+    scenario: str | None  # None: over all
     metric: Metric
     a: Side
     b: Side
-    differences: Array
-    """(n_seeds,) B - A; over all: mean over the scenarios."""
+    differences: Array  # (n_seeds,) B - A; over all: mean over the scenarios
     difference: Estimate
     improvement: Estimate
     """Probability that a run of B is better than its pair; a tie counts as half."""

@@ -48,16 +48,14 @@ class Result:
 
     scenario: str
     policy: str
-    row: Row
-    """None stands where the file is older than the column."""
+    row: Row  # None stands where the file is older than the column
 
 
 @dataclass
 class Results:
     """Results by run: those of a file, if there is one, and those added since."""
 
-    path: Path | None
-    """None: held in memory only."""
+    path: Path | None  # None: held in memory only
     by_run: dict[RunKey, Result] = field(default_factory=dict)
     n_unsaved: int = 0
 

@@ -19,8 +19,7 @@ from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.protocol import Policy
 from fireworld.simulation.built import BuiltScenario
 
-Row = tuple[Any, ...]
-"""How one run came out: COLUMNS in their order."""
+Row = tuple[Any, ...]  # how one run came out: COLUMNS in their order
 KINDS: Final[dict[str, type]] = {name: get_type_hints(Outcome)[attribute] for name, attribute in COLUMNS.items()}
 """The Python type of each column: int, float or bool."""
 

@@ -29,12 +29,9 @@ class Estimate:
     """A mean over repetitions and seeds, and how sure it is."""
 
     mean: float
-    low: float
-    """Lower end of the 95 % interval."""
-    high: float
-    """Upper end of the 95 % interval."""
-    interquartile_mean: float
-    """Mean of the middle half of all values: what a typical run comes to."""
+    low: float  # lower end of the 95 % interval
+    high: float  # upper end of the 95 % interval
+    interquartile_mean: float  # mean of the middle half of all values: what a typical run comes to
     n_repetitions: int
     n_seeds: int
 

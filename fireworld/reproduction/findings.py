@@ -23,8 +23,7 @@ from fireworld.reproduction.study import NO_WATER, Study
 from fireworld.shown import text_table
 
 Answer = Literal["reproduced", "partly", "not reproduced", "open", "yes", "no"]
-N_ENOUGH: Final = 20
-"""Repetitions and seeds below which a claim about learning is not to be made."""
+N_ENOUGH: Final = 20  # repetitions and seeds below which a claim about learning is not to be made
 _MARKS: Final = {WITHIN: "=", NEAR: "~", APART: "x"}
 _QUANTITIES: Final = {"convergence episode": "episodes", "time to complete": "time"}
 _HEADS: Final = ("scenario", "quantity", "without cooperation", "with")

@@ -25,8 +25,7 @@ from fireworld.training.training import check_same
 
 FORMAT: Final = "fireworld-reproduction/1"
 REPORT: Final = "report.html"
-SETTINGS: Final = "kept/settings.json"
-"""What the work in a folder was begun with."""
+SETTINGS: Final = "kept/settings.json"  # what the work in a folder was begun with
 SUBFOLDERS: Final = ("kept", "teams", "recordings", "figures")
 _HINT: Final = "delete it and it is made anew"
 

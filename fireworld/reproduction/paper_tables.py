@@ -29,8 +29,7 @@ class PaperCell:
     team: str
     paper: float
     ours: Estimate
-    ours_max: float | None = None
-    """Greatest possible value, of a score."""
+    ours_max: float | None = None  # greatest possible value, of a score
 
     @property
     def verdict(self) -> str:
@@ -51,8 +50,7 @@ class PaperPair:
 
     without: PaperCell
     together: PaperCell
-    difference: Estimate
-    """With - without, run by run."""
+    difference: Estimate  # with - without, run by run
 
     @property
     def claim_holds(self) -> bool | None:
@@ -80,8 +78,7 @@ class TeamComparison:
     other: str
     question: str
     difference: Estimate
-    improvement: Estimate
-    """Probability that a run of the first is the better one."""
+    improvement: Estimate  # probability that a run of the first is the better one
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,7 @@ from fireworld.training.curriculum import Curriculum, load_curriculum
 from fireworld.training.methods.sarsa import PAPER
 
 CURRICULUM: Final = "paper"
-FIRST_SEED: Final = 1000
-"""Of the tests."""
+FIRST_SEED: Final = 1000  # of the tests
 N_REPETITIONS: Final = 20
 N_SEEDS: Final = 20
 N_REPETITIONS_QUICK: Final = 2

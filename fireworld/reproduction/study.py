@@ -31,13 +31,10 @@ TEAMS: Final[Mapping[str, str]] = {
     NO_WATER: "control: the fire left to itself",
 }
 """What is tested, by name."""
-RULES: Final = ("random", *FIXED, NO_WATER)
-"""Teams that do not differ between repetitions."""
-LEARNED: Final = tuple(team for team in TEAMS if team not in RULES)
-"""Teams that do."""
+RULES: Final = ("random", *FIXED, NO_WATER)  # teams that do not differ between repetitions
+LEARNED: Final = tuple(team for team in TEAMS if team not in RULES)  # teams that do
 
-Tested = dict[str, dict[str, Outcomes]]
-"""Outcomes by scenario and team."""
+Tested = dict[str, dict[str, Outcomes]]  # outcomes by scenario and team
 
 
 @dataclass(frozen=True)
@@ -48,11 +45,9 @@ class LearningCurve:
     team: str
     """TOGETHER or TOGETHER_WITHOUT_FLAGS; both begin with the same stage alone, listed once, as ALONE."""
     scenario: str
-    scenario_number: int
-    """Counted through the curriculum, from 0."""
+    scenario_number: int  # counted through the curriculum, from 0
     converged: bool
-    score: float
-    """Of the last episode."""
+    score: float  # of the last episode
     score_max: float
     total_reward: Array  # (episodes,) return of each episode
     n_changed: Array  # (episodes,) states whose greedy action changed

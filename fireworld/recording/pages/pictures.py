@@ -17,8 +17,7 @@ from fireworld.files import check_output, write_file
 from fireworld.recording.inputs import AnyRecording, open_to_show
 from fireworld.records import Recording, StepRecord
 
-ENDINGS: Final = (*STILLS, *FILMS)
-"""Of files that can be rendered."""
+ENDINGS: Final = (*STILLS, *FILMS)  # of files that can be rendered
 
 
 @dataclass(frozen=True)

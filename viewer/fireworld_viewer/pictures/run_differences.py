@@ -18,8 +18,7 @@ from fireworld_viewer.story.steps import compare_damage
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Gaps = Sequence[float | None]
-"""Numbers over steps; None where a run does not have the step."""
+Gaps = Sequence[float | None]  # numbers over steps; None where a run does not have the step
 
 _VIOLET: Final = "#a0209a"
 _BRIGADE: Final = hexadecimal(colors.ACTIVITY_RGB[2])
