@@ -179,7 +179,7 @@ class Comparison:
             ArgumentError: there is no such policy.
             ViewError: matplotlib is not installed.
         """
-        from fireworld_viewer.pictures.policy_figures import DifferencePanel, draw_paired_differences
+        from fireworld_viewer.pictures.differences import DifferencePanel, draw_paired_differences
 
         one = self.of(policy)
         a, b = (compared.name for compared in one.policies)

@@ -23,7 +23,6 @@ _NEAR_SHARE: Final = 0.25
 class PaperCell:
     """One value of the paper, and what we measured."""
 
-    table: int
     scenario: str
     quantity: str
     team: str
@@ -107,8 +106,8 @@ def make_tables(study: Study) -> PaperTables:
             estimate(_column(curve.converged for curve in study.curves_of(TOGETHER, row.scenario)))
             for row in paper.TABLE_1
         ],
-        tests=[pair for row in paper.TABLE_2 for pair in _pairs(study, row, table=2)],
-        more_brigades=[pair for row in paper.TABLE_3 for pair in _pairs(study, row, table=3)],
+        tests=[pair for row in paper.TABLE_2 for pair in _pairs(study, row)],
+        more_brigades=[pair for row in paper.TABLE_3 for pair in _pairs(study, row)],
         shares=shares,
         shares_more_brigades=_shares(study, names_3),
         comparisons=_comparisons(study, names_2, shares),
@@ -131,12 +130,12 @@ def _training_cells(study: Study, row: paper.PaperTraining) -> list[PaperCell]:
     episodes = estimate(_column(curve.n_episodes for curve in curves))
     score = estimate(_column(curve.score for curve in curves))
     return [
-        PaperCell(1, row.scenario, "convergence episode", TOGETHER, row.convergence_episode, episodes),
-        PaperCell(1, row.scenario, "score", TOGETHER, row.score, score, curves[0].score_max),
+        PaperCell(row.scenario, "convergence episode", TOGETHER, row.convergence_episode, episodes),
+        PaperCell(row.scenario, "score", TOGETHER, row.score, score, curves[0].score_max),
     ]
 
 
-def _pairs(study: Study, row: paper.PaperTest, *, table: int) -> list[PaperPair]:
+def _pairs(study: Study, row: paper.PaperTest) -> list[PaperPair]:
     made = []
     for quantity, key, values in (
         ("time to complete", "steps", row.steps),
@@ -147,8 +146,8 @@ def _pairs(study: Study, row: paper.PaperTest, *, table: int) -> list[PaperPair]
         best = float(study.values(row.scenario, ALONE, "score_max")[0, 0]) if key == "score" else None
         made.append(
             PaperPair(
-                PaperCell(table, row.scenario, quantity, ALONE, values[0], estimate(without), best),
-                PaperCell(table, row.scenario, quantity, TOGETHER, values[1], estimate(together), best),
+                PaperCell(row.scenario, quantity, ALONE, values[0], estimate(without), best),
+                PaperCell(row.scenario, quantity, TOGETHER, values[1], estimate(together), best),
                 paired_difference(together, without),
             )
         )

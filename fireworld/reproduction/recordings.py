@@ -8,9 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from fireworld_viewer.pictures.curves import LearningPanel, draw_learning_curves
 from fireworld_viewer.pictures.figure_files import png_bytes
 from fireworld_viewer.pictures.maps import draw_record
-from fireworld_viewer.pictures.policy_figures import LearningPanel, draw_learning_curves
 
 from fireworld.kernels.arrays import Array
 from fireworld.policy.names import NamedPolicy

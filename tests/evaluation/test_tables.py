@@ -32,7 +32,7 @@ from tests.evaluation import synthetic
 )
 def test_the_verdict_of_a_cell(mean, low, high, verdict):
     ours = Estimate(mean, low, high, mean, 2, 3)
-    assert PaperCell(2, "test-1", "score", ALONE, 100.0, ours).verdict == verdict
+    assert PaperCell("test-1", "score", ALONE, 100.0, ours).verdict == verdict
 
 
 def cells_in(tables):

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from fireworld_recorder.spread import differing_entities
+from fireworld_viewer.pictures.differences import draw_difference_curves, draw_difference_map
 from fireworld_viewer.pictures.figure_files import png_bytes
 from fireworld_viewer.pictures.maps import draw_record
-from fireworld_viewer.pictures.run_differences import draw_difference_curves, draw_difference_map
 from fireworld_viewer.story.series import LABELS
 
 from fireworld.html_page import compared_row, html_figure, html_mark, html_page, html_table, text_cell

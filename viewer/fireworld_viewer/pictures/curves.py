@@ -1,9 +1,10 @@
-"""Curves of one run or two: score, buildings, reward, tanks; and timelines of what the brigades chose and did."""
+"""Curves of one run or two, timelines of what the brigades chose and did, and curves of how teams learned."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from fireworld.records import ACTION_NAMES, ACTIVITIES, Array, Recording
 from fireworld_viewer import colors
 from fireworld_viewer.pictures.city_map import hexadecimal
-from fireworld_viewer.pictures.figure_files import INK, new_figure, open_frame
+from fireworld_viewer.pictures.figure_files import INK, PAIR_COLORS, new_figure, open_frame
 from fireworld_viewer.story.series import LABELS, per_brigade, series
 
 if TYPE_CHECKING:
@@ -197,3 +198,42 @@ def _draw_codes(figure: Figure, recordings: Sequence[Recording], total: float) -
             handles=handles, loc="center left", bbox_to_anchor=(0.13, height), ncols=max(1, len(handles)),
             frameon=False, fontsize=9, labelcolor=INK, borderaxespad=0, columnspacing=1.4, handlelength=1.3,
         )  # fmt: skip
+
+
+_PANELS_ACROSS: Final = 4  # of learning curves
+
+
+@dataclass(frozen=True, kw_only=True)
+class LearningPanel:
+    """What one panel shows."""
+
+    title: str
+    curves: Mapping[str, Sequence[Array]]
+    """By team, one or two: (episodes,) numbers of each repetition; repetitions may differ in length."""
+    marked_episode: float  # where a dotted line stands
+
+
+def draw_learning_curves(panels: Sequence[LearningPanel], *, label: str, mark: str) -> Figure:
+    """Draw the panels in rows of four; the label is that of the numbers, the mark that of the dotted lines."""
+    figure = new_figure(12.0, 5.6, dpi=110, paper="white", layout="constrained")
+    grid = figure.subplots(-(-len(panels) // _PANELS_ACROSS), _PANELS_ACROSS, sharex=True, squeeze=False).ravel()
+    for axes, panel in zip(grid, panels, strict=False):
+        for (team, repetitions), color in zip(panel.curves.items(), PAIR_COLORS, strict=False):
+            for curve in repetitions:
+                axes.plot(curve, color=color, linewidth=0.5, alpha=0.25)
+            axes.plot(_mean_curve(repetitions), color=color, linewidth=1.8, label=team)
+        axes.axvline(panel.marked_episode, color="#555555", linewidth=1.0, linestyle=":", label=mark)
+        axes.set_title(panel.title, fontsize=10, loc="left")
+        open_frame(axes)
+        axes.tick_params(labelsize=8)
+    grid[0].legend(fontsize=8, frameon=False)
+    figure.supxlabel("episode", fontsize=10)
+    figure.supylabel(label, fontsize=10)
+    return figure
+
+
+def _mean_curve(repetitions: Sequence[Array]) -> Array:
+    """Return the mean over the repetitions that last as long: (longest,)."""
+    longest = np.array([*zip_longest(*repetitions, fillvalue=np.nan)], order="F").T
+    means: Array = np.nanmean(longest, axis=0)
+    return means
