@@ -60,7 +60,7 @@ def command(
     from fireworld_viewer.pictures.film import FILMS
 
     from fireworld.files import check_output
-    from fireworld.recording.pages.render import ENDINGS
+    from fireworld.recording.pages.pictures import ENDINGS
 
     check_output(output, endings=ENDINGS, force=force)
     if output.suffix.lower() in FILMS:
@@ -89,7 +89,7 @@ def _step_numbers(option: str, text: str) -> list[int]:
 
 
 def _render_picture(paths: Sequence[Path], output: Path, steps: Sequence[int], *, force: bool) -> None:
-    from fireworld.recording.pages.render import render_picture
+    from fireworld.recording.pages.pictures import render_picture
 
     render_picture(open_one_or_two(paths, doing="drawing"), output, steps=steps, force=force)
     click.echo(f"{output}: {len(steps)} step{'s' if len(steps) > 1 else ''}, {_size(output)}")
@@ -107,7 +107,7 @@ def _render_film(
 ) -> None:
     from fireworld_viewer.pictures.film import FPS
 
-    from fireworld.recording.pages.render import render_film
+    from fireworld.recording.pages.pictures import render_film
 
     recordings = open_one_or_two(paths, doing="drawing")
     with bars() as progress:

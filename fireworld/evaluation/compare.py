@@ -90,10 +90,10 @@ def compare(
         runs.make(executor, interrupted, on_run)
     reference, *others = found
     of_reference = runs.outcomes(reference)
-    compared = [ComparedPolicy(reference.name, reference.identity)]
+    compared = [ComparedPolicy(reference.name, reference.named.identity)]
     for policy in others:
         pairings = compare_outcomes(of_reference, runs.outcomes(policy), same_policy=policy.key == reference.key)
-        compared.append(ComparedPolicy(policy.name, policy.identity, tuple(pairings)))
+        compared.append(ComparedPolicy(policy.name, policy.named.identity, tuple(pairings)))
     return Comparison(
         policies=tuple(compared),
         scenarios=tuple((name, each.scenario.digest) for name, each in built.items()),

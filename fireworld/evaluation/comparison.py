@@ -40,25 +40,21 @@ class ComparedPolicy:
 
 @dataclass(frozen=True, repr=False)
 class Comparison:
-    """Policies compared with the first of them, run by run on the same scenarios and seeds.
-
-    Attributes:
-        policies: the reference (A), and one or more others (each of them B).
-        scenarios: name and digest of each.
-        seeds: of the runs.
-        version: of the simulator.
-        metric: what the judgement is about.
-        margin: loss that does not matter, in the metric's unit.
-        warnings: how teams are used differently from their training.
-    """
+    """Policies compared with the first of them, run by run on the same scenarios and seeds."""
 
     policies: tuple[ComparedPolicy, ...]
+    """The reference (A), and one or more others (each of them B)."""
     scenarios: tuple[tuple[str, str], ...]
+    """Name and digest of each."""
     seeds: Sequence[int]
     version: str
+    """Of the simulator."""
     metric: str
+    """What the judgement is about."""
     margin: float
+    """Loss that does not matter, in the metric's unit."""
     warnings: tuple[str, ...] = ()
+    """How teams are used differently from their training."""
 
     @property
     def each(self) -> list[Comparison]:
@@ -183,11 +179,24 @@ class Comparison:
             ArgumentError: there is no such policy.
             ViewError: matplotlib is not installed.
         """
-        from fireworld.evaluation.figures import draw_differences
+        from fireworld_viewer.pictures.differences import DifferencePanel, draw_paired_differences
 
         one = self.of(policy)
         a, b = (compared.name for compared in one.policies)
-        return draw_differences(_shown(one), title=f"{b} (B) against {a} (A), {len(self.seeds)} seeds")
+        panels = [
+            DifferencePanel(
+                label=metric.label,
+                unit=metric.unit,
+                higher_is_better=metric.higher_is_better,
+                lines={
+                    pairing.scenario or OVER_ALL: (pairing.differences, [*pairing.difference.ends().values()])
+                    for pairing in _shown(one)
+                    if pairing.metric == metric
+                },
+            )
+            for metric in METRICS
+        ]
+        return draw_paired_differences(panels, title=f"{b} (B) against {a} (A), {len(self.seeds)} seeds")
 
     def save_figure(self, path: Path | str, *, policy: str | None = None, force: bool = False) -> None:
         """Write the figure to a file.
@@ -200,7 +209,7 @@ class Comparison:
         Raises:
             ArgumentError, ViewError, OutputError: as for `figure`; or the file cannot be written.
         """
-        from fireworld.evaluation.figures import save_figure
+        from fireworld_viewer.pictures.figure_files import save_figure
 
         save_figure(self.figure(policy), Path(path), force=force)
 
@@ -224,11 +233,7 @@ _HEADS: Final = ("", "A", "B", "B - A", "P", "B is")
 
 
 def find_metric(name: object) -> Metric:
-    """Return a metric by its name.
-
-    Raises:
-        ArgumentError: there is none of that name.
-    """
+    """Return a metric by its name; ArgumentError if there is none."""
     for metric in METRICS:
         if metric.name == name:
             return metric

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from fireworld.errors import PolicyError
 from fireworld.evaluation.results import Result, Results, RunKey, simulator_version
-from fireworld.evaluation.runs import Outcomes, Row, outcomes, row_of, run_compiled, run_step_by_step
+from fireworld.evaluation.runs import Outcomes, Row, row_of, run_compiled, run_step_by_step
 from fireworld.executors import AnyExecutor, Workers, n_cores, processes, threads, workers_for
 from fireworld.interrupt import Interrupted
 from fireworld.policy.asking import describe
@@ -23,49 +23,28 @@ from fireworld.scenario import Scenario
 from fireworld.simulation.built import BuiltScenario, build_scenario
 
 SAVE_EVERY_RUNS: Final = 100
-RUNS_WORTH_A_PROCESS: Final = 8
-"""A process takes about as long to start as these."""
+RUNS_WORTH_A_PROCESS: Final = 8  # a process takes about as long to start as these
 
 
 @dataclass(frozen=True)
 class RunnablePolicy:
-    """A policy of a comparison.
-
-    Attributes:
-        given: what it is made of, anew for every run; of a policy that runs in compiled code, the policy itself.
-        named: the policy, made once.
-        name: as it was asked for: two team files may have one name in two folders.
-        identity: digest of what it does; empty if that is not known.
-        key: the identity; where there is none, its place among the policies.
-    """
+    """A policy of a comparison."""
 
     given: Any
-    named: NamedPolicy
-    name: str
-    identity: str
-    key: str
-
-    @property
-    def compiled(self) -> bool:
-        """Whether it runs in compiled code."""
-        return isinstance(self.given, KernelPolicy)
-
-    @property
-    def portable(self) -> bool:
-        """Whether other processes can make it."""
-        return self.compiled or self.named.can_be_found_again
+    """What it is made of, anew for every run; of a policy that runs in compiled code, the policy itself."""
+    named: NamedPolicy  # made once
+    name: str  # as it was asked for: two team files may have one name in two folders
+    key: str  # its identity; where there is none, its place among the policies
 
 
 def runnable(given: Any, place: int) -> RunnablePolicy:
     """Find a policy by its name, file, class, object, or function; errors as for `find_policy`."""
     named = find_policy(given)
-    identity = named.identity
     return RunnablePolicy(
         given=named.policy if isinstance(named.policy, KernelPolicy) else given,
         named=named,
         name=str(given) if isinstance(given, str | os.PathLike) else named.name,
-        identity=identity,
-        key=identity or f"policy {place}",
+        key=named.identity or f"policy {place}",
     )
 
 
@@ -74,8 +53,7 @@ class PolicyRun:
     """A run to be made, here or in another process."""
 
     built: BuiltScenario
-    label: str
-    """The scenario as errors name it."""
+    label: str  # the scenario as errors name it
     policy: Any
     seed: int
 
@@ -141,7 +119,7 @@ class ComparisonRuns:
         """Return how a policy's runs came out, by scenario; all of them must be known."""
         known = self.results.by_run
         return {
-            label: outcomes(self.seeds, [known[key].row for key in self._keys(policy, built)])
+            label: Outcomes(self.seeds, [known[key].row for key in self._keys(policy, built)])
             for label, built in self.built.items()
         }
 
@@ -159,8 +137,10 @@ class ComparisonRuns:
         anywhere, sent, here = list[RunKey](), list[RunKey](), list[RunKey]()
         chosen = not (executor is None or isinstance(executor, int))
         for key, (policy, _, _) in self.missing.items():
-            share = anywhere if chosen or policy.compiled else sent if policy.portable else here
-            share.append(key)
+            if chosen or isinstance(policy.given, KernelPolicy):
+                anywhere.append(key)
+            else:
+                (sent if policy.named.can_be_found_again else here).append(key)
         yield anywhere, workers_for(executor, stop=stop)
         n = min(executor if isinstance(executor, int) else _n_processes(), len(sent) // RUNS_WORTH_A_PROCESS)
         yield sent, processes(n, stop=stop) if n > 1 else threads(1, stop=stop)

@@ -26,10 +26,8 @@ Judgement = Literal["not worse", "worse", "cannot tell"]
 
 N_SEEDS_MIN: Final = 6
 """Seeds that must differ for a verdict: five all of one sign come by chance once in sixteen times."""
-N_SEEDS_ENOUGH: Final = 20
-"""Below it intervals are too narrow."""
-N_SEEDS_MAX: Final = 10_000
-"""Where more would be needed, the difference is too small for a verdict."""
+N_SEEDS_ENOUGH: Final = 20  # below it intervals are too narrow
+N_SEEDS_MAX: Final = 10_000  # where more would be needed, the difference is too small for a verdict
 _POWER: Final = 7.849
 """(1.960 + 0.842)^2: an interval of 95 % that leaves out zero four times in five."""
 
@@ -52,13 +50,11 @@ class Side:
 class Pairing:
     """One metric in one scenario, or over all."""
 
-    scenario: str | None
-    """None: over all."""
+    scenario: str | None  # None: over all
     metric: Metric
     a: Side
     b: Side
-    differences: Array
-    """(n_seeds,) B - A; over all: mean over the scenarios."""
+    differences: Array  # (n_seeds,) B - A; over all: mean over the scenarios
     difference: Estimate
     improvement: Estimate
     """Probability that a run of B is better than its pair; a tie counts as half."""
@@ -158,13 +154,7 @@ class Pairing:
 def compare_outcomes(
     of_a: Mapping[str, Outcomes], of_b: Mapping[str, Outcomes], *, same_policy: bool = False
 ) -> list[Pairing]:
-    """Compare two policies, scenario by scenario and then over all; all metrics of each.
-
-    Args:
-        of_a: the reference's runs by scenario, the same seeds in each.
-        of_b: the new policy's, of the same scenarios and seeds.
-        same_policy: the two are one policy.
-    """
+    """Compare the runs of two policies, by scenario and of the same seeds: in each scenario, then over all."""
     everything: list[tuple[str | None, list[str]]] = [*((name, [name]) for name in of_a), (None, list(of_a))]
     return [
         _pair(scenario, metric, *([of[name] for name in within] for of in (of_a, of_b)), same_policy=same_policy)
@@ -179,13 +169,9 @@ def over_all(pairings: Sequence[Pairing], metric: str = METRICS[0].name) -> Pair
 
 
 def judge(pairing: Pairing, *, margin: float = 0.0) -> Judgement:
-    """Judge whether B is not worse than A.
+    """Judge whether B is not worse than A; `margin`, in the metric's unit, is a loss that does not matter.
 
     Not worse: the interval of the gain does not reach below -margin. Worse: it does, and lies wholly below zero.
-
-    Args:
-        pairing: what was measured.
-        margin: loss that does not matter, in the metric's unit; >= 0.
     """
     if pairing.verdict == "the same policy":
         return "not worse"

@@ -48,16 +48,14 @@ class Result:
 
     scenario: str
     policy: str
-    row: Row
-    """None stands where the file is older than the column."""
+    row: Row  # None stands where the file is older than the column
 
 
 @dataclass
 class Results:
     """Results by run: those of a file, if there is one, and those added since."""
 
-    path: Path | None
-    """None: held in memory only."""
+    path: Path | None  # None: held in memory only
     by_run: dict[RunKey, Result] = field(default_factory=dict)
     n_unsaved: int = 0
 
@@ -74,10 +72,8 @@ class Results:
     def save(self) -> None:
         """Write the file if there is anything new: what it holds by now, and what was added.
 
-        Equal results give equal bytes, whatever the order they came in.
-
-        Raises:
-            OutputError: it cannot be written, or what is there by now is no results file.
+        Equal results give equal bytes, whatever the order they came in. OutputError if it cannot be written, or if what
+        is there by now is no results file.
         """
         if self.path is None or not self.n_unsaved:
             return
@@ -88,14 +84,9 @@ class Results:
 
 
 def open_results(path: Path | None) -> Results:
-    """Open a file of results, or begin one.
+    """Open a file of results, or begin one; None holds them in memory.
 
-    Args:
-        path: the file; None holds results in memory.
-
-    Raises:
-        OutputError: pyarrow is not installed, or the file cannot be read, is damaged or no results file; it is left as
-            it is.
+    OutputError if pyarrow is not installed, or as for `read_results`; the file is left as it is.
     """
     if path is None:
         return Results(None)
@@ -124,11 +115,7 @@ def simulator_version() -> str:
 
 
 def read_results(path: Path) -> dict[RunKey, Result]:
-    """Read a file of results.
-
-    Raises:
-        OutputError: it cannot be read, is damaged or no results file.
-    """
+    """Read a file of results; OutputError if it cannot be read, is damaged or no results file."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

@@ -19,8 +19,7 @@ from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.protocol import Policy
 from fireworld.simulation.built import BuiltScenario
 
-Row = tuple[Any, ...]
-"""How one run came out: COLUMNS in their order."""
+Row = tuple[Any, ...]  # how one run came out: COLUMNS in their order
 KINDS: Final[dict[str, type]] = {name: get_type_hints(Outcome)[attribute] for name, attribute in COLUMNS.items()}
 """The Python type of each column: int, float or bool."""
 
@@ -33,7 +32,7 @@ class Outcomes:
     nan where the run has none.
     """
 
-    seed: Array  # (n_seeds,) int64
+    seeds: Sequence[int]
     rows: Sequence[Row]
 
     def __getattr__(self, name: str) -> Array:
@@ -53,20 +52,13 @@ def evaluate(
 ) -> Outcomes:
     """Run a policy once under every seed; policies measured on the same seeds see the same random draws.
 
-    Args:
-        built: the scenario, built.
-        policy: what the brigades follow.
-        seeds: of the runs.
-        workers: who runs them; None: this thread. The outcome does not depend on it.
-
-    Raises:
-        Interrupted: the workers were asked to stop.
+    Without workers it is this thread that runs them; Interrupted if workers were asked to stop.
     """
     tasks = [partial(run_compiled, built, policy, seed=seed) for seed in seeds]
     found = [task() for task in tasks] if workers is None else workers.run(tasks)
     if found is None:
         raise Interrupted("interrupted")
-    return outcomes(seeds, [row_of(outcome) for outcome in found])
+    return Outcomes(seeds, [row_of(outcome) for outcome in found])
 
 
 def run_compiled(built: BuiltScenario, policy: KernelPolicy, *, seed: int) -> Outcome:
@@ -77,11 +69,7 @@ def run_compiled(built: BuiltScenario, policy: KernelPolicy, *, seed: int) -> Ou
 
 
 def run_step_by_step(built: BuiltScenario, policy: Policy, *, seed: int) -> Outcome:
-    """Run any policy by asking it in every step.
-
-    Raises:
-        PolicyError: the policy failed.
-    """
+    """Run any policy by asking it in every step; PolicyError if it fails."""
     world = built.world(seed=seed)
     begin(policy, world.city_arrays, n_brigades=world.n_brigades, seed=seed)
     while not (world.terminated or world.truncated):
@@ -92,8 +80,3 @@ def run_step_by_step(built: BuiltScenario, policy: Policy, *, seed: int) -> Outc
 def row_of(outcome: Outcome) -> Row:
     """Return what is stored of an outcome."""
     return tuple(getattr(outcome, attribute) for attribute in COLUMNS.values())
-
-
-def outcomes(seeds: Sequence[int], rows: Sequence[Row]) -> Outcomes:
-    """Put runs together, one for each seed."""
-    return Outcomes(np.array(seeds, dtype=np.int64), rows)

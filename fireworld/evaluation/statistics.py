@@ -29,12 +29,9 @@ class Estimate:
     """A mean over repetitions and seeds, and how sure it is."""
 
     mean: float
-    low: float
-    """Lower end of the 95 % interval."""
-    high: float
-    """Upper end of the 95 % interval."""
-    interquartile_mean: float
-    """Mean of the middle half of all values: what a typical run comes to."""
+    low: float  # lower end of the 95 % interval
+    high: float  # upper end of the 95 % interval
+    interquartile_mean: float  # mean of the middle half of all values: what a typical run comes to
     n_repetitions: int
     n_seeds: int
 
@@ -61,8 +58,7 @@ class Estimate:
 def estimate(values: Array) -> Estimate:
     """Estimate a mean and its 95 % interval by a two-level bootstrap.
 
-    Args:
-        values: (repetitions, seeds); column k holds the runs of one seed. (1, seeds) for what does not learn.
+    Values are (repetitions, seeds), a column for the runs of one seed; (1, seeds) for what does not learn.
     """
     table = np.asarray(values, dtype=np.float64)
     n_repetitions, n_seeds = table.shape
@@ -95,12 +91,7 @@ def interquartile_mean(values: Array) -> float:
 
 
 def paired_difference(values: Array, others: Array) -> Estimate:
-    """Estimate the mean of values - others, run by run on the same repetition and seed.
-
-    Args:
-        values: (repetitions, seeds).
-        others: (repetitions, seeds) of the same seeds, or (1, seeds).
-    """
+    """Estimate the mean of values - others, (repetitions, seeds) each or (1, seeds), run by run on the same seeds."""
     return estimate(np.asarray(values, dtype=np.float64) - np.asarray(others, dtype=np.float64))
 
 

@@ -122,9 +122,8 @@ class Difference:
             LogError: a recording changed since it was opened.
         """
         from fireworld.recording.pages.difference_page import difference_page
-        from fireworld.recording.pages.difference_pictures import draw_all
 
-        return difference_page(self, draw_all(self))
+        return difference_page(self)
 
     def save_html(self, path: Path | str, *, force: bool = False) -> None:
         """Write the page to a file.

@@ -198,7 +198,7 @@ class Run:
             OutputError: it cannot be written.
             ViewError: matplotlib is not installed.
         """
-        from fireworld.recording.pages.render import render_film
+        from fireworld.recording.pages.pictures import render_film
 
         output = path_of("path", path)
         render_film(self._recording, output, fps=fps, every=every, force=force)

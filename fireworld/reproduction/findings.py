@@ -1,4 +1,4 @@
-"""What a reproduction found, in sentences made from the numbers: what holds, what does not, and what stays open."""
+"""What a reproduction found, in sentences made from the numbers: what holds, what does not, what stays open."""
 
 from __future__ import annotations
 
@@ -20,10 +20,13 @@ from fireworld.reproduction.paper_tables import (
     cells_of,
 )
 from fireworld.reproduction.study import NO_WATER, Study
+from fireworld.shown import text_table
 
 Answer = Literal["reproduced", "partly", "not reproduced", "open", "yes", "no"]
-N_ENOUGH: Final = 20
-"""Repetitions and seeds below which a claim about learning is not to be made."""
+N_ENOUGH: Final = 20  # repetitions and seeds below which a claim about learning is not to be made
+_MARKS: Final = {WITHIN: "=", NEAR: "~", APART: "x"}
+_QUANTITIES: Final = {"convergence episode": "episodes", "time to complete": "time"}
+_HEADS: Final = ("scenario", "quantity", "without cooperation", "with")
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,19 @@ def tally(cells: Sequence[PaperCell]) -> str:
         f"of the paper's {len(cells)} values {counts[WITHIN]} lie within our 95 % interval, to {counts[NEAR]} more "
         f"our mean is within 25 %, and to {counts[APART]} it is not"
     )
+
+
+def report_text(study: Study, tables: PaperTables) -> str:
+    """Return the report as text: the paper's Tables 1 to 3 beside ours, and what was found."""
+    lines = [
+        "paper: ours [95 % interval]",
+        text_table(_HEADS, _rows(tables), "<<>>"),
+        "= the paper's value is in it, ~ our mean is within 25 % of it, x neither",
+        "",
+        "findings",
+        *(f"  {finding.question} {finding.verdict}" for finding in findings(study, tables)),
+    ]
+    return "\n".join([*lines, *filter(None, [caveat(study)])])
 
 
 def _cooperation(tables: PaperTables) -> Finding:
@@ -159,3 +175,20 @@ def _list(values: Iterable[float]) -> str:
 
 def _sentence(text: str) -> str:
     return text[0].upper() + text[1:] + ("" if text.endswith((".", "?")) else ".")
+
+
+def _rows(tables: PaperTables) -> list[list[str]]:
+    rows = [[cell.scenario, _quantity(cell), "", _compared(cell)] for cell in tables.trainings]
+    for pair in (*tables.tests, *tables.more_brigades):
+        scenario = pair.without.scenario.replace("-brigades-", ", ")
+        rows.append([scenario, _quantity(pair.without), _compared(pair.without), _compared(pair.together)])
+    return rows
+
+
+def _quantity(cell: PaperCell) -> str:
+    return _QUANTITIES.get(cell.quantity, cell.quantity)
+
+
+def _compared(cell: PaperCell) -> str:
+    digits = 1 if cell.quantity == "score" else 0
+    return f"{_MARKS[cell.verdict]} {cell.paper:.3g}: {cell.ours.text(digits=digits)}"

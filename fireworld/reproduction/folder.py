@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import Struct
 
 from fireworld.errors import OutputError, TrainingError, expected
-from fireworld.evaluation.runs import Outcomes, outcomes
+from fireworld.evaluation.runs import Outcomes
 from fireworld.files import write_file
 from fireworld.kernels.arrays import Array
 from fireworld.outcome import COLUMNS
@@ -20,14 +20,12 @@ from fireworld.policy.teams.table_team import TableTeam
 from fireworld.policy.teams.team import load_team
 from fireworld.reproduction.csv_files import CSV_FILES
 from fireworld.reproduction.repetitions import Repetition
-from fireworld.reproduction.study import TEAMS, TOGETHER, LearningCurve
-from fireworld.reproduction.team_tests import Tested
+from fireworld.reproduction.study import TEAMS, TOGETHER, LearningCurve, Tested
 from fireworld.training.training import check_same
 
 FORMAT: Final = "fireworld-reproduction/1"
 REPORT: Final = "report.html"
-SETTINGS: Final = "kept/settings.json"
-"""What the work in a folder was begun with."""
+SETTINGS: Final = "kept/settings.json"  # what the work in a folder was begun with
 SUBFOLDERS: Final = ("kept", "teams", "recordings", "figures")
 _HINT: Final = "delete it and it is made anew"
 
@@ -37,10 +35,8 @@ Content = TypeVar("Content")
 class RepetitionText(Struct, frozen=True, forbid_unknown_fields=True):
     """A Repetition as plain values; its teams are in files of their own."""
 
-    teams: dict[str, str]
-    """Digest of each team, by name."""
-    graduates: dict[str, str]
-    """Digest of each graduate, by scenario."""
+    teams: dict[str, str]  # digests by name
+    graduates: dict[str, str]  # digests by scenario
     lessons: list[LearningCurve]
 
 
@@ -51,14 +47,7 @@ class ReproductionFolder:
     path: Path
 
     def make(self, *, force: bool) -> None:
-        """Make the folder, with room for everything in it.
-
-        Args:
-            force: delete what an earlier reproduction left in it.
-
-        Raises:
-            OutputError: it cannot be made, or something is in it already.
-        """
+        """Make the folder; delete what an earlier reproduction left in it (`force`), or raise OutputError."""
         path = self.path
         try:
             if not force and path.exists() and (not path.is_dir() or any(path.iterdir())):
@@ -74,11 +63,7 @@ class ReproductionFolder:
             raise OutputError(f"{path}: cannot be made: {error.strerror or error}") from None
 
     def find(self) -> None:
-        """Check that there is a reproduction to continue.
-
-        Raises:
-            OutputError: there is none.
-        """
+        """Check that there is a reproduction to continue; OutputError if there is none."""
         if not (self.path / SETTINGS).is_file():
             got = f"no {self.path / SETTINGS}"
             raise OutputError(expected("resume", "", "a reproduction to continue", got, "leave out --resume"))
@@ -92,11 +77,7 @@ class ReproductionFolder:
         write_file(self.path / name, content.encode() if isinstance(content, str) else content)
 
     def repetition(self, number: int) -> Repetition | None:
-        """Return a repetition that was trained before; None if it has not been.
-
-        Raises:
-            TrainingError: a file is damaged, or gone.
-        """
+        """Return a repetition that was trained before, or None; TrainingError if a file is damaged, or gone."""
         path = self._training(number)
         found = self._read(path, RepetitionText)
         if found is None:
@@ -112,17 +93,14 @@ class ReproductionFolder:
 
     def write_repetition(self, number: int, repetition: Repetition) -> None:
         """Write the teams of a repetition, and then how they learned: with that it counts as done."""
-        teams, graduates = repetition.teams, repetition.graduates
-        for name, team in teams.items():
+        for name, team in repetition.teams.items():
             team.save(self._team(name, number), force=True)
-        for scenario, team in graduates.items():
+        for scenario, team in repetition.graduates.items():
             team.save(self._graduate(scenario, number), force=True)
-        content = RepetitionText(
-            {name: team.digest for name, team in teams.items()},
-            {scenario: team.digest for scenario, team in graduates.items()},
-            list(repetition.curves),
+        teams, graduates = (
+            {name: team.digest for name, team in saved.items()} for saved in (repetition.teams, repetition.graduates)
         )
-        self._write(self._training(number), content)
+        self._write(self._training(number), RepetitionText(teams, graduates, list(repetition.curves)))
 
     def n_trained(self, n_repetitions: int) -> int:
         """Return how many repetitions are trained."""
@@ -131,16 +109,9 @@ class ReproductionFolder:
     def tested(
         self, name: str, *, scenarios: Iterable[str], teams: Iterable[str], seeds: Sequence[int]
     ) -> Tested | None:
-        """Return the outcomes of a repetition's tests, or of the rules'; None if there are none.
+        """Return the outcomes of a repetition's tests, or of the "rules"; None if there are none.
 
-        Args:
-            name: of the repetition, or "rules".
-            scenarios: the tests.
-            teams: who was tested.
-            seeds: of the runs.
-
-        Raises:
-            TrainingError: the file is damaged.
+        TrainingError if the file is damaged, or of other scenarios, teams or seeds.
         """
         path = self._tests(name)
         found = self._read(path, dict[str, dict[str, dict[str, list[bool | int | float]]]])
@@ -155,7 +126,7 @@ class ReproductionFolder:
         }
 
     def write_tested(self, name: str, tested: Tested) -> None:
-        """Write the outcomes of a repetition's tests, or of the rules'; errors as for `write_file`."""
+        """Write the outcomes of a repetition's tests, or of the "rules"; errors as for `write_file`."""
         content = {
             scenario: {
                 team: dict(zip(COLUMNS, map(list, zip(*found.rows, strict=True)), strict=True))
@@ -170,11 +141,7 @@ class ReproductionFolder:
         self._write(self.path / SETTINGS, {"format": FORMAT, **identity})
 
     def check_settings(self, identity: Mapping[str, Any]) -> None:
-        """Check that the work in the folder was begun with the same settings.
-
-        Raises:
-            TrainingError: it was not, or the file of settings is damaged.
-        """
+        """Check that the work was begun with the same settings; TrainingError if not, or if their file is damaged."""
         path = self.path / SETTINGS
         check_same(self._read(path, dict[str, Any]) or {}, {"format": FORMAT, **identity}, path)
 
@@ -233,4 +200,4 @@ def _outcomes(columns: Mapping[str, list[bool | int | float]], seeds: Sequence[i
     if set(columns) != set(COLUMNS) or any(len(column) != len(seeds) for column in columns.values()):
         wanted = f"{', '.join(COLUMNS)} of {len(seeds)} runs"
         raise TrainingError(expected(str(path), "", wanted, "others", _HINT))
-    return outcomes(seeds, [*zip(*(columns[name] for name in COLUMNS), strict=True)])
+    return Outcomes(seeds, [*zip(*(columns[name] for name in COLUMNS), strict=True)])

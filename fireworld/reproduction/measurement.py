@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
 from threading import Event, Lock
 from typing import Any
 
+from fireworld.evaluation.runs import evaluate
 from fireworld.executors import AnyExecutor, in_this_process, workers_for
 from fireworld.interrupt import Interrupted
-from fireworld.policy.kernel import KernelPolicy
+from fireworld.policy.kernel import KernelPolicy, at_random, from_tables
+from fireworld.policy.names import BUILT_IN
+from fireworld.reproduction import paper
 from fireworld.reproduction.folder import ReproductionFolder
-from fireworld.reproduction.repetitions import Repetition, RepetitionTraining, n_scenarios
-from fireworld.reproduction.study import Study
-from fireworld.reproduction.team_tests import LEARNED, RULES, TeamTests, Tested, build_tests, collect, rules
-from fireworld.simulation.built import CityCache
+from fireworld.reproduction.repetitions import Repetition, n_scenarios, random_tables, train_repetition
+from fireworld.reproduction.study import LEARNED, NO_WATER, RANDOM_TABLES, RULES, TEAMS, Study, Tested
+from fireworld.scenario import load_scenario
+from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.training.curriculum import Curriculum
 from fireworld.training.methods.sarsa import Sarsa
 from fireworld.version import __version__
@@ -43,32 +46,28 @@ class Parts:
 
 @dataclass(frozen=True)
 class Measurement:
-    """Trainings and tests; any thread or process may do a part of them.
-
-    Attributes:
-        folder: where what is done is kept.
-        curriculum: of the trainings.
-        method: of the trainings.
-        n_repetitions: trainings.
-        seeds: of the test runs.
-        stop: set it, and a part under way raises Interrupted.
-        on_progress: called after every scenario of a training ("training") and every test of a policy ("testing").
-        cities: cities built before; added to.
-    """
+    """Trainings and tests; any thread or process may do a part of them. What is done is kept in the folder."""
 
     folder: ReproductionFolder
     curriculum: Curriculum
     method: Sarsa
     n_repetitions: int
-    seeds: Sequence[int]
-    stop: Event = field(default_factory=Event)
-    on_progress: OnProgress = lambda *_: None
+    seeds: Sequence[int]  # of the test runs
+    stop: Event = field(default_factory=Event)  # set it, and a part under way raises Interrupted
+    on_progress: OnProgress = lambda *_: None  # called after every scenario of a training and every test of a policy
     cities: CityCache = field(default_factory=CityCache)
 
     @cached_property
-    def tests(self) -> TeamTests:
-        """The tests, built."""
-        return build_tests(self.seeds, self.cities)
+    def tests(self) -> Mapping[str, BuiltScenario]:
+        """The tests of Tables 2 and 3, built."""
+        names = [row.scenario for row in (*paper.TABLE_2, *paper.TABLE_3)]
+        return {name: self.cities.build(load_scenario(name)) for name in names}
+
+    @cached_property
+    def tests_without_water(self) -> Mapping[str, BuiltScenario]:
+        """The same, where brigades have no water."""
+        dry = {"parameters.brigades.power_litres": 0}
+        return {name: self.cities.build(built.scenario.with_values(dry)) for name, built in self.tests.items()}
 
     @cached_property
     def training_parts(self) -> Parts:
@@ -79,7 +78,7 @@ class Measurement:
     def testing_parts(self) -> Parts:
         """Tests of policies that are done."""
         n_policies = self.n_repetitions * len(LEARNED) + len(RULES)
-        return Parts("testing", len(self.tests.built) * n_policies, self.on_progress)
+        return Parts("testing", len(self.tests) * n_policies, self.on_progress)
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -89,7 +88,7 @@ class Measurement:
             "seeds": [*self.seeds],
             "curriculum": {"name": self.curriculum.name, "digest": self.curriculum.digest},
             "method": self.method.as_dict(),
-            "tests": {name: built.scenario.digest for name, built in self.tests.built.items()},
+            "tests": {name: built.scenario.digest for name, built in self.tests.items()},
             "fireworld": __version__,
         }
 
@@ -102,12 +101,12 @@ class Measurement:
             OutputError: something cannot be written.
             ExecutorError: a process died.
         """
-        training, testing, per_policy = self.training_parts, self.testing_parts, len(self.tests.built)
+        training, testing = self.training_parts, self.testing_parts
 
         def on_result(_: int, result: tuple[Repetition | None, Tested]) -> None:
             if not in_this_process(executor):  # the parts were done where nobody counts
                 training.done(n_scenarios(self.curriculum) if result[0] else 0)
-                testing.done(per_policy * len(LEARNED if result[0] else RULES))
+                testing.done(len(self.tests) * len(LEARNED if result[0] else RULES))
 
         repeat: list[Task] = [partial(self.repetition, number + 1) for number in range(self.n_repetitions)]
         tasks = [*repeat, self.rules]  # the rules are short and fill up the end
@@ -120,7 +119,13 @@ class Measurement:
             n_repetitions=self.n_repetitions,
             seeds=self.seeds,
             curves=[curve for repetition in repetitions for curve in repetition.curves],
-            outcomes=collect(of_repetitions, of_rules),
+            outcomes={
+                test: {
+                    team: [tested[test][team] for tested in ([of_rules] if team in RULES else of_repetitions)]
+                    for team in TEAMS
+                }
+                for test in of_rules
+            },
             agreement=[repetition.agreement for repetition in repetitions],
         )
         return study, repetitions[0]
@@ -129,42 +134,51 @@ class Measurement:
         """Train the teams of a repetition and test them; errors as for `run`."""
         trained = self.folder.repetition(number)
         if trained is None:
-            training = RepetitionTraining(
-                curriculum=self.curriculum,
-                method=self.method,
-                number=number,
+            trained = train_repetition(
+                self.curriculum,
+                self.method,
+                number,
                 cities=self.cities,
                 stop=self.stop,
                 on_scenario=self.training_parts.done,
                 with_graduates=number == 1,  # they are recorded
             )
-            trained = training()
             self.folder.write_repetition(number, trained)
         else:
             self.training_parts.done(n_scenarios(self.curriculum))
-        return trained, self._test(str(number), LEARNED, lambda: self.tests.policies_of(trained, number))
+
+        def policies() -> dict[str, KernelPolicy]:
+            tables = random_tables(number, n_brigades=max(built.n_brigades for built in self.tests.values()))
+            return {**{name: team.policy() for name, team in trained.teams.items()}, RANDOM_TABLES: from_tables(tables)}
+
+        return trained, self._test(str(number), LEARNED, policies)
 
     def rules(self) -> tuple[Repetition | None, Tested]:
         """Test what does not learn; errors as for `run`."""
-        return None, self._test("rules", RULES, rules)
+        made = {**BUILT_IN, NO_WATER: at_random}
+        return None, self._test("rules", RULES, lambda: {name: made[name]() for name in RULES})
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Send what decides the outcome; another process builds tests and cities once."""
         return _received, (self.folder, self.curriculum, self.method, self.n_repetitions, self.seeds)
 
     def _test(self, name: str, teams: Sequence[str], policies: Callable[[], dict[str, KernelPolicy]]) -> Tested:
-        tested = self.folder.tested(name, scenarios=self.tests.built, teams=teams, seeds=self.seeds)
-        if tested is None:
-            tested = self.tests.run(policies(), self._on_test)
-            self.folder.write_tested(name, tested)
-        else:
+        """Run every policy in every test under all seeds, unless the outcomes are kept under this name."""
+        tested = self.folder.tested(name, scenarios=self.tests, teams=teams, seeds=self.seeds)
+        if tested is not None:
             self.testing_parts.done(len(tested) * len(teams))
+            return tested
+        tested, by_team = {}, policies()
+        for test in self.tests:
+            tested[test] = {}
+            for team, policy in by_team.items():
+                built = (self.tests_without_water if team == NO_WATER else self.tests)[test]
+                tested[test][team] = evaluate(built, policy, self.seeds)
+                self.testing_parts.done()
+                if self.stop.is_set():
+                    raise Interrupted("interrupted")
+        self.folder.write_tested(name, tested)
         return tested
-
-    def _on_test(self) -> None:
-        self.testing_parts.done()
-        if self.stop.is_set():
-            raise Interrupted("interrupted")
 
 
 @lru_cache(maxsize=1)

@@ -23,14 +23,12 @@ _NEAR_SHARE: Final = 0.25
 class PaperCell:
     """One value of the paper, and what we measured."""
 
-    table: int
     scenario: str
     quantity: str
     team: str
     paper: float
     ours: Estimate
-    ours_max: float | None = None
-    """Greatest possible value, of a score."""
+    ours_max: float | None = None  # greatest possible value, of a score
 
     @property
     def verdict(self) -> str:
@@ -51,8 +49,7 @@ class PaperPair:
 
     without: PaperCell
     together: PaperCell
-    difference: Estimate
-    """With - without, run by run."""
+    difference: Estimate  # with - without, run by run
 
     @property
     def claim_holds(self) -> bool | None:
@@ -80,8 +77,7 @@ class TeamComparison:
     other: str
     question: str
     difference: Estimate
-    improvement: Estimate
-    """Probability that a run of the first is the better one."""
+    improvement: Estimate  # probability that a run of the first is the better one
 
 
 @dataclass(frozen=True)
@@ -93,19 +89,11 @@ class PaperTables:
     """Share of the repetitions in which the policy settled, by rows of Table 1."""
     tests: Sequence[PaperPair]
     more_brigades: Sequence[PaperPair]
-    shares: Sequence[TeamShare]
-    """Over the tests of Table 2."""
-    shares_more_brigades: Sequence[TeamShare]
-    """Over the tests of Table 3."""
-    comparisons: Sequence[TeamComparison]
-    """Over the tests of Table 2."""
+    shares: Sequence[TeamShare]  # over the tests of Table 2
+    shares_more_brigades: Sequence[TeamShare]  # over the tests of Table 3
+    comparisons: Sequence[TeamComparison]  # over the tests of Table 2
     agreement: Estimate
     """Share of the states met in which all brigades of the cooperative team prefer the same action."""
-
-    @property
-    def cells(self) -> list[PaperCell]:
-        """Every value of the paper."""
-        return [*self.trainings, *cells_of([*self.tests, *self.more_brigades])]
 
 
 def make_tables(study: Study) -> PaperTables:
@@ -118,8 +106,8 @@ def make_tables(study: Study) -> PaperTables:
             estimate(_column(curve.converged for curve in study.curves_of(TOGETHER, row.scenario)))
             for row in paper.TABLE_1
         ],
-        tests=[pair for row in paper.TABLE_2 for pair in _pairs(study, row, table=2)],
-        more_brigades=[pair for row in paper.TABLE_3 for pair in _pairs(study, row, table=3)],
+        tests=[pair for row in paper.TABLE_2 for pair in _pairs(study, row)],
+        more_brigades=[pair for row in paper.TABLE_3 for pair in _pairs(study, row)],
         shares=shares,
         shares_more_brigades=_shares(study, names_3),
         comparisons=_comparisons(study, names_2, shares),
@@ -142,12 +130,12 @@ def _training_cells(study: Study, row: paper.PaperTraining) -> list[PaperCell]:
     episodes = estimate(_column(curve.n_episodes for curve in curves))
     score = estimate(_column(curve.score for curve in curves))
     return [
-        PaperCell(1, row.scenario, "convergence episode", TOGETHER, row.convergence_episode, episodes),
-        PaperCell(1, row.scenario, "score", TOGETHER, row.score, score, curves[0].score_max),
+        PaperCell(row.scenario, "convergence episode", TOGETHER, row.convergence_episode, episodes),
+        PaperCell(row.scenario, "score", TOGETHER, row.score, score, curves[0].score_max),
     ]
 
 
-def _pairs(study: Study, row: paper.PaperTest, *, table: int) -> list[PaperPair]:
+def _pairs(study: Study, row: paper.PaperTest) -> list[PaperPair]:
     made = []
     for quantity, key, values in (
         ("time to complete", "steps", row.steps),
@@ -158,8 +146,8 @@ def _pairs(study: Study, row: paper.PaperTest, *, table: int) -> list[PaperPair]
         best = float(study.values(row.scenario, ALONE, "score_max")[0, 0]) if key == "score" else None
         made.append(
             PaperPair(
-                PaperCell(table, row.scenario, quantity, ALONE, values[0], estimate(without), best),
-                PaperCell(table, row.scenario, quantity, TOGETHER, values[1], estimate(together), best),
+                PaperCell(row.scenario, quantity, ALONE, values[0], estimate(without), best),
+                PaperCell(row.scenario, quantity, TOGETHER, values[1], estimate(together), best),
                 paired_difference(together, without),
             )
         )

@@ -8,9 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from fireworld_viewer.pictures.curves import LearningPanel, draw_learning_curves
 from fireworld_viewer.pictures.figure_files import png_bytes
 from fireworld_viewer.pictures.maps import draw_record
-from fireworld_viewer.pictures.policy_figures import LearningPanel, draw_learning_curves
 
 from fireworld.kernels.arrays import Array
 from fireworld.policy.names import NamedPolicy
@@ -45,22 +45,15 @@ def runs_to_record(repetition: Repetition) -> list[tuple[str, str, Team]]:
     In Table 1 it is the cooperative team as it was at the end of the row's scenario; in Tables 2 and 3 it is both teams
     as they are after all of their training.
     """
-    rows: list[tuple[str, str, Team]] = [
-        (row.scenario, TOGETHER, repetition.graduates[row.scenario]) for row in paper.TABLE_1
-    ]
-    return rows + [
-        (row.scenario, team, repetition.teams[team])
-        for row in (*paper.TABLE_2, *paper.TABLE_3)
-        for team in (ALONE, TOGETHER)
+    tests = [row.scenario for row in (*paper.TABLE_2, *paper.TABLE_3)]
+    return [
+        *((row.scenario, TOGETHER, repetition.graduates[row.scenario]) for row in paper.TABLE_1),
+        *((test, team, repetition.teams[team]) for test in tests for team in (ALONE, TOGETHER)),
     ]
 
 
 def record_run(scenario: str, team: str, members: Team, *, seed: int, folder: Path, cities: CityCache) -> RecordedRun:
-    """Run and record.
-
-    Raises:
-        OutputError: the recording cannot be written.
-    """
+    """Run and record; errors as for `play`."""
     policy = members.policy()
     named = NamedPolicy(name=team, digest=policy.digest, policy=policy)
     run = prepare_run(cities.build(load_scenario(scenario)), named, seed=seed)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import takewhile
 from threading import Event
@@ -39,67 +39,47 @@ class Repetition:
         return int((choice == choice[0]).all(axis=0).sum()) / max(1, int(met.sum()))
 
 
-@dataclass(frozen=True, kw_only=True)
-class RepetitionTraining:
-    """One repetition to be trained; its number is its seed, so that it can be repeated by itself.
+def train_repetition(
+    curriculum: Curriculum,
+    method: Sarsa,
+    number: int,
+    *,
+    cities: CityCache,
+    stop: Event,
+    on_scenario: Callable[[], object],
+    with_graduates: bool = False,
+) -> Repetition:
+    """Train a repetition; its number is its seed, so that it can be repeated by itself. Interrupted if `stop` is set.
 
     The paper's cooperative team and its control (270 states, trained in the team) begin with the same stage alone; it
-    is done once. What it leaves is the paper's non-cooperative team.
+    is done once. What it leaves is the paper's non-cooperative team. `on_scenario` is called after every scenario.
     """
+    curves: list[LearningCurve] = []
+    graduates: dict[str, TableTeam] = {}
 
-    curriculum: Curriculum
-    method: Sarsa
-    number: int
-    cities: CityCache
-    stop: Event
-    on_scenario: Callable[[], object]
-    """Called after every scenario."""
-    with_graduates: bool = False
-    """Return the team as it was after every scenario, too."""
+    def trainer_in(scenarios: Curriculum, progress: Progress | None = None) -> SarsaTrainer:
+        return SarsaTrainer(scenarios, method, seed=number, progress=progress, cities=cities)
 
-    def __call__(self) -> Repetition:
-        """Train.
-
-        Raises:
-            Interrupted: `stop` was set.
-        """
-        control = self._trainer(without_flags(self.curriculum))
-        alone = [*takewhile(lambda stage: not stage.cooperation, self.curriculum.stages)]
-        n_alone = sum(len(stage.scenarios) for stage in alone)
-        curves = self._follow(control, ALONE, until=n_alone)
-        # By now all brigades hold the table of stage alone; the same for every value of the flags starts the others.
-        begun = control.progress.tables
-        flagged = np.repeat(begun, N_FLAG_VALUES, axis=1)
-        progress = Progress(n_alone, tables=flagged, visits=np.zeros(flagged.shape, dtype=np.int64))
-        team_alone = replace(control.team(), tables=begun[:1].copy(), visits=control.progress.visits[:1].copy())
-        together = self._trainer(self.curriculum, progress)
-        graduates: dict[str, TableTeam] = {}
-        curves += self._follow(together, TOGETHER, until=self.curriculum.n_scenarios, graduates=graduates)
-        curves += self._follow(control, TOGETHER_WITHOUT_FLAGS, until=self.curriculum.n_scenarios)
-        teams = {ALONE: team_alone, TOGETHER: together.team(), TOGETHER_WITHOUT_FLAGS: control.team()}
-        return Repetition(teams=teams, graduates=graduates if self.with_graduates else {}, curves=tuple(curves))
-
-    def _trainer(self, curriculum: Curriculum, progress: Progress | None = None) -> SarsaTrainer:
-        return SarsaTrainer(curriculum, self.method, seed=self.number, progress=progress, cities=self.cities)
-
-    def _follow(
-        self, trainer: SarsaTrainer, team: str, *, until: int, graduates: dict[str, TableTeam] | None = None
-    ) -> list[LearningCurve]:
-        """Train up to a scenario; add the team at the end of each to `graduates`."""
-        curves = []
-        while trainer.progress.scenario_number < until:
-            number, reports = trainer.progress.scenario_number, []
-            for report in trainer:
-                reports.append(report)
-                if self.stop.is_set():
-                    raise Interrupted("interrupted")
-                if trainer.progress.scenario_number != number:
-                    break
-            curves.append(_learning_curve(reports, repetition=self.number, team=team))
-            if graduates is not None and trainer.graduate is not None:
+    def follow(trainer: SarsaTrainer, team: str, *, until: int = curriculum.n_scenarios) -> None:
+        for reports in _reports_by_scenario(trainer, until, stop):
+            curves.append(_learning_curve(reports, repetition=number, team=team))
+            if with_graduates and team == TOGETHER and trainer.graduate is not None:
                 graduates[reports[-1].scenario] = trainer.graduate
-            self.on_scenario()
-        return curves
+            on_scenario()
+
+    control = trainer_in(without_flags(curriculum))
+    alone = takewhile(lambda stage: not stage.cooperation, curriculum.stages)
+    n_alone = sum(len(stage.scenarios) for stage in alone)
+    follow(control, ALONE, until=n_alone)
+    # By now all brigades hold the table of stage alone; the same for every value of the flags starts the others.
+    begun = control.progress.tables
+    flagged = np.repeat(begun, N_FLAG_VALUES, axis=1)
+    team_alone = replace(control.team(), tables=begun[:1].copy(), visits=control.progress.visits[:1].copy())
+    together = trainer_in(curriculum, Progress(n_alone, tables=flagged, visits=np.zeros(flagged.shape, dtype=np.int64)))
+    follow(together, TOGETHER)
+    follow(control, TOGETHER_WITHOUT_FLAGS)
+    teams = {ALONE: team_alone, TOGETHER: together.team(), TOGETHER_WITHOUT_FLAGS: control.team()}
+    return Repetition(teams=teams, graduates=graduates, curves=tuple(curves))
 
 
 def n_scenarios(curriculum: Curriculum) -> int:
@@ -114,21 +94,27 @@ def without_flags(curriculum: Curriculum) -> Curriculum:
 
 
 def random_tables(number: int, *, n_brigades: int) -> Array:
-    """Draw a table for every brigade that prefers some action in each state: (n_brigades, 4320, 4).
-
-    Args:
-        number: of the repetition.
-        n_brigades: tables to draw.
-    """
+    """Draw for a repetition a table a brigade that prefers some action in each state: (n_brigades, 4320, 4)."""
     seed = -1 - number  # no training has it
-    choice = np.array(
-        [
-            [below(seed, TABLE, brigade, state, bound=len(ACTIONS)) for state in range(N_STATES)]
-            for brigade in range(n_brigades)
-        ]
-    )
-    tables: Array = np.eye(len(ACTIONS))[choice]
+    choice = [
+        [below(seed, TABLE, brigade, state, bound=len(ACTIONS)) for state in range(N_STATES)]
+        for brigade in range(n_brigades)
+    ]
+    tables: Array = np.eye(len(ACTIONS))[np.array(choice)]
     return tables
+
+
+def _reports_by_scenario(trainer: SarsaTrainer, until: int, stop: Event) -> Iterator[list[EpisodeReport]]:
+    """Train up to a scenario, and yield the reports of each when it is done."""
+    while trainer.progress.scenario_number < until:
+        number, reports = trainer.progress.scenario_number, []
+        for report in trainer:
+            reports.append(report)
+            if stop.is_set():
+                raise Interrupted("interrupted")
+            if trainer.progress.scenario_number != number:
+                break
+        yield reports
 
 
 def _learning_curve(reports: list[EpisodeReport], *, repetition: int, team: str) -> LearningCurve:

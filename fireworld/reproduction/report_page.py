@@ -32,14 +32,7 @@ _CLAIMS: Final = {True: ("as the paper says", "good"), False: ("the other way", 
 
 
 def report_page(study: Study, tables: PaperTables, images: Mapping[str, bytes]) -> str:
-    """Write the page.
-
-    Args:
-        study: what was measured.
-        tables: what it comes to.
-        images: PNG files by name: "returns", "policy-changes", and for each test "SCENARIO-before",
-            "SCENARIO-non-cooperative", "SCENARIO-cooperative". What is missing is left out.
-    """
+    """Write the page; images are PNG files by the names of `recordings.pictures`, and left out where missing."""
     body = [
         "<h1>Does the paper reproduce?</h1>",
         f"<p>{_introduction(study)}</p>",
@@ -66,7 +59,7 @@ def report_page(study: Study, tables: PaperTables, images: Mapping[str, bytes]) 
 
 
 def _introduction(study: Study) -> str:
-    n_runs = sum(len(row.seed) for teams in study.outcomes.values() for rows in teams.values() for row in rows)
+    n_runs = sum(len(row.seeds) for teams in study.outcomes.values() for rows in teams.values() for row in rows)
     return (
         "A. Abdolmaleki, M. Movahedi, N. Lau, L. P. Reis: <i>A Distributed Cooperative Reinforcement Learning Method "
         "for Decision Making in Fire Brigade Teams</i> (RoboCup 2012), repeated: "

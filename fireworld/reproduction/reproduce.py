@@ -15,20 +15,18 @@ from fireworld.executors import AnyExecutor, workers_for
 from fireworld.interrupt import Interrupted, gentle_interrupt
 from fireworld.reproduction import paper
 from fireworld.reproduction.csv_files import csv_files
-from fireworld.reproduction.findings import Finding, caveat, findings
+from fireworld.reproduction.findings import Finding, caveat, findings, report_text
 from fireworld.reproduction.folder import REPORT, ReproductionFolder
 from fireworld.reproduction.measurement import Measurement, OnProgress, Parts
 from fireworld.reproduction.paper_tables import PaperTables, make_tables
 from fireworld.reproduction.recordings import pictures, record_run, runs_to_record
 from fireworld.reproduction.report_page import report_page
-from fireworld.reproduction.report_text import report_text
 from fireworld.reproduction.study import Study
 from fireworld.training.curriculum import Curriculum, load_curriculum
 from fireworld.training.methods.sarsa import PAPER
 
 CURRICULUM: Final = "paper"
-FIRST_SEED: Final = 1000
-"""Of the tests."""
+FIRST_SEED: Final = 1000  # of the tests
 N_REPETITIONS: Final = 20
 N_SEEDS: Final = 20
 N_REPETITIONS_QUICK: Final = 2

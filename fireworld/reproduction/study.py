@@ -31,6 +31,10 @@ TEAMS: Final[Mapping[str, str]] = {
     NO_WATER: "control: the fire left to itself",
 }
 """What is tested, by name."""
+RULES: Final = ("random", *FIXED, NO_WATER)  # teams that do not differ between repetitions
+LEARNED: Final = tuple(team for team in TEAMS if team not in RULES)  # teams that do
+
+Tested = dict[str, dict[str, Outcomes]]  # outcomes by scenario and team
 
 
 @dataclass(frozen=True)
@@ -41,11 +45,9 @@ class LearningCurve:
     team: str
     """TOGETHER or TOGETHER_WITHOUT_FLAGS; both begin with the same stage alone, listed once, as ALONE."""
     scenario: str
-    scenario_number: int
-    """Counted through the curriculum, from 0."""
+    scenario_number: int  # counted through the curriculum, from 0
     converged: bool
-    score: float
-    """Of the last episode."""
+    score: float  # of the last episode
     score_max: float
     total_reward: Array  # (episodes,) return of each episode
     n_changed: Array  # (episodes,) states whose greedy action changed
@@ -58,31 +60,17 @@ class LearningCurve:
 
 @dataclass(frozen=True)
 class Study:
-    """All that was measured.
-
-    Attributes:
-        n_repetitions: trainings.
-        seeds: of the test runs.
-        curves: of all repetitions.
-        outcomes: by scenario and team: one Outcomes a repetition, one in all for what does not differ between them.
-        agreement: (repetitions,) share of the states in which all brigades of the cooperative team, at the end of their
-            training, prefer the same action, among states that one of them has met.
-    """
+    """All that was measured."""
 
     n_repetitions: int
-    seeds: Sequence[int]
-    curves: Sequence[LearningCurve]
+    seeds: Sequence[int]  # of the test runs
+    curves: Sequence[LearningCurve]  # of all repetitions
     outcomes: Mapping[str, Mapping[str, Sequence[Outcomes]]]
-    agreement: Sequence[float]
+    """By scenario and team: one Outcomes a repetition, one in all for RULES."""
+    agreement: Sequence[float]  # of each repetition, see Repetition.agreement
 
     def values(self, scenario: str, team: str, quantity: str) -> Array:
-        """Return one quantity of all runs: (repetitions or 1, seeds) float64.
-
-        Args:
-            scenario: a test.
-            team: one of TEAMS.
-            quantity: an attribute of Outcomes.
-        """
+        """Return one quantity, an attribute of Outcomes, of all runs: (repetitions or 1, seeds) float64."""
         rows = [getattr(outcomes, quantity) for outcomes in self.outcomes[scenario][team]]
         return np.array(rows, dtype=np.float64)
 

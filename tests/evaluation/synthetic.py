@@ -17,7 +17,7 @@ def outcomes(seeds, *, score, score_max, burnt_out=100, steps=200, completed=Tru
     kinds = (float, float, int, int, bool, int, float, float)
     values = (score, score_max, burnt_out, steps, completed, 0, -1.0, 0.0)
     columns = [np.broadcast_to(value, n).astype(kind).tolist() for value, kind in zip(values, kinds, strict=True)]
-    return Outcomes(np.array(seeds), [*zip(*columns, strict=True)])
+    return Outcomes(list(seeds), [*zip(*columns, strict=True)])
 
 
 def study(*, together=0.75, alone=0.5, n_repetitions=2, n_seeds=3):

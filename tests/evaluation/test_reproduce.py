@@ -20,7 +20,7 @@ from fireworld.policy.teams.team import load_team
 from fireworld.reproduction import folder as reproduction_folder
 from fireworld.reproduction import paper
 from fireworld.reproduction.csv_files import CSV_FILES
-from fireworld.reproduction.repetitions import RepetitionTraining, random_tables, without_flags
+from fireworld.reproduction.repetitions import random_tables, train_repetition, without_flags
 from fireworld.reproduction.reproduce import reproduce
 from fireworld.reproduction.study import ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS
 from fireworld.scenario import load_scenario
@@ -73,17 +73,22 @@ def small(tmp_path, monkeypatch, curriculum):
 
 
 def train(curriculum, number=1, **more):
-    stop, seen = Event(), []
-    training = RepetitionTraining(
-        curriculum=curriculum,
-        method=METHOD,
-        number=number,
-        cities=CityCache(),
-        stop=stop,
-        on_scenario=lambda: seen.append(1),
-        **more,
-    )
-    return training(), len(seen)
+    seen = []
+    words = {"cities": CityCache(), "stop": Event(), "on_scenario": lambda: seen.append(1), **more}
+    return train_repetition(curriculum, METHOD, number, **words), len(seen)
+
+
+@pytest.fixture
+def trained(monkeypatch):
+    """Numbers of the repetitions that are trained."""
+    numbers = []
+
+    def train_and_note(curriculum, method, number, **words):
+        numbers.append(number)
+        return train_repetition(curriculum, method, number, **words)
+
+    monkeypatch.setattr("fireworld.reproduction.measurement.train_repetition", train_and_note)
+    return numbers
 
 
 def test_a_repetition_equals_trainings_from_end_to_end(curriculum):
@@ -208,13 +213,11 @@ def test_from_python_with_an_executor_it_is_the_same(small, undrawn, curriculum)
     assert len(one.study.curves) == 12
 
 
-def test_a_folder_of_an_earlier_version_is_resumed(small, undrawn, monkeypatch):
+def test_a_folder_of_an_earlier_version_is_resumed(small, undrawn, trained, monkeypatch):
     monkeypatch.setattr("fireworld.reproduction.measurement.__version__", "0.1.0")
     earlier = Path(__file__).parent / "data" / "reproduction-1"
     for name in ("kept", "teams"):
         shutil.copytree(earlier / name, small / "found" / name)
-    trained, call = [], RepetitionTraining.__call__
-    monkeypatch.setattr(RepetitionTraining, "__call__", lambda self: trained.append(self.number) or call(self))
     reproduce("found", repetitions=2, seeds=2, resume=True)
     assert trained == [2]
     for path in (earlier / "expected").iterdir():
@@ -284,7 +287,7 @@ def kept_files(small):
     return sorted(path.name for path in (small / "found" / "kept").iterdir())
 
 
-def test_ctrl_c_and_resume(small, fireworld, whole, monkeypatch):
+def test_ctrl_c_and_resume(small, fireworld, whole, trained, monkeypatch):
     at_write(monkeypatch, "tests-1.json", lambda: signal.raise_signal(signal.SIGINT))
     done = fireworld(*FEW, "--jobs", 1)
     assert done.code == 130
@@ -294,8 +297,7 @@ def test_ctrl_c_and_resume(small, fireworld, whole, monkeypatch):
     refused = fireworld(*FEW)
     assert (refused.code, refused.err.count("\n")) == (2, 1)
     assert "--resume continues it, --force replaces what is there" in refused.err
-    trained, call = [], RepetitionTraining.__call__
-    monkeypatch.setattr(RepetitionTraining, "__call__", lambda self: trained.append(self.number) or call(self))
+    trained.clear()
     resumed = fireworld(*FEW, "--resume")
     assert resumed.code == 0, resumed.err
     assert trained == [2], "the first is not trained again"

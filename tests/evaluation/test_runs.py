@@ -25,7 +25,7 @@ def test_outcomes_are_those_of_recorded_runs(built):
     found = evaluate(built, BUILT_IN["nearest-to-me"](), SEEDS)
     for place, seed in enumerate(SEEDS):
         last = [*prepare_run(built, find_policy("nearest-to-me"), seed=seed)][-1]
-        assert found.seed[place] == seed
+        assert found.seeds[place] == seed
         assert found.score[place] == last.score.score
         assert found.score_max[place] == last.score.score_max == 5
         assert found.n_burnt_out[place] == last.score.n_burnt_out
@@ -41,5 +41,5 @@ def test_threads_change_nothing(built):
     one = evaluate(built, BUILT_IN["random"](), range(8))
     many = evaluate(built, BUILT_IN["random"](), range(8), workers=threads(3))
     assert len(set(one.total_reward.tolist())) > 4
-    for quantity in ("seed", *COLUMNS.values()):
+    for quantity in ("seeds", *COLUMNS.values()):
         np.testing.assert_array_equal(getattr(one, quantity), getattr(many, quantity))

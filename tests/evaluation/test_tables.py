@@ -12,7 +12,7 @@ from fireworld.evaluation.statistics import Estimate
 from fireworld.reproduction import paper
 from fireworld.reproduction.csv_files import CSV_FILES, csv_files
 from fireworld.reproduction.findings import caveat, findings, tally
-from fireworld.reproduction.paper_tables import APART, NEAR, WITHIN, PaperCell, make_tables
+from fireworld.reproduction.paper_tables import APART, NEAR, WITHIN, PaperCell, cells_of, make_tables
 from fireworld.reproduction.recordings import draw_policy_changes, draw_returns
 from fireworld.reproduction.report_page import report_page
 from fireworld.reproduction.study import ALONE, TOGETHER
@@ -32,12 +32,16 @@ from tests.evaluation import synthetic
 )
 def test_the_verdict_of_a_cell(mean, low, high, verdict):
     ours = Estimate(mean, low, high, mean, 2, 3)
-    assert PaperCell(2, "test-1", "score", ALONE, 100.0, ours).verdict == verdict
+    assert PaperCell("test-1", "score", ALONE, 100.0, ours).verdict == verdict
+
+
+def cells_in(tables):
+    return [*tables.trainings, *cells_of([*tables.tests, *tables.more_brigades])]
 
 
 def test_cells_hold_the_papers_values_beside_ours():
     tables = make_tables(synthetic.study())
-    assert len(tables.cells) == 16 + 18 + 18
+    assert len(cells_in(tables)) == 16 + 18 + 18
     cell = tables.tests[0].together
     assert (cell.scenario, cell.quantity, cell.team) == ("test-1", "time to complete", TOGETHER)
     assert (cell.paper, cell.ours.mean) == (290, 436.0)
@@ -75,7 +79,7 @@ def test_findings_follow_the_numbers(together, verdict, against_random):
 
 
 def test_every_cell_is_counted_once():
-    cells = make_tables(synthetic.study()).cells
+    cells = cells_in(make_tables(synthetic.study()))
     numbers = re.search(r"paper's (\d+) values (\d+) lie .* to (\d+) more .* to (\d+) it is not", tally(cells))
     total, *parts = map(int, numbers.groups())
     assert total == len(cells) == sum(parts)

@@ -15,7 +15,7 @@ from fireworld.recording.difference import diff
 from fireworld.recording.explain import explain
 from fireworld.recording.export import export, recover
 from fireworld.recording.fork import fork, prepare_fork
-from fireworld.recording.pages.render import render_film, render_picture
+from fireworld.recording.pages.pictures import render_film, render_picture
 from fireworld.recording.pages.run_page import report
 from fireworld.recording.pages.view import view
 from fireworld.recording.verify import verify

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fireworld_viewer import colors
-from fireworld_viewer.rerun_view import air, app
+from fireworld_viewer.rerun_view import app
+from fireworld_viewer.rerun_view.city_layers import HOTTEST, air_pixels
 
 from fireworld.recording.replay import Replay
 from fireworld.records import CityRecord, MemoryRecording, Snapshot
@@ -29,7 +30,7 @@ def snapshot(cells: list[list[float]]) -> Snapshot:
 
 
 def test_hotter_air_is_paler_and_cold_air_is_clear():
-    pixels = air.air_pixels(np.array([[0.0, 0.9], [air.HOTTEST, 2 * air.HOTTEST], [air.HOTTEST / 4, 5.0]]))
+    pixels = air_pixels(np.array([[0.0, 0.9], [HOTTEST, 2 * HOTTEST], [HOTTEST / 4, 5.0]]))
     assert pixels.shape == (2, 3, 4)  # y, x
     north, south = pixels
     assert south[0, 3] == north[0, 3] == 0

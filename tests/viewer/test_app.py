@@ -8,13 +8,13 @@ import socket
 import subprocess
 import sys
 import urllib.request
+from functools import partial
 from pathlib import Path
 
 import pytest
 import rerun
 from fireworld_viewer.rerun_view import app
-from fireworld_viewer.rerun_view.blueprint import title
-from fireworld_viewer.rerun_view.camera import frame_fire, frame_from_above
+from fireworld_viewer.rerun_view.blueprint import frame_fire, frame_from_above, title
 from fireworld_viewer.rerun_view.pages import OutcomePage
 
 from fireworld.errors import OutputError, ViewError
@@ -120,7 +120,7 @@ def test_without_a_display_the_other_ways_are_named(small, monkeypatch: pytest.M
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     with pytest.raises(ViewError, match=r"no display here; try --save FILE\.rrd, --web, or `fireworld render`"):
-        app.show([small])
+        app.show(partial(app.save, [small]))
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs a shell")
@@ -133,7 +133,7 @@ def test_a_viewer_that_cannot_open_its_window_is_one_sentence(
     monkeypatch.setattr(app, "viewer_executable", lambda: broken)
     monkeypatch.setenv("DISPLAY", ":0")
     with pytest.raises(ViewError, match=r"ended with code 3: no Vulkan driver; try --save FILE\.rrd, --web, or `fire"):
-        app.show([small])
+        app.show(partial(app.save, [small]))
     assert capfd.readouterr() == ("", "")
 
 
@@ -143,7 +143,7 @@ def test_a_taken_port_is_named(small):
         taken.listen()
         port = taken.getsockname()[1]
         with pytest.raises(ViewError, match=f"--port: expected a free port, got {port}"):
-            app.serve([small], port=port, announce=print)
+            app.serve(partial(app.save, [small]), port=port, announce=print)
 
 
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="reads the table of sockets")
@@ -152,7 +152,8 @@ def test_the_page_is_served_on_this_machine_only_and_ends_when_told(tmp_path: Pa
     program = f"""
 from tests.viewer.conftest import make_recording
 from fireworld_viewer.rerun_view import app
-app.serve([make_recording(3, 3, 2)], port={port}, announce=lambda address: print(address, flush=True))
+write = lambda path: app.save([make_recording(3, 3, 2)], path)
+app.serve(write, port={port}, announce=lambda address: print(address, flush=True))
 """
     environment = {**os.environ, "HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path), "TMPDIR": str(tmp_path)}
     with subprocess.Popen(

@@ -150,16 +150,19 @@ def test_mistakes_are_one_sentence(
 
 
 def test_web_and_window_get_what_they_are_told(logs, monkeypatch: pytest.MonkeyPatch):
-    calls = []
-    monkeypatch.setattr(app, "show", lambda recordings, **options: calls.append(("show", len(recordings), options)))
-    monkeypatch.setattr(app, "serve", lambda recordings, **options: calls.append(("serve", len(recordings), options)))
+    saved, served = [], []
+
+    def serve(write, *, port, announce):
+        write(Path("served"))
+        served.append(port)
+
+    monkeypatch.setattr(app, "save", lambda recordings, _, *, focus, **__: saved.append((len(recordings), focus)))
+    monkeypatch.setattr(app, "show", lambda write: write(Path("shown")))
+    monkeypatch.setattr(app, "serve", serve)
     assert view("a.mcap", "b.mcap").exit_code == 0
     assert view("a.mcap", "--web", "--port", "9191", "--focus", "100").exit_code == 0
-    assert calls[0][:2] == ("show", 2)
-    assert calls[0][2]["focus"] == ()
-    assert calls[1][:2] == ("serve", 1)
-    assert calls[1][2]["port"] == 9191
-    assert calls[1][2]["focus"] == (100,)
+    assert saved == [(2, ()), (1, (100,))]
+    assert served == [9191]
 
 
 def test_help_imports_nothing_heavy():

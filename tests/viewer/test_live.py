@@ -13,8 +13,8 @@ from threading import Event
 
 import numpy as np
 import pytest
-from fireworld_viewer.rerun_view import app, live, live_sender
-from fireworld_viewer.rerun_view.live_sender import BackgroundSender
+from fireworld_viewer.rerun_view import app, live
+from fireworld_viewer.rerun_view.live import BackgroundSender
 
 from fireworld.errors import ViewError
 from fireworld.policy.teams.ranking_words import OF_BRIGADE, OF_BUILDING, OF_TEAM, WEIGHTS
@@ -37,7 +37,7 @@ def window(monkeypatch, tmp_path):
 
 
 def to_file(path: Path) -> live.Screen:
-    return partial(live_sender.ViewerProcess, (str(app.viewer_executable()), "-", "--save", str(path)), stays=False)
+    return partial(live.ViewerProcess, (str(app.viewer_executable()), "-", "--save", str(path)), stays=False)
 
 
 class Pipe:
@@ -107,7 +107,7 @@ def test_a_closed_viewer_is_told_of_once():
 
 
 def test_a_viewer_that_hangs_does_not_keep_the_end(monkeypatch):
-    monkeypatch.setattr(live_sender, "PATIENCE_SECONDS", 0.02)
+    monkeypatch.setattr(live, "PATIENCE_SECONDS", 0.02)
     pipe = Pipe(blocked=True)
     sender, told = send(pipe, range(5))
     sender.close()
@@ -169,7 +169,7 @@ def test_a_watched_run_is_the_same_run(here, fireworld, window):
 
 def test_a_viewer_closed_in_mid_run(here, fireworld, monkeypatch):
     alone = json.loads(fireworld(*SHORT).out)
-    monkeypatch.setattr(live, "own_window", lambda: partial(live_sender.ViewerProcess, DYING, stays=True))
+    monkeypatch.setattr(live, "own_window", lambda: partial(live.ViewerProcess, DYING, stays=True))
     done = fireworld(*SHORT, "--view", "--record", "a.mcap")
     assert (done.code, done.err) == (0, NOTE)
     assert json.loads(done.out)["digest"] == alone["digest"]
@@ -196,7 +196,7 @@ def test_a_server_that_dies_in_mid_run(here, fireworld, monkeypatch):
             url = f"rerun+http://{app.LOCALHOST}:{port}/proxy"
             until_it_listens(url)
             monkeypatch.setenv("SERVER", str(server.pid))
-            monkeypatch.setattr(live_sender, "PATIENCE_SECONDS", 0.5)
+            monkeypatch.setattr(live, "PATIENCE_SECONDS", 0.5)
             done = fireworld(*SHORT, "--policy", "killing:Killer", "--view-url", url)
             assert server.wait() == -signal.SIGKILL
         finally:
@@ -329,7 +329,7 @@ def test_only_weights_that_are_searched_for_are_drawn(here, fireworld, window):
 def test_a_viewer_closed_in_mid_search(here, fireworld, monkeypatch):
     (here / "tiny.yaml").write_text(TINY)
     assert fireworld(*SEARCH, "-o", "alone.npz").code == 0
-    monkeypatch.setattr(live, "own_window", lambda: partial(live_sender.ViewerProcess, DYING, stays=True))
+    monkeypatch.setattr(live, "own_window", lambda: partial(live.ViewerProcess, DYING, stays=True))
     done = fireworld(*SEARCH, "-o", "seen.npz", "--view")
     assert (done.code, NOTE in done.err) == (0, True)
     assert (here / "seen.npz").read_bytes() == (here / "alone.npz").read_bytes()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from fireworld_viewer.pictures.policy_figures import (
+from fireworld_viewer.pictures.differences import (
     BETTER,
     EQUAL,
     WORSE,

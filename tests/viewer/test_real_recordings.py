@@ -9,7 +9,7 @@ import pytest
 from fireworld_recorder.reader import Log, open_log
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh
-from fireworld_viewer.rerun_view.air import air_cells, air_pixels
+from fireworld_viewer.rerun_view.city_layers import air_cells, air_pixels
 from fireworld_viewer.rerun_view.plots import COUNTS, REWARDS, SCORES
 
 from tests import command_line

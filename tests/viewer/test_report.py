@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from fireworld_recorder.reader import open_log
-from fireworld_viewer.pictures.curves import draw_curves
-from fireworld_viewer.pictures.decision_timeline import draw_timeline
-from fireworld_viewer.story.counts import OwnTarget, count_choices
+from fireworld_viewer.pictures.curves import draw_curves, draw_timeline
+from fireworld_viewer.story.series import OwnTarget, count_choices
 
 from fireworld.cli import root
 from fireworld.records import ACTION_NAMES, MemoryRecording
@@ -81,7 +80,7 @@ def test_what_brigades_chose_is_counted(small):
     assert (third.n_without, third.own_targets) == (2, [])
     steps = list(recording)[1:]
     assert first.sprayed_litres == sum(int(step.brigades.sprayed_litres[0]) for step in steps)
-    assert sum(first.n_by_activity) == len(steps), "the start is no step"
+    assert sum(first.n_by_action) + first.n_without == len(steps), "the start is no step"
 
 
 def test_refills_are_counted(small):

@@ -7,6 +7,12 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from fireworld_recorder.spread import differing_entities
+from fireworld_viewer.pictures.differences import draw_difference_curves, draw_difference_map
+from fireworld_viewer.pictures.figure_files import png_bytes
+from fireworld_viewer.pictures.maps import draw_record
+from fireworld_viewer.story.series import LABELS
+
 from fireworld.html_page import compared_row, html_figure, html_mark, html_page, html_table, text_cell
 from fireworld.recording.difference_text import (
     SPREAD_HEADS,
@@ -27,25 +33,22 @@ _STYLE: Final = """
 .maps { grid-template-columns: repeat(2, 1fr); } .first { font-size: 1.25rem; margin: .8rem 0 1.2rem; }
 td.text { overflow-wrap: anywhere; }
 """
-_CURVES: Final = "Score, burning and burnt-out buildings of both, and buildings that differ."
+_CURVES: Final = ("score", "n_burning", "n_burnt_out")
+_CURVES_CAPTION: Final = "Score, burning and burnt-out buildings of both, and buildings that differ."
 _CAPTIONS: Final = {"a": "A", "b": "B", "difference": "What differs between the two maps, and out of sight"}
 _HEADER: Final = ("scenario", "scenario_digest", "seed", "policy", "policy_digest", "fireworld_version", "forked_from")
 
 
-def difference_page(compared: Difference, images: Mapping[str, bytes]) -> str:
-    """Write the page; it needs no other file.
-
-    Args:
-        compared: how two runs differ.
-        images: PNG files by name, from `draw_all`; what is missing is left out.
-    """
+def difference_page(compared: Difference) -> str:
+    """Write the page, which needs no other file; ViewError without matplotlib, LogError if a recording changed."""
     a, b = compared.names
     title = f"<h1>{escape(Path(b).name)} against {escape(Path(a).name)}</h1>"
-    return html_page(f"fireworld: {b} against {a}", [title, *difference_body(compared, images)], style=_STYLE)
+    body = difference_body(compared, _draw_all(compared))
+    return html_page(f"fireworld: {b} against {a}", [title, *body], style=_STYLE)
 
 
 def difference_body(compared: Difference, images: Mapping[str, bytes]) -> list[str]:
-    """Write what stands below the title of the page; arguments as for `difference_page`."""
+    """Write what stands below the title; images are PNG files by name, and left out where missing."""
     difference, first = compared.found, compared.first
     verdict = html_mark("the same", "good") if first is None else html_mark("different", "bad")
     sentence = f"{difference.n_steps_compared} steps are the same" if first is None else first.sentence
@@ -56,7 +59,7 @@ def difference_body(compared: Difference, images: Mapping[str, bytes]) -> list[s
         _header(compared),
         *_maps("The first difference", "first", images),
         *_spread(difference),
-        *(["<h2>Curves</h2>", html_figure(images["curves"], _CURVES)] if "curves" in images else []),
+        *(["<h2>Curves</h2>", html_figure(images["curves"], _CURVES_CAPTION)] if "curves" in images else []),
         *_maps("The last step of both", "last", images),
         *_topics(difference),
     ]  # fmt: skip
@@ -102,3 +105,36 @@ def _topics(difference: RunComparison) -> Iterator[str]:
         cells = (topic, PHASES.get(topic, place.phase), place.sentence)
         rows.append([*(text_cell(escape(cell)) for cell in cells), str(n), str(difference.n_steps_compared)])
     yield html_table(heads, rows, n_text=3)
+
+
+def _draw_all(difference: Difference) -> Mapping[str, bytes]:
+    """Draw curves of the runs, if their digests differ, and maps of the steps where they first and last differ."""
+    images: dict[str, bytes] = {}
+    rows = difference.spread.rows
+    for moment, row in zip(("first", "last"), [*rows[:1], *rows[1:][-1:]], strict=False):
+        images |= {f"{moment}-{name}": image for name, image in _draw_maps(difference, row.step).items()}
+    if difference.rows:
+        images["curves"] = _draw_curves(difference)
+    return images
+
+
+def _draw_maps(difference: Difference, step: int) -> dict[str, bytes]:
+    """Draw one step of both runs, and what of it differs."""
+    city, (a, b) = difference.runs[0].city, (run.step(step) for run in difference.runs)
+    figures = {"difference": draw_difference_map(city, a, b, differing_entities(a, b, difference.rules, city))}
+    for name, record in (("a", a), ("b", b)):
+        score = f"score {record.score.score:.4g} of {record.score.score_max:.0f}"
+        figures[name] = draw_record(city, record, title=f"{name.upper()}: step {record.step}, {score}")
+    return {name: png_bytes(figure) for name, figure in figures.items()}
+
+
+def _draw_curves(difference: Difference) -> bytes:
+    """Draw score, burning and burnt out of both runs, and how many buildings differ."""
+    rows, curves = difference.rows, {}
+    for name in _CURVES:
+        both = [getattr(row, name) for row in rows]
+        curves[LABELS[f"score.{name}"]] = [one.a for one in both], [one.b for one in both]
+    n_buildings = {"in anything": [row.n_buildings for row in rows], "in fieryness": [row.n_states for row in rows]}
+    first_step = None if difference.first is None else difference.first.step
+    steps = [row.step for row in rows]
+    return png_bytes(draw_difference_curves(steps, curves, n_buildings, first_step=first_step))

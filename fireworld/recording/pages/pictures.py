@@ -1,12 +1,23 @@
-"""Pictures of runs: what `Run.show` returns, and what notebooks show of a run."""
+"""Pictures and films of runs: as files, and what `Run.show` and notebooks show."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
-from fireworld.files import write_file
+from fireworld_viewer.pictures.figure_files import STILLS, plain_style, png_bytes, save_figure
+from fireworld_viewer.pictures.film import FILMS, FPS, save_film
+from fireworld_viewer.pictures.maps import draw_record, draw_steps
+from fireworld_viewer.story.steps import LAST, read_steps_between
+
+from fireworld.errors import ViewError
+from fireworld.files import check_output, write_file
+from fireworld.recording.inputs import AnyRecording, open_to_show
 from fireworld.records import Recording, StepRecord
+
+ENDINGS: Final = (*STILLS, *FILMS)  # of files that can be rendered
 
 
 @dataclass(frozen=True)
@@ -33,14 +44,7 @@ class Picture:
 
 
 def map_of(run: Recording, record: StepRecord) -> Picture:
-    """Return a map of the city after a step.
-
-    Raises:
-        ViewError: matplotlib is not installed.
-    """
-    from fireworld_viewer.pictures.figure_files import plain_style, png_bytes
-    from fireworld_viewer.pictures.maps import draw_record
-
+    """Return a map of the city after a step; ViewError if matplotlib is not installed."""
     title = f"{run.header.scenario}, {run.header.policy}, seed {run.header.seed}: step {record.step}"
     with plain_style():
         return Picture(title, png_bytes(draw_record(run.city, record, title=title)))
@@ -48,9 +52,50 @@ def map_of(run: Recording, record: StepRecord) -> Picture:
 
 def map_png(run: Recording, record: StepRecord) -> bytes | None:
     """Return the map as a PNG file; None where matplotlib is not installed."""
-    from fireworld.errors import ViewError
-
     try:
         return map_of(run, record).png
     except ViewError:
         return None
+
+
+def render_picture(
+    logs: AnyRecording | Sequence[AnyRecording],
+    output: Path | str,
+    *,
+    steps: Sequence[int] = (LAST,),
+    force: bool = False,
+) -> None:
+    """Draw steps of one recording, or of two of one city side by side, as a .png, .svg or .pdf file.
+
+    Recordings are paths or runs; those that were cut off or damaged are drawn as far as they are good. Errors:
+    OutputError, LogError, or ViewError if there is no such step, the cities differ or matplotlib is missing.
+    """
+    check_output(Path(output), endings=STILLS, force=force)
+    recordings = open_to_show(logs)
+    with plain_style():
+        save_figure(draw_steps(recordings, steps), Path(output), force=force)
+
+
+def render_film(
+    logs: AnyRecording | Sequence[AnyRecording],
+    output: Path | str,
+    *,
+    first_step: int | None = None,
+    last_step: int | None = None,
+    every: int = 1,
+    fps: float = FPS,
+    force: bool = False,
+    on_frame: Callable[[int, int], object] = lambda _, __: None,
+) -> list[int]:
+    """Make a film, a .gif or .mp4 file; recordings and errors as for `render_picture`. Return the steps drawn.
+
+    Every n-th step is drawn, and always the last; `fps` of them a second. `on_frame` is called after each frame with
+    the number of frames done and of all.
+    """
+    check_output(Path(output), endings=FILMS, force=force)
+    recordings = open_to_show(logs)
+    shown = read_steps_between(recordings, first=first_step, last=last_step, every=every)
+    frames = iter(range(1, len(shown) + 1))
+    with plain_style():
+        save_film(recordings, shown, Path(output), fps=fps, on_frame=lambda: on_frame(next(frames), len(shown)))
+    return [one.step for one in shown]

@@ -11,12 +11,11 @@ from typing import Final
 
 import numpy as np
 from fireworld_recorder.totals import final_outcome
-from fireworld_viewer.pictures.curves import draw_curves
-from fireworld_viewer.pictures.decision_timeline import draw_timeline
+from fireworld_viewer.pictures.curves import draw_curves, draw_timeline
 from fireworld_viewer.pictures.figure_files import plain_style, png_bytes
 from fireworld_viewer.pictures.maps import draw_steps
-from fireworld_viewer.story.counts import Counts, count_choices
 from fireworld_viewer.story.narration import event_lines
+from fireworld_viewer.story.series import Counts, count_choices
 from fireworld_viewer.story.steps import evenly_spaced
 
 from fireworld.errors import one_line
@@ -44,15 +43,8 @@ _TARGETS_SHOWN: Final = 12
 def report(logs: AnyRun | Sequence[AnyRun], output: Path | str, *, force: bool = False) -> None:
     """Write one recording, or two of one city, as an HTML page that needs no other file.
 
-    Args:
-        logs: paths of recordings, or runs; those that were cut off or damaged are reported as far as they are good.
-        output: a .html file.
-        force: replace an existing file.
-
-    Raises:
-        OutputError: the file cannot be written.
-        ViewError: matplotlib is not installed, a recording has no steps, or the cities differ.
-        LogError: a recording cannot be read.
+    Recordings are paths or runs; those that were cut off or damaged are reported as far as they are good. Errors:
+    OutputError, LogError, or ViewError if there is no matplotlib, no step, or if the cities differ.
     """
     check_output(Path(output), endings=ENDINGS, force=force)
     runs = open_one_or_two(logs)
@@ -62,16 +54,11 @@ def report(logs: AnyRun | Sequence[AnyRun], output: Path | str, *, force: bool =
             "curves": png_bytes(draw_curves(runs)),
             "timeline": png_bytes(draw_timeline(runs)),
         }
-    write_file(Path(output), run_page(runs, images).encode())
+    write_file(Path(output), _run_page(runs, images).encode())
 
 
-def run_page(logs: Sequence[StoredRun], images: Mapping[str, bytes]) -> str:
-    """Write the page; it needs no other file.
-
-    Args:
-        logs: one recording, or two of the same city; with steps.
-        images: PNG files: "maps", "curves", "timeline".
-    """
+def _run_page(logs: Sequence[StoredRun], images: Mapping[str, bytes]) -> str:
+    """Write the page, with PNG files of the "maps", "curves" and "timeline" of all runs."""
     names = _names(logs)
     headers = [log.header for log in logs]
     title = " against ".join(f"{one_line(one.scenario)}, {one_line(one.policy)}, seed {one.seed}" for one in headers)

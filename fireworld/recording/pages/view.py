@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -32,23 +33,11 @@ def view(
 ) -> None:
     """Show one recording, or two of one city side by side, in Rerun; return when its window is closed.
 
-    Args:
-        logs: paths of recordings, or runs; those that were cut off or damaged are shown as far as they are good.
-        save: write a Rerun file instead.
-        force: replace an existing file.
-        web: serve the view to browsers on this machine instead, until Ctrl-C.
-        port: of the page that `web` serves.
-        announce: called with the address of that page.
-        focus: ids of buildings whose temperatures are plotted; by default, those that burn first.
-        first_step: first step to show.
-        last_step: last step to show.
-        every: show every n-th step.
-        air: show the heat of the air at every step, which is computed by a replay.
-
-    Raises:
-        ViewError: there is no Rerun or no display, the cities differ, or there is no such step or building.
-        OutputError: the file cannot be written.
-        LogError: a recording cannot be read, or does not replay to what is recorded.
+    Recordings are paths or runs; those that were cut off or damaged are shown as far as they are good. With `save` a
+    Rerun file is written instead; with `web` the view is served to browsers on this machine until Ctrl-C, and
+    `announce` called with its address. `focus`: ids of buildings whose temperatures are plotted, by default those that
+    burn first. `air`: show its heat at every step, which is computed by a replay. Errors: OutputError, LogError, or
+    ViewError if there is no Rerun, no display, no such step or building, or if the cities differ.
     """
     held = open_to_show(logs)
     names = [run_name(recording) for recording in held]
@@ -58,12 +47,13 @@ def view(
         held = [replay_with_air(recording, source=name) for recording, name in zip(held, names, strict=True)]
     shown = [select_steps(one, first=first_step, last=last_step, every=every) for one in held]
     outcome = _outcome([Path(name).name for name in names], shown)
+    write = functools.partial(app.save, shown, focus=focus, outcome=outcome)
     if save is not None:
-        app.save(shown, Path(save), focus=focus, outcome=outcome, force=force)
+        write(Path(save), force=force)
     elif web:
-        app.serve(shown, focus=focus, outcome=outcome, port=port or app.WEB_PORT, announce=announce)
+        app.serve(write, port=port or app.WEB_PORT, announce=announce)
     else:
-        app.show(shown, focus=focus, outcome=outcome)
+        app.show(write)
 
 
 def _outcome(heads: Sequence[str], recordings: Sequence[Recording]) -> OutcomePage:

@@ -31,11 +31,7 @@ _MISSING: Final = "pictures: matplotlib is not installed; try pip install 'firew
 
 
 def import_library(name: str, hint: str) -> Any:
-    """Import a library that need not be installed.
-
-    Raises:
-        ViewError: it is not; the message is the hint.
-    """
+    """Import a library that need not be installed; ViewError with the hint if it is not."""
     try:
         return importlib.import_module(name)
     except ImportError:
@@ -45,11 +41,7 @@ def import_library(name: str, hint: str) -> Any:
 def new_figure(
     width_inches: float, height_inches: float, *, dpi: int = DPI, paper: str = PAPER, layout: Any = None
 ) -> Figure:
-    """Return an empty figure that needs no screen, on paper of a color; a "constrained" layout makes room for labels.
-
-    Raises:
-        ViewError: matplotlib is not installed.
-    """
+    """Return an empty figure that needs no screen, on colored paper; a "constrained" layout makes room for labels."""
     import_library("matplotlib", _MISSING)
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

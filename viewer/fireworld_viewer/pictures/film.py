@@ -33,8 +33,7 @@ _NEAR: Final = 6
 _NO_AV: Final = (
     "film: PyAV, which writes .mp4, is not installed; try pip install 'fireworld[film]', or a film that ends in .gif"
 )
-Frame = NDArray[np.uint8]
-"""(height, width, 3) sRGB; both even."""
+Frame = NDArray[np.uint8]  # (height, width, 3) sRGB; both even
 
 
 def save_film(

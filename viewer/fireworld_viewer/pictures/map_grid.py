@@ -64,15 +64,9 @@ class MapCell:
 
 
 class MapGrid:
-    """A figure of maps; `show` sets all of them to another step.
+    """A figure of maps, row by row; `show` sets all of them to another step.
 
-    Args:
-        cells: row by row.
-        columns: maps side by side.
-        map_inches: width of a map.
-        heading: above everything; empty for none.
-        labels: entries of the legend; what is on these maps if left out.
-        dpi: pixels an inch.
+    The labels are the entries of the legend: what is on these maps if left out.
     """
 
     def __init__(

@@ -40,46 +40,28 @@ def save(
 ) -> None:
     """Write one recording, or two side by side, as a Rerun file; an unfinished file never bears the final name.
 
-    Args:
-        recordings: one, or two of the same city.
-        path: the .rrd file.
-        focus: ids of buildings whose temperatures are plotted; if there are none, those that burn first.
-        force: replace an existing file.
-        outcome: how the runs came out, and where two first differ; left out of the view if not given.
-
-    Raises:
-        OutputError: the file exists or cannot be written.
-        ViewError: Rerun is missing, the cities differ or a building of the focus is unknown.
+    `focus`: ids of buildings whose temperatures are plotted; if there are none, those that burn first. `outcome`: how
+    the runs came out, and where two first differ; left out of the view if not given. Errors: OutputError, or ViewError
+    if Rerun is missing, the cities differ or a building of the focus is unknown.
     """
     check_output(path, force=force)
     write_file(path, _rrd(recordings, focus, outcome))
 
 
-def show(recordings: Sequence[Recording], *, focus: Sequence[int] = (), outcome: OutcomePage | None = None) -> None:
-    """Open recordings in Rerun's own window and return when it is closed; the arguments are those of `save`.
+def show(write: Callable[[Path], None]) -> None:
+    """Open the Rerun file that `write` makes in Rerun's own window, and return when it is closed.
 
-    Raises:
-        ViewError: there is no display, or no viewer.
+    ViewError if there is no display, or no viewer.
     """
     _import_rerun()
     check_display("view", "--save FILE.rrd, --web, or `fireworld render` for pictures")
-    _run_viewer(recordings, focus, outcome, ["--port", str(free_port()), "--hide-welcome-screen"])
+    _run_viewer(write, ["--port", str(free_port()), "--hide-welcome-screen"])
 
 
-def serve(
-    recordings: Sequence[Recording],
-    *,
-    focus: Sequence[int] = (),
-    outcome: OutcomePage | None = None,
-    port: int = WEB_PORT,
-    announce: Callable[[str], None],
-) -> None:
-    """Serve Rerun with the recordings to browsers on this machine until interrupted; arguments as in `save`.
+def serve(write: Callable[[Path], None], *, port: int = WEB_PORT, announce: Callable[[str], None]) -> None:
+    """Serve the Rerun file that `write` makes to browsers on this machine until interrupted; announce the address.
 
-    `port` is that of the page, and `announce` is called with its address.
-
-    Raises:
-        ViewError: the port is taken, or there is no viewer.
+    ViewError if the port, that of the page, is taken, or if there is no viewer.
     """
     _import_rerun()
     try:
@@ -89,7 +71,7 @@ def serve(
     data_port = free_port()
     announce(f"http://{LOCALHOST}:{port}?url=rerun%2Bhttp%3A%2F%2F{LOCALHOST}%3A{data_port}%2Fproxy")
     ports = ["--web-viewer-port", str(port), "--port", str(data_port)]
-    _run_viewer(recordings, focus, outcome, ["--serve-web", *ports])
+    _run_viewer(write, ["--serve-web", *ports])
 
 
 def check_display(option: str, others: str) -> None:
@@ -99,13 +81,8 @@ def check_display(option: str, others: str) -> None:
 
 
 def viewer_executable() -> Path:
-    """Return the path of Rerun's viewer; the `rerun` script is a wrapper that leaves it running when it is stopped.
-
-    Raises:
-        ViewError: it is not there.
-    """
-    rerun = _import_rerun()
-    folder = Path(str(rerun.__file__)).parents[1] / "rerun_cli"
+    """Return the path of Rerun's viewer, or raise ViewError; the `rerun` script would leave it running when stopped."""
+    folder = Path(str(_import_rerun().__file__)).parents[1] / "rerun_cli"
     path = folder / ("rerun.exe" if os.name == "nt" else "rerun")
     if not path.is_file():
         raise ViewError(f"view: expected Rerun's viewer at {path}; {INSTALL_HINT}")
@@ -119,11 +96,7 @@ def viewer_environment(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 def free_port(wanted: int = 0) -> int:
-    """Return a port of this machine that nobody listens on at the moment: the one wanted, any for 0.
-
-    Raises:
-        OSError: it is taken.
-    """
+    """Return a port of this machine that nobody listens on: any for 0, else the one wanted; OSError if it is taken."""
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         probe.bind((LOCALHOST, wanted))
@@ -132,11 +105,7 @@ def free_port(wanted: int = 0) -> int:
 
 
 def new_stream(application_id: str = APPLICATION_ID, *, recording_id: str | None = None) -> rerun.RecordingStream:
-    """Return an empty stream without timelines of its own.
-
-    Raises:
-        ViewError: Rerun is missing or switched off.
-    """
+    """Return an empty stream without timelines of its own; ViewError if Rerun is missing or switched off."""
     rerun = _import_rerun()
     stream = rerun.RecordingStream(application_id, recording_id=recording_id, send_properties=False)
     if not rerun.is_enabled(stream):
@@ -191,13 +160,11 @@ def _identity(recordings: Sequence[Recording]) -> str:
     return digest.hexdigest()[:32]
 
 
-def _run_viewer(
-    recordings: Sequence[Recording], focus: Sequence[int], outcome: OutcomePage | None, options: list[str]
-) -> None:
-    """Run Rerun's viewer on recordings until it ends or this process is stopped; it never outlives this process."""
+def _run_viewer(write: Callable[[Path], None], options: list[str]) -> None:
+    """Run Rerun's viewer on a file until it ends or this process is stopped; it never outlives this process."""
     with tempfile.TemporaryDirectory(prefix="fireworld-") as folder:
         path = Path(folder) / "view.rrd"
-        save(recordings, path, focus=focus, outcome=outcome)
+        write(path)
         command = [str(viewer_executable()), "--bind", LOCALHOST, *options, str(path)]
         before = signal.signal(signal.SIGTERM, signal.default_int_handler)
         with (Path(folder) / "errors").open("w+", encoding="utf-8", errors="replace") as errors:

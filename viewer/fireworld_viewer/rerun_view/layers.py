@@ -23,11 +23,8 @@ class Layers:
     Steps may come in several parts, one after another: what is static is sent once, and what is sent only where it
     changes is compared with the last step of the part before.
 
-    Args:
-        stream: where to.
-        prefix: entity path, "" or like "/a".
-        steps: (k,) steps of the first part; set the attribute before the next part.
-        name: of this run beside another, "" where it is alone.
+    The prefix is an entity path, "" or like "/a"; `steps` are the (k,) steps of the first part, to be set before the
+    next one. A run beside another has a name, "" where it is alone.
     """
 
     def __init__(self, stream: rerun.RecordingStream, prefix: str, steps: NDArray[np.int64], *, name: str = "") -> None:

@@ -18,8 +18,7 @@ HELP_PATH: Final = "/help"
 OUTCOME_PATH: Final = "/outcome"
 
 HEALTH: Final = ("well", "hurt", "dying", "dead")
-_COLUMN_WIDTH: Final = 3.9
-"""Width of a name in rows; a row is as high as a dot with its name."""
+_COLUMN_WIDTH: Final = 3.9  # width of a name in rows; a row is as high as a dot with its name
 
 HELP: Final = Path(__file__).with_name("help.md").read_text(encoding="utf-8")
 

@@ -14,7 +14,6 @@ from fireworld.records import CityRecord, Recording
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh
 from fireworld_viewer.rerun_view import brigades, city_layers
-from fireworld_viewer.rerun_view.air import log_air
 from fireworld_viewer.rerun_view.layers import Layers
 from fireworld_viewer.rerun_view.pages import OutcomePage
 from fireworld_viewer.rerun_view.plots import log_plot, log_plots
@@ -64,7 +63,7 @@ class RunLayers:
         layers, mesh = self._layers, self._mesh
         layers.steps = recording.steps
         city_layers.log_buildings(layers, recording, mesh)
-        log_air(layers, recording, mesh)
+        city_layers.log_air(layers, recording, mesh)
         brigades.log_brigades(layers, recording)
         brigades.log_water(layers, recording, mesh)
         city_layers.log_civilians(layers, recording, mesh)
@@ -106,8 +105,7 @@ def log_comparison(
 ) -> None:
     """Send two runs, below /a and /b, and their difference; where they first differ is marked if the outcome is given.
 
-    Raises:
-        ViewError: the runs are of different cities, one has no steps, or a building of the focus is unknown.
+    ViewError if the runs are of different cities, one has no steps, or a building of the focus is unknown.
     """
     check_same_city(first.city, second.city)
     steps, rows_a, rows_b = common_steps(first.steps, second.steps)

@@ -47,12 +47,7 @@ class TrainingPoint:
 
 
 class CurveWriter:
-    """Writes points to a stream: a curve for each name that comes up in a plot, in a color of its own there.
-
-    Args:
-        stream: of Rerun.
-        layout: of the plots; sent with the first points.
-    """
+    """Writes points to a stream: a curve for each name that comes up in a plot, in a color of its own there."""
 
     def __init__(self, stream: rerun.RecordingStream, layout: TrainingLayout) -> None:
         self._stream, self._layout = stream, layout

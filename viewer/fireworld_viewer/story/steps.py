@@ -32,10 +32,7 @@ def select_steps(
 ) -> MemoryRecording:
     """Read the steps from `first` to `last`, both included, and of these every `every`-th, into memory.
 
-    Events and choices of steps that are left out are left out, too.
-
-    Raises:
-        ViewError: no step is left.
+    Events and choices of steps that are left out are left out, too. ViewError if no step is left.
     """
     chosen = set(_between("view", recording.steps, first, last)[::every].tolist())
     return MemoryRecording(recording.header, recording.city, [one for one in recording if one.step in chosen])
@@ -119,10 +116,7 @@ def common_steps(
 ) -> tuple[NDArray[np.int64], NDArray[np.intp], NDArray[np.intp]]:
     """Align two runs: every step of either once both have begun, (k,), and the row of each run with its state there.
 
-    A run that has ended stays in its last state.
-
-    Raises:
-        ViewError: a run has no steps.
+    A run that has ended stays in its last state. ViewError if a run has no steps.
     """
     if len(steps_a) == 0 or len(steps_b) == 0:
         raise ViewError(expected("view", "", "two recordings with steps", f"{len(steps_a)} and {len(steps_b)} steps"))
@@ -133,11 +127,7 @@ def common_steps(
 
 
 def check_same_city(first: CityRecord, second: CityRecord) -> None:
-    """Check that two runs took place in the same city.
-
-    Raises:
-        ViewError: the cities differ in a building; the message names both and what differs.
-    """
+    """Check that two runs took place in the same city; ViewError, with what differs, if one building does."""
     for name in ("building_id", "outline_ptr", "outline_x_m", "outline_y_m", "floors"):
         if not np.array_equal(getattr(first, name), getattr(second, name)):
             n, m = len(first.building_id), len(second.building_id)

@@ -1,8 +1,9 @@
-"""Two runs that differ: a map of what differs at a step, and curves of both."""
+"""Two policies or runs compared: differences seed by seed, a map of what differs at a step, curves of both runs."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -16,10 +17,10 @@ from fireworld_viewer.pictures.maps import draw_map
 from fireworld_viewer.story.steps import compare_damage
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Gaps = Sequence[float | None]
-"""Numbers over steps; None where a run does not have the step."""
+Gaps = Sequence[float | None]  # numbers over steps; None where a run does not have the step
 
 _VIOLET: Final = "#a0209a"
 _BRIGADE: Final = hexadecimal(colors.ACTIVITY_RGB[2])
@@ -29,6 +30,69 @@ _KINDS: Final = {
     0: ("other difference", "#cec4e6"),
 }
 """Of buildings that differ: label and color by the sign that `compare_damage` returns."""
+BETTER: Final = "#0072b2"
+WORSE: Final = "#d55e00"
+EQUAL: Final = "#8a8a8a"
+"""Blue, vermilion and grey: every eye can distinguish them; side and mark say the same."""
+_INK: Final = "#222222"
+_GOLDEN: Final = 0.6180339887498949
+_SPREAD: Final = 0.3  # points lie that far above and below their line
+_DIRECTIONS: Final = {True: (1, " (more is better)"), False: (-1, " (less is better)"), None: (0, "")}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DifferencePanel:
+    """One quantity."""
+
+    label: str
+    unit: str
+    higher_is_better: bool | None  # None: neither is better
+    lines: Mapping[str, tuple[Array, Sequence[float]]]
+    """By scenario, the last over all if there are several: (seeds,) B - A; its mean, and the ends of its interval."""
+
+
+def draw_paired_differences(panels: Sequence[DifferencePanel], *, title: str) -> Figure:
+    """Draw a panel for each quantity, two in a row: a point for every seed, and the mean with its 95 % interval."""
+    n_rows = -(-len(panels) // 2)
+    height = n_rows * (1.4 + 0.5 * len(panels[0].lines))
+    figure = new_figure(11.0, height, paper="white", layout="constrained")
+    grid = figure.subplots(n_rows, 2, squeeze=False).ravel()
+    for axes, panel in zip(grid, panels, strict=False):
+        _draw_panel(axes, panel)
+    for axes in grid[len(panels) :]:
+        axes.remove()
+    figure.suptitle(title, fontsize=12, x=0.01, ha="left")
+    figure.supxlabel(
+        "a point is a seed: B - A. Blue, upward: B is better; orange, downward: A is; grey: equal. "
+        "Black: mean and 95 % interval.",
+        fontsize=9,
+    )
+    return figure
+
+
+def _draw_panel(axes: Axes, panel: DifferencePanel) -> None:
+    sign, direction = _DIRECTIONS[panel.higher_is_better]
+    axes.axvline(0.0, color=_INK, linewidth=0.8)
+    for place, (differences, (mean, low, high)) in enumerate(panel.lines.values()):
+        # One point a seed, spread evenly over the height of the line in the order of the seeds.
+        heights = place + _SPREAD * (2.0 * (np.arange(len(differences)) * _GOLDEN % 1.0) - 1.0)
+        gain = sign * differences
+        for chosen, color, shape in ((gain > 0, BETTER, "^"), (gain < 0, WORSE, "v"), (gain == 0, EQUAL, "o")):
+            x, y = differences[chosen], heights[chosen]
+            axes.scatter(x, y, s=14, color=color, marker=shape, linewidths=0, alpha=0.6)
+        axes.plot([low, high], [place, place], color=_INK, linewidth=2.4, solid_capstyle="butt", zorder=4)
+        axes.plot([mean], [place], marker="o", color="white", markeredgecolor=_INK, markersize=7, zorder=5)
+    n = len(panel.lines)
+    if n > 1:
+        axes.axhline(n - 1.5, color="#cccccc", linewidth=0.8)
+    axes.set_yticks(range(n), list(panel.lines), fontsize=9)
+    axes.set_ylim(n - 0.4, -0.6)
+    widest = max(float(np.abs(differences).max()) for differences, _ in panel.lines.values())
+    axes.set_xlim(-1.08 * (widest or 1.0), 1.08 * (widest or 1.0))
+    axes.set_title(f"{panel.label}{direction}", fontsize=10, loc="left")
+    axes.set_xlabel(panel.unit, fontsize=8)
+    open_frame(axes)
+    axes.tick_params(axis="x", labelsize=8)
 
 
 def draw_difference_map(city: CityRecord, a: StepRecord, b: StepRecord, differing: Mapping[str, Array]) -> Figure:
@@ -73,13 +137,9 @@ def draw_difference_curves(
     *,
     first_step: int | None,
 ) -> Figure:
-    """Draw three curves of both runs, and how many buildings differ.
+    """Draw three curves of A and of B by title, those after the first counts, and how many buildings differ by label.
 
-    Args:
-        steps: of the numbers.
-        curves: by title: of A and of B; those after the first are counts.
-        n_buildings: by label: how many buildings differ, in anything and in fieryness.
-        first_step: of the first difference; None for none.
+    All numbers are over the steps; `first_step` is that of the first difference.
     """
     figure = new_figure(12.0, 6.4, dpi=110, paper="white", layout="constrained")
     panels = figure.subplots(2, 2, sharex=True).ravel()
