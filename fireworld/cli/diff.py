@@ -85,9 +85,8 @@ def command(
     if html is not None:
         check_matplotlib("diff --html")
     if is_training(first) and is_training(second):
-        if any((tolerances, ignore, first_step is not None, last_step is not None, any_scenario, outputs)):
-            raise click.UsageError("Of two trainings --partial and --json are all there is to ask for.")
-        _diff_trainings(context, first, second, partial=partial, as_json=as_json)
+        asked = any((tolerances, ignore, first_step is not None, last_step is not None, any_scenario, outputs))
+        _diff_trainings(context, first, second, asked=asked, partial=partial, as_json=as_json)
     difference = diff(
         first,
         second,
@@ -116,8 +115,12 @@ def command(
     context.exit(0 if difference.same else 1)
 
 
-def _diff_trainings(context: click.Context, first: Path, second: Path, *, partial: bool, as_json: bool) -> NoReturn:
-    """Compare two training logs."""
+def _diff_trainings(
+    context: click.Context, first: Path, second: Path, *, asked: bool, partial: bool, as_json: bool
+) -> NoReturn:
+    """Compare two training logs; `asked`: for something that is for runs alone."""
+    if asked:
+        raise click.UsageError("Of two trainings --partial and --json are all there is to ask for.")
     from fireworld.training.log.difference import diff_trainings
 
     difference = diff_trainings(first, second, partial=partial)

@@ -34,18 +34,18 @@ def command(context: click.Context, *, log: Path | None, as_json: bool, schema: 
 
     Exit code: 0 good, 1 cut off or damaged but good up to a step, 2 not readable.
     """
+    from fireworld_recorder.kind import noun_of
     from fireworld_recorder.reader import open_log
     from fireworld_recorder.schema import PROTO
 
-    from fireworld.recording.inputs import is_training
     from fireworld.recording.summary import summary
 
     if schema and proto:
         raise click.UsageError("--schema and --proto exclude each other.")
     if log is None and not (schema or proto):
         raise click.UsageError("Missing argument 'LOG'; only --schema and --proto do without.")
-    if log is not None and is_training(log):
-        _show_training(context, Path(log), as_json=as_json, schema=schema or proto)
+    if log is not None and noun_of(log) == "training":
+        _show_training(context, log, as_json=as_json, schema=schema or proto)
     recording = None if log is None else open_log(log, partial=True)
     if proto:
         click.echo(PROTO.read_text(encoding="utf-8"), nl=False)

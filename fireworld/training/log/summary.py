@@ -104,6 +104,6 @@ def _cells(row: dict[str, Any]) -> list[str]:
         f"{row['n_steps']:,}",
         ends,
         f"{row['return']:,.0f}",
-        f"{row['score']:.2f} of {row['score_max']:.0f}",
+        f"{row['score']:.2f}/{row['score_max']:.0f}",
         str(row["n_visited"]),
     ]
