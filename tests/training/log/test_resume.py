@@ -1,0 +1,126 @@
+"""A training that was cut off at any byte continues, and its log becomes the same, byte for byte."""
+
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from fireworld_recorder.writer import PARTIAL_SUFFIX
+
+from fireworld.errors import LogError, OutputError, TrainingError
+from fireworld.training.log.reader import open_training
+from fireworld.training.train import train
+from fireworld.training.training import StopTraining
+from tests.training.log.conftest import SHORT, SHORT_SEARCH
+
+
+def cut(whole, folder, n_bytes):
+    """Leave what a kill after so many bytes leaves; return the name of the log."""
+    path = folder / "t.mcap"
+    for old in folder.glob("t.*"):
+        old.unlink()
+    path.with_name(path.name + PARTIAL_SUFFIX).write_bytes(whole[:n_bytes])
+    return path
+
+
+@pytest.mark.parametrize(("method", "short"), [("paper", SHORT), ("search", SHORT_SEARCH)])
+def test_a_log_that_was_cut_anywhere_is_continued_to_the_same_bytes(curriculum, make_log, tmp_path, method, short):
+    source = make_log(method)
+    whole, team = source.read_bytes(), source.with_suffix(".npz").read_bytes()
+    places = random.Random(7)
+    n_continued = 0
+    for n_bytes in sorted(places.randrange(len(whole)) for _ in range(30)):
+        path = cut(whole, tmp_path, n_bytes)
+        output = path.with_suffix(".npz")
+        try:
+            before = open_training(path.with_name(path.name + PARTIAL_SUFFIX), partial=True)
+        except LogError:  # the header is not there yet: nothing is lost but the beginning
+            continue
+        train(curriculum, method=method, set=short, output=output, record=path, resume=True)
+        n_continued += len(before) > 0
+        assert path.read_bytes() == whole
+        assert output.read_bytes() == team
+        assert sorted(one.name for one in tmp_path.glob("t.*")) == ["t.mcap", "t.npz"]
+    assert n_continued >= 10
+
+
+def test_the_table_of_reports_is_whole_too(curriculum, make_log, tmp_path):
+    whole = make_log().read_bytes()
+    train(curriculum, set=SHORT, log=tmp_path / "all.csv")
+    path = cut(whole, tmp_path, len(whole) // 2)
+    train(curriculum, set=SHORT, record=path, log=tmp_path / "t.csv", resume=True)
+    assert (tmp_path / "t.csv").read_bytes() == (tmp_path / "all.csv").read_bytes()
+
+
+def test_a_callback_stops_and_resume_continues(curriculum, make_log, tmp_path):
+    path = tmp_path / "t.mcap"
+
+    def stop(training, report):
+        if training.n_reports == 5:
+            raise StopTraining
+
+    train(curriculum, set=SHORT, output=tmp_path / "t.npz", record=path, callbacks=[stop])
+    assert [one.name for one in tmp_path.iterdir()] == ["t.mcap.partial"]
+    assert len(open_training(tmp_path / "t.mcap.partial", partial=True)) == 5
+    train(curriculum, set=SHORT, output=tmp_path / "t.npz", record=path, resume=True)
+    assert path.read_bytes() == make_log().read_bytes()
+
+
+def test_a_missing_team_is_made_of_a_log_that_is_whole(curriculum, make_log, tmp_path):
+    path = tmp_path / "t.mcap"
+    path.write_bytes(make_log().read_bytes())
+    train(curriculum, set=SHORT, output=tmp_path / "t.npz", record=path, resume=True)
+    assert (tmp_path / "t.npz").read_bytes() == make_log().with_suffix(".npz").read_bytes()
+    assert path.read_bytes() == make_log().read_bytes()
+
+
+def test_the_log_of_another_training_is_not_continued(curriculum, make_log, tmp_path):
+    whole = make_log().read_bytes()
+    path = cut(whole, tmp_path, len(whole) // 2)
+    left = path.with_name(path.name + PARTIAL_SUFFIX).read_bytes()
+    for changed, message in [
+        ({"set": {**SHORT, "alpha": 0.1}}, "method.alpha: expected 0.1, got 0.7"),
+        ({"seed": 9}, "seed: expected 9, got 1"),
+        ({"stages": "alone"}, "curriculum.digest: expected"),
+    ]:
+        with pytest.raises(TrainingError, match=message):
+            train(curriculum, **{"set": SHORT, **changed}, record=path, resume=True)
+    with pytest.raises(OutputError, match="a training that did not end left this, or one is under way; try --resume"):
+        train(curriculum, set=SHORT, record=path)
+    assert path.with_name(path.name + PARTIAL_SUFFIX).read_bytes() == left
+    assert not path.exists()
+
+
+def test_damage_in_the_middle_costs_what_comes_after_it(curriculum, make_log, tmp_path):
+    whole = bytearray(make_log().read_bytes())
+    whole[2 * len(whole) // 3] ^= 1
+    path = cut(bytes(whole), tmp_path, len(whole))
+    train(curriculum, set=SHORT, record=path, resume=True)
+    assert path.read_bytes() == make_log().read_bytes()
+
+
+@pytest.mark.slow
+def test_a_training_that_is_killed_continues(curriculum_file, make_log, tmp_path):
+    """Real kills at random moments, one after another, of one training."""
+    settings = [word for key, value in SHORT.items() for word in ("--set", f"{key}={value}")]
+    words = ["train", curriculum_file, *settings, "-o", tmp_path / "t.npz", "--record", tmp_path / "t.mcap"]
+    command = [sys.executable, "-m", "fireworld", *map(str, words)]
+    moments, n_kills = random.Random(3), 0
+    while not (tmp_path / "t.npz").exists():
+        begun = any(tmp_path.glob("t.mcap*"))
+        process = subprocess.Popen([*command, *(["--resume"] if begun else [])], stderr=subprocess.PIPE)
+        deadline = time.monotonic() + 60
+        while process.poll() is None and not any(tmp_path.glob("t.mcap*")) and time.monotonic() < deadline:
+            time.sleep(0.002)
+        time.sleep(moments.random() * 0.02)
+        process.send_signal(signal.SIGKILL)
+        n_kills += process.wait() == -signal.SIGKILL
+        partial = tmp_path / "t.mcap.partial"
+        if n_kills >= 8:
+            subprocess.run([*command, "--resume"], check=True, capture_output=True)
+        elif partial.exists() and b"fireworld.training" not in partial.read_bytes():
+            partial.unlink()  # killed before the header was there
+    assert (tmp_path / "t.mcap").read_bytes() == make_log().read_bytes()
+    assert n_kills > 0
