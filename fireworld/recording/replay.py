@@ -34,11 +34,15 @@ class RecordedPolicy(Policy):
         self._records = iter(recording)
         self._record = next(self._records, None)
 
+    def made(self, step: int) -> Decisions | None:
+        """Return the decisions recorded for a step, those of the next one if it is not there; steps come rising."""
+        while self._record is not None and self._record.step < step:
+            self._record = next(self._records, None)
+        return self._record.decisions if self._record is not None else None
+
     def decide(self, observation: Observation) -> Decision:
         """Return the decision recorded for this brigade and step."""
-        while self._record is not None and self._record.step < observation.step:
-            self._record = next(self._records, None)
-        made = self._record.decisions if self._record is not None else None
+        made = self.made(observation.step)
         decision = recorded_decision(made, observation.brigade) if made is not None else None
         if decision is None or (decision.target is not None and decision.target not in observation.burning):
             # The replay differs from the recording; with any action the comparison continues and names the step.
@@ -60,6 +64,13 @@ def recorded_decision(made: Decisions, brigade: int) -> Decision | None:
         explored=bool(made.explored[brigade]),
         epsilon=made.epsilon,
     )
+
+
+def with_errors(record: StepRecord, made: Decisions | None) -> StepRecord:
+    """Return a step that was computed again, with recorded TD errors: given as values are, for nothing is learned."""
+    if made is None or not len(made.td_error):
+        return record
+    return replace(record, decisions=replace(record.decisions, td_error=made.td_error))
 
 
 def recorded_scenario(header: RunHeader) -> Scenario:
@@ -126,7 +137,8 @@ class Replay:
         if last >= 0:
             yield finished(observer.record())
         while world.step_number < last and not (world.terminated or world.truncated):
-            yield finished(observer.record(world.step(policy)))
+            record = observer.record(world.step(policy))
+            yield finished(with_errors(record, policy.made(record.step)))
 
 
 def check_replay(recorded: Recording, replayed: Steps, *, source: str, hint: str = "") -> None:

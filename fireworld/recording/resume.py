@@ -11,6 +11,7 @@ from fireworld.policy.names import TEAM_ATTACHMENT, NamedPolicy, find_policy
 from fireworld.policy.protocol import Policy
 from fireworld.policy.teams.team import parse_team
 from fireworld.recording.decisions import RecordedDecisions, ShadowPolicy
+from fireworld.recording.replay import with_errors
 from fireworld.records import ACTION_NAMES, MemoryRecording, RunHeader, StepRecord
 from fireworld.simulation.built import BuiltScenario
 from fireworld.simulation.observer import Observer
@@ -145,6 +146,5 @@ def _steps_again(world: World, decider: Policy, records: Sequence[StepRecord]) -
     recorded = {record.step: record.decisions for record in records}
     while world.step_number < records[-1].step and not (world.terminated or world.truncated):
         record = observer.record(world.step(decider))
-        errors = recorded[record.step].td_error  # given, as values are: nothing is learned here
-        again.append(replace(record, decisions=replace(record.decisions, td_error=errors)))
+        again.append(with_errors(record, recorded[record.step]))
     return again

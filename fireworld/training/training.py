@@ -64,6 +64,7 @@ class Training:
     stopped: bool = False
     log: str = field(default="", repr=False)
     error: Exception | None = field(default=None, repr=False)
+    _resumes: bool = field(default=False, repr=False)
     _before: TrainingLog | None = field(default=None, repr=False)
 
     @property
@@ -133,9 +134,15 @@ class Training:
         return True
 
     def _resume_from(self, path: Path) -> bool:
-        """Continue where a training log ends."""
-        from fireworld.training.log.reader import open_training
+        """Continue where a training log ends; what was cut off before its first part begins anew."""
+        from fireworld_recorder.scan import holds_nothing
 
+        from fireworld.training.log.reader import open_training
+        from fireworld.training.log.records import TRAINING
+
+        self._resumes = True
+        if path == self.checkpoint and holds_nothing(path, TRAINING):
+            return True
         before = open_training(path, partial=True)
         check_same(before.identity, self.trainer.identity, path)
         for number, part in enumerate(before.parts()):
@@ -188,8 +195,8 @@ class Training:
             return nullcontext()
         from fireworld.training.log.writer import TrainingWriter
 
-        before = None if self._before is None else self._before.raw_parts()
-        return TrainingWriter(self.record, self.trainer, force=self.force, before=before)
+        before = () if self._before is None else self._before.raw_parts()
+        return TrainingWriter(self.record, self.trainer, force=self.force, before=before if self._resumes else None)
 
     def _take(self, report: Report, callbacks: Sequence[Callback]) -> None:
         """Do all there is to do after a report, but the training log."""

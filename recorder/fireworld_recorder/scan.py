@@ -104,6 +104,21 @@ def scan(path: Path, kind: LogKind = RUN) -> Scan:
         raise LogError(f"{path}: cannot be read: {error.strerror}") from error
 
 
+def holds_nothing(path: Path, kind: LogKind = RUN) -> bool:
+    """Return whether a log was cut off before anything was committed, its header maybe not even whole.
+
+    Raises:
+        LogError: it is no log, or a damaged one.
+    """
+    try:
+        return not scan(path, kind).steps
+    except LogError as error:
+        start = path.read_bytes()[: len(container.MAGIC)] if path.is_file() else None
+        if isinstance(error.__cause__, TruncatedError) or start in (b"", container.MAGIC[: len(start or b"")]):
+            return True
+        raise
+
+
 def _scan(path: str, stream: _Stream) -> Scan:
     stream_of_messages, kind = stream.messages(), stream.kind
     try:

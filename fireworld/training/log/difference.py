@@ -316,7 +316,7 @@ def _first_difference(a: TrainingLog, b: Trained, number: int, one: Part | None,
     if Episode in one and Episode in other:
         return _in_episode(a, b, number, (one[Episode], other[Episode]))
     for kind, record in one.items():
-        for item in fields(record):
+        for item in sorted(fields(record), key=lambda item: "per" not in item.metadata):  # figures follow from columns
             x, y = getattr(record, item.name), getattr(other.get(kind, record), item.name)
             if not np.array_equal(x, y):
                 return _in_generation(a, number, record, item.name, x, y)

@@ -90,10 +90,10 @@ def test_searches(make_log):
 
 
 def test_what_cannot_be_compared(make_log, log_path, tmp_path, curriculum):
-    with pytest.raises(LogError, match="method: expected paper, as in .*, got 'search'"):
+    with pytest.raises(LogError, match=r"method: expected paper, as in .*, got 'search'"):
         diff_trainings(log_path, make_log("search"))
     fw.train("quick", set={"n_episodes_max": 1}, record=tmp_path / "q.mcap")
-    with pytest.raises(LogError, match="brigades: expected 1 in alone-1, as in .*, got '2 in quick'"):
+    with pytest.raises(LogError, match=r"brigades: expected 1 in alone-1, as in .*, got 2 in quick"):
         diff_trainings(log_path, tmp_path / "q.mcap")
     with pytest.raises(LogError, match="diff of trainings"):
         fw.diff(log_path, log_path, tolerances={"hp": 1})
@@ -113,7 +113,7 @@ def test_verify_finds_a_changed_draw_of_the_table(log_path, monkeypatch):
 
 
 def test_verify_finds_a_changed_exploration(log_path, monkeypatch):
-    monkeypatch.setattr(sarsa, "_power", lambda base, exponent: 0.5)
+    monkeypatch.setattr(sarsa, "_power", lambda *_: 0.5)
     found = verify_training(log_path)
     assert not found
     assert found.difference.first.phase == "draw"

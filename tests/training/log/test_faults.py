@@ -61,7 +61,7 @@ def test_a_cut_log_is_good_up_to_the_last_part(log_path, tmp_path):
         assert diff_trainings(log_path, path, partial=True).same == (len(prefix) == len(full))
 
 
-def rewrite(log, path, *, header=None, change=lambda number, messages: messages):
+def rewrite(log, path, *, header=None, change=lambda _, messages: messages):
     """Write a log again, sealed as if it were true, with something changed."""
     from fireworld_recorder.chain import Chain
     from fireworld_recorder.codec import encode

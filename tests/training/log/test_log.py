@@ -159,7 +159,7 @@ def test_nothing_is_traced_where_nobody_records(make_log, curriculum):
 def test_names_that_are_not_there_are_answered_with_those_that_are(log):
     with pytest.raises(LogError, match="scenario: expected one of alone-1, alone-2, together-1, together-2, got 'x'"):
         log.episode("x", 0)
-    with pytest.raises(LogError, match="episode: expected one from 0 to [0-9]+ of alone-2, got 99"):
+    with pytest.raises(LogError, match=r"episode: expected one from 0 to [0-9]+ of alone-2, got 99"):
         log.episode("alone-2", 99)
     with pytest.raises(LogError, match="part: expected one from 0 to"):
         log.trainer_before(len(log) + 1)

@@ -31,15 +31,14 @@ def test_a_log_that_was_cut_anywhere_is_continued_to_the_same_bytes(curriculum, 
     whole, team = source.read_bytes(), source.with_suffix(".npz").read_bytes()
     places = random.Random(7)
     n_continued = 0
-    for n_bytes in sorted(places.randrange(len(whole)) for _ in range(30)):
+    for n_bytes in [0, 1, 8, 9, 100, *(places.randrange(k * len(whole) // 30, len(whole)) for k in range(30))]:
         path = cut(whole, tmp_path, n_bytes)
         output = path.with_suffix(".npz")
         try:
-            before = open_training(path.with_name(path.name + PARTIAL_SUFFIX), partial=True)
-        except LogError:  # the header is not there yet: nothing is lost but the beginning
-            continue
+            n_continued += len(open_training(path.with_name(path.name + PARTIAL_SUFFIX), partial=True)) > 0
+        except LogError:
+            pass  # the header is not there yet
         train(curriculum, method=method, set=short, output=output, record=path, resume=True)
-        n_continued += len(before) > 0
         assert path.read_bytes() == whole
         assert output.read_bytes() == team
         assert sorted(one.name for one in tmp_path.glob("t.*")) == ["t.mcap", "t.npz"]
@@ -76,6 +75,14 @@ def test_a_missing_team_is_made_of_a_log_that_is_whole(curriculum, make_log, tmp
     assert path.read_bytes() == make_log().read_bytes()
 
 
+def test_a_foreign_file_is_not_replaced(curriculum, tmp_path):
+    path = tmp_path / "t.mcap.partial"
+    path.write_text("my notes")
+    with pytest.raises(LogError, match="expected an MCAP recording"):
+        train(curriculum, set=SHORT, record=tmp_path / "t.mcap", resume=True)
+    assert path.read_text() == "my notes"
+
+
 def test_the_log_of_another_training_is_not_continued(curriculum, make_log, tmp_path):
     whole = make_log().read_bytes()
     path = cut(whole, tmp_path, len(whole) // 2)
@@ -87,7 +94,9 @@ def test_the_log_of_another_training_is_not_continued(curriculum, make_log, tmp_
     ]:
         with pytest.raises(TrainingError, match=message):
             train(curriculum, **{"set": SHORT, **changed}, record=path, resume=True)
-    with pytest.raises(OutputError, match="a training that did not end left this, or one is under way; try --resume"):
+    with pytest.raises(
+        OutputError, match="expected no checkpoint, got one of an earlier training; continue from it with --resume"
+    ):
         train(curriculum, set=SHORT, record=path)
     assert path.with_name(path.name + PARTIAL_SUFFIX).read_bytes() == left
     assert not path.exists()
@@ -109,8 +118,8 @@ def test_a_training_that_is_killed_continues(curriculum_file, make_log, tmp_path
     command = [sys.executable, "-m", "fireworld", *map(str, words)]
     moments, n_kills = random.Random(3), 0
     while not (tmp_path / "t.npz").exists():
-        begun = any(tmp_path.glob("t.mcap*"))
-        process = subprocess.Popen([*command, *(["--resume"] if begun else [])], stderr=subprocess.PIPE)
+        begun = (tmp_path / "t.mcap").exists() or (tmp_path / "t.mcap.partial").exists()
+        process = subprocess.Popen([*command, *(["--resume"] if begun else [])], stderr=subprocess.DEVNULL)
         deadline = time.monotonic() + 60
         while process.poll() is None and not any(tmp_path.glob("t.mcap*")) and time.monotonic() < deadline:
             time.sleep(0.002)
@@ -119,8 +128,6 @@ def test_a_training_that_is_killed_continues(curriculum_file, make_log, tmp_path
         n_kills += process.wait() == -signal.SIGKILL
         partial = tmp_path / "t.mcap.partial"
         if n_kills >= 8:
-            subprocess.run([*command, "--resume"], check=True, capture_output=True)
-        elif partial.exists() and b"fireworld.training" not in partial.read_bytes():
-            partial.unlink()  # killed before the header was there
+            subprocess.run([*command, *(["--resume"] if partial.exists() else [])], check=True, capture_output=True)
     assert (tmp_path / "t.mcap").read_bytes() == make_log().read_bytes()
     assert n_kills > 0
