@@ -21,6 +21,7 @@ SECTIONS: Final = {
     "log": "log_rows",
     "view": "view_rows",
     "pictures": "render_rows",
+    "training": "training_rows",
     "compare": "compare_rows",
     "start-up": "start_rows",
 }

@@ -47,6 +47,9 @@ if TYPE_CHECKING:
     from fireworld.scenario import scenarios as scenarios
     from fireworld.simulation.session import Session as Session
     from fireworld.simulation.session import world as world
+    from fireworld.training.log.episode_run import replay_episode as replay_episode
+    from fireworld.training.log.reader import TrainingLog as TrainingLog
+    from fireworld.training.log.reader import open_training as open_training
     from fireworld.training.train import train as train
 
 _ROOMS = {
@@ -64,6 +67,7 @@ _ROOMS = {
     "Scenario": "scenario",
     "Session": "simulation.session",
     "Team": "policy.teams.team",
+    "TrainingLog": "training.log.reader",
     "Verification": "recording.verify",
     "compare": "evaluation.compare",
     "diff": "recording.difference",
@@ -72,8 +76,10 @@ _ROOMS = {
     "fork": "recording.fork",
     "load_team": "policy.teams.team",
     "open_log": "recording.run",
+    "open_training": "training.log.reader",
     "policies": "policy.names",
     "recover": "recording.export",
+    "replay_episode": "training.log.episode_run",
     "reproduce": "reproduction.reproduce",
     "run": "recording.record",
     "scenarios": "scenario",

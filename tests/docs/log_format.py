@@ -6,7 +6,8 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Final
+from collections.abc import Iterable
+from typing import Any, Final
 
 from fireworld_recorder.schema import (
     COUNTS,
@@ -21,10 +22,13 @@ from fireworld_recorder.schema import (
 from google.protobuf import descriptor_pb2
 
 from fireworld.records import PHASES, Snapshot
+from fireworld.training.log.records import TRAINING
 from tests.docs.pages import ROOT
 
 PAGE: Final = ROOT / "docs" / "log-format.md"
+TRAINING_PAGE: Final = ROOT / "docs" / "recorded-trainings.md"
 BEGIN: Final = "<!-- generated from fireworld/records.py by `make docs` -->\n"
+TRAINING_BEGIN: Final = "<!-- generated from fireworld/training/log/records.py by `make docs` -->\n"
 END: Final = "<!-- end of the generated part -->\n"
 
 
@@ -89,10 +93,10 @@ def proto_text() -> str:
     return "\n".join(lines) + "\n"
 
 
-def docs_text() -> str:
-    """Write the tables of topics and fields for docs/log-format.md."""
+def docs_text(topics: Iterable[type[Any]] = TOPICS) -> str:
+    """Write the tables of topics and fields for the page of a format."""
     lines: list[str] = []
-    for record_type in TOPICS:
+    for record_type in topics:
         message = message_of(record_type)
         phase = f" Phase: {PHASES[message.topic]}." if message.topic in PHASES else ""
         lines += [f"### {message.topic}", "", message.doc + phase, ""]
@@ -107,12 +111,14 @@ def docs_text() -> str:
 
 
 def with_generated_part(page: str) -> str:
-    """Replace the generated part of the log-format page."""
-    before, _, rest = page.partition(BEGIN)
+    """Replace the generated part of a page about a format."""
+    begin, topics = (BEGIN, TOPICS) if BEGIN in page else (TRAINING_BEGIN, TRAINING.topics)
+    before, _, rest = page.partition(begin)
     _, _, after = rest.partition(END)
-    return f"{before}{BEGIN}\n{docs_text()}\n{END}{after}"
+    return f"{before}{begin}\n{docs_text(topics)}\n{END}{after}"
 
 
 if __name__ == "__main__":
     PROTO.write_text(proto_text(), encoding="utf-8")
-    PAGE.write_text(with_generated_part(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    for page in (PAGE, TRAINING_PAGE):
+        page.write_text(with_generated_part(page.read_text(encoding="utf-8")), encoding="utf-8")

@@ -6,12 +6,14 @@ import sys
 from types import MappingProxyType
 from typing import get_args
 
+import pytest
 from fireworld_recorder import schema, tables
 from fireworld_recorder.schema import COUNTS, TOPICS, Commit, message_of
 from fireworld_recorder.writer import own_channels
 from google.protobuf import descriptor_pb2
 
 from fireworld.records import DTYPES, STEP_TOPICS, CityRecord, Entity
+from fireworld.training.log.records import TRAINING
 from tests.docs import log_format
 
 
@@ -24,10 +26,13 @@ def test_checked_in_proto_file_is_current():
     assert schema.PROTO.read_text(encoding="utf-8") == log_format.proto_text(), "run `make docs`"
 
 
-def test_docs_are_current():
-    page = log_format.PAGE.read_text(encoding="utf-8")
+@pytest.mark.parametrize(
+    ("path", "topics"), [(log_format.PAGE, TOPICS), (log_format.TRAINING_PAGE, TRAINING.topics)], ids=["run", "training"]
+)
+def test_docs_are_current(path, topics):
+    page = path.read_text(encoding="utf-8")
     assert page == log_format.with_generated_part(page), "run `make docs`"
-    for topic in TOPICS:
+    for topic in topics:
         assert f"### {topic.topic}\n" in page
 
 

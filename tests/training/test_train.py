@@ -182,7 +182,7 @@ def test_a_callback_that_fails_is_the_callers_matter(here, files):
         ({"output": "no/t.npz"}, "^no/t.npz: expected an existing folder"),
         ({"output": "t.npy"}, "^t.npy: expected a file ending in .npz, got '.npy'$"),
         ({"output": "t.npz", "log": "t.npz"}, "^t.npz: expected a file of its own"),
-        ({"resume": True}, "^--resume: expected an output whose checkpoint to continue from, got 'none'$"),
+        ({"resume": True}, "^--resume: expected an output or a record to continue from, got 'none'$"),
         ({"output": "t.npz", "resume": True}, "^--resume: expected a checkpoint to continue from, got no t.npz.check"),
         ({"output": "t.npz", "resume": True, "force": True}, "^--force and --resume exclude each other$"),
         ({"jobs": 0}, "^jobs: expected a whole number from 1 to 1000, got 0$"),
