@@ -43,6 +43,7 @@ def command(*, log: Path, folder: Path, tables: str | None, force: bool, as_json
     """
     from fireworld.recording.export import export
     from fireworld.recording.inputs import is_training, open_run
+    from fireworld.records import StoredRun
     from fireworld.training.log.reader import open_training
 
     chosen = None if tables is None else [name.strip() for name in tables.split(",")]
@@ -50,7 +51,8 @@ def command(*, log: Path, folder: Path, tables: str | None, force: bool, as_json
     with bar("export", len(recording), quiet=as_json) as advance:
         n_rows = export(recording, folder, tables=chosen, force=force, on_step=lambda _: advance())
     if recording.damage is not None:
-        click.echo(f"{log}: {recording.damage}; exported {len(recording)} that were committed", err=True)
+        unit = "step" if isinstance(recording, StoredRun) else recording.header.unit
+        click.echo(f"{log}: {recording.damage}; exported {len(recording)} committed {unit}s", err=True)
     if as_json:
         known = {key: getattr(recording, key) for key in ("state", "damage", "digest")}
         known = {"folder": str(folder), **known, "n_steps": len(recording), "n_rows": n_rows}

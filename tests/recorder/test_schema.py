@@ -27,7 +27,9 @@ def test_checked_in_proto_file_is_current():
 
 
 @pytest.mark.parametrize(
-    ("path", "topics"), [(log_format.PAGE, TOPICS), (log_format.TRAINING_PAGE, TRAINING.topics)], ids=["run", "training"]
+    ("path", "topics"),
+    [(log_format.PAGE, TOPICS), (log_format.TRAINING_PAGE, TRAINING.topics)],
+    ids=["run", "training"],
 )
 def test_docs_are_current(path, topics):
     page = path.read_text(encoding="utf-8")
