@@ -36,12 +36,7 @@ class _UntoldError(Exception):
 
 
 def covering(digest: str, values: Any) -> str:
-    """Return a digest that covers another one and values; the other one itself if there are none.
-
-    Args:
-        digest: of a source; "" if there is none.
-        values: what JSON can hold.
-    """
+    """Return a digest that covers another one, "" if there is none, and values that JSON can hold, if there are any."""
     if not (digest and values):
         return digest
     return hashlib.sha256(json.dumps([digest, values], sort_keys=True).encode()).hexdigest()

@@ -190,10 +190,7 @@ def with_file(name: str, changed: Callable[[str], str]) -> str:
 def note_on_team(named: NamedPolicy, n_brigades: int, *, choices: str = "") -> str:
     """Return how a team is used differently from its training, a line each; nothing about other policies.
 
-    Args:
-        named: the policy.
-        n_brigades: brigades of the scenario.
-        choices: of the scenario; left out, they are not compared.
+    The scenario's `choices` are compared unless they are left out.
     """
     if TEAM_ATTACHMENT not in named.attachments or not isinstance(named.policy, KernelPolicy):
         return ""

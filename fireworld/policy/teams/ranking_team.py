@@ -104,11 +104,7 @@ class RankingTeam(Team):
         return sentences(self.preferences(row=row))
 
     def difference(self, other: Self) -> RankingDifference:
-        """Compare the weights of another team with these.
-
-        Raises:
-            TrainingError: they have another number of rows.
-        """
+        """Compare the weights of another team with these; TrainingError if it has another number of rows."""
         if len(self.weights) != len(other.weights):
             wanted = f"as many rows as in A, {len(self.weights)}"
             raise TrainingError(expected("B", "weights", wanted, f"{len(other.weights)} of them"))

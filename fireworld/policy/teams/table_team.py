@@ -112,11 +112,7 @@ class TableTeam(Team):
         return int((actions == actions[0]).all(axis=0).sum()), int(everywhere.sum())
 
     def difference(self, other: Self) -> TableDifference:
-        """Compare the tables of another team with these, state by state.
-
-        Raises:
-            TrainingError: they have other states, or another number of tables.
-        """
+        """Compare the tables of another team with these; TrainingError if they have another shape."""
         n_tables, n_states, _ = self.tables.shape
         if self.tables.shape != other.tables.shape:
             got = f"{other.tables.shape[0]} of {other.tables.shape[1]} states"

@@ -150,14 +150,7 @@ def first_state(row: int, n_states: int) -> int:
 
 
 def describe_choices(text: str, chosen: Sequence[Sequence[Choice]], *, n_states: int, limit: int) -> Iterator[Block]:
-    """Yield what tables do in states and why; of several states only in those visited in training.
-
-    Args:
-        text: what was asked for.
-        chosen: the choices of all tables, state by state.
-        n_states: of a table, 4320 or 270.
-        limit: states at most.
-    """
+    """Yield what tables do in the states that a text asks for, and why; of several only in those seen in training."""
     listed = chosen
     if len(chosen) > 1:
         listed = [choices for choices in chosen if any(one.visited for one in choices)]

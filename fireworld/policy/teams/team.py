@@ -169,11 +169,7 @@ class TeamDifference(Shown):
 
     @property
     def same_actions(self) -> bool:
-        """Whether they do the same, where the kind has actions beside values.
-
-        Raises:
-            TrainingError: it does not.
-        """
+        """Whether they do the same; TrainingError where the kind has no actions beside values."""
         raise TrainingError(expected("--actions-only", "", "two teams with tables of actions", self.what))
 
     @abstractmethod
@@ -182,16 +178,7 @@ class TeamDifference(Shown):
 
 
 def compare_teams(a: Team, b: Team, *, names: tuple[str, str] = ("A", "B")) -> TeamDifference:
-    """Compare team B with team A.
-
-    Args:
-        a: the first.
-        b: the second, of the same kind.
-        names: what errors call them.
-
-    Raises:
-        TrainingError: they cannot be compared.
-    """
+    """Compare team B with team A, which errors call by these names; TrainingError if they cannot be compared."""
     if a.kind != b.kind:
         raise TrainingError(expected(names[1], "", f"{a.what}, as in {names[0]}", b.what))
     return a.difference(b)
@@ -223,24 +210,12 @@ def load_team(name_or_path: str | Path) -> Team:
 
 
 def parse_team(content: bytes, *, source: str) -> Team:
-    """Read the content of a team file of any kind.
-
-    Args:
-        content: of the file.
-        source: what errors call it.
-
-    Raises:
-        TrainingError: it is not a team file, of another format, or makes no sense.
-    """
+    """Read the content of a team file of any kind; TrainingError, which names the source, if it makes no sense."""
     return _parse(content, source=source)[0]
 
 
 def read_team(path: Path) -> tuple[Team, dict[str, Array]]:
-    """Read a team file, and the arrays that it holds besides the team's, as a checkpoint does.
-
-    Raises:
-        TrainingError: as for `parse_team`, or the file cannot be read.
-    """
+    """Read a team file, and the arrays that it holds besides the team's, as a checkpoint does; errors as there."""
     return _parse(read_bytes(path), source=str(path))
 
 
