@@ -50,12 +50,7 @@ class BuiltScenario:
         )
 
     def world(self, *, seed: int, n_steps_max: int | None = None) -> World:
-        """Start a world.
-
-        Args:
-            seed: of the run's random draws.
-            n_steps_max: last step; None: the scenario's.
-        """
+        """Start a world; its last step is the scenario's unless another is given."""
         return World(self.start, seed=seed, n_steps_max=self.scenario.steps if n_steps_max is None else n_steps_max)
 
     def city_record(self) -> CityRecord:
@@ -106,13 +101,8 @@ class CityCache:
     def build(self, scenario: Scenario, *, city_json: bytes | None = None) -> BuiltScenario:
         """Build a scenario's city, or take it from the cache, and place everybody in it.
 
-        Args:
-            scenario: the scenario.
-            city_json: content of its city file, where it comes from a recording; None reads the file.
-
-        Raises:
-            ScenarioError: the city has not what the scenario asks for.
-            CityError: the city cannot be built.
+        `city_json` is the content of its city file, where that comes from a recording and not from the disk. Raises
+        ScenarioError if the city has not what the scenario asks for, CityError if it cannot be built.
         """
         key = repr((scenario.city, scenario.city_sha256, scenario.resolved_parameters.fire))
         bare = self._built.get(key)

@@ -50,11 +50,7 @@ class Observer:
         self._before = self._remember()
 
     def record(self, choices: Choices | None = None) -> StepRecord:
-        """Return the record of the step just done, or of the start.
-
-        Args:
-            choices: what `World.step` returned; None before the first step.
-        """
+        """Return the record of the step just done, with what `World.step` returned; without that, of the start."""
         world = self.world
         events = self._events() if choices is not None else _events([])
         snapshot_due = world.step_number % SNAPSHOT_EVERY_STEPS == 0

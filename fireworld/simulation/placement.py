@@ -41,15 +41,9 @@ class Placement:
 
 
 def scenario_plan(scenario: Scenario, *, city_json: bytes | None = None) -> Plan:
-    """Make or load the plan of a scenario's city.
+    """Make or load the plan of a scenario's city; `city_json` is the content of its file, where that is in a recording.
 
-    Args:
-        scenario: the scenario.
-        city_json: content of the city file, where it comes from a recording; None reads the file.
-
-    Raises:
-        ScenarioError: figures that make no city, or another city file than the scenario names.
-        CityError: a city file that makes no city.
+    Raises ScenarioError for figures that make no city or another city file, CityError for a file that makes none.
     """
     generated = scenario.city.generated
     if generated is None:
@@ -75,11 +69,7 @@ def attachments(scenario: Scenario) -> dict[str, bytes]:
 
 
 def place(scenario: Scenario, plan: Plan) -> Placement:
-    """Place a scenario's fires, civilians and brigades in its city.
-
-    Raises:
-        ScenarioError: the city has not the buildings, places or refuges that the scenario asks for.
-    """
+    """Place a scenario's fires, civilians and brigades in its city; ScenarioError if it has not what they need."""
     ignited: list[int] = []
     for index, fire in enumerate(scenario.fires):
         ignited += _ignite(scenario, plan, fire, key=f"fires.{index}", taken=ignited)

@@ -38,14 +38,7 @@ def prepare_start(
 ) -> Start:
     """Place everybody in a city and set it on fire; arguments are named as in a scenario.
 
-    Args:
-        city: the city.
-        parameters: of fire, health and brigades.
-        placement: who and what is where.
-        reward: what a step is worth; None: the paper's.
-        choices: what brigades know of each other's choices.
-        unit_volume_m3: unit of the volume feature; None: twice the mean building.
-        arrays: of the same city and fire parameters, if they have been built already.
+    A reward of None is the paper's; the city's arrays are built unless they are given.
     """
     arrays = arrays if arrays is not None else city_arrays(city, parameters.fire)
     reward = reward if reward is not None else reward_of("stock")

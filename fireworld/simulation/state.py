@@ -209,11 +209,7 @@ def take_snapshot(world: WorldState) -> dict[str, Array]:
 
 
 def restore_snapshot(world: WorldState, snapshot: Mapping[str, Array]) -> None:
-    """Put a snapshot back into a world of the same city and team.
-
-    Raises:
-        LogError: an array is missing or of another shape or type.
-    """
+    """Put a snapshot back into a world of the same city and team; LogError if an array is missing or does not fit."""
     for name, array in named_arrays(world):
         if name in SCRATCH:
             continue

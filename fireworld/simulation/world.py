@@ -30,17 +30,7 @@ class Choices:
 
 
 class World:
-    """A city, its team and its fire.
-
-    Attributes:
-        city: the City.
-        city_arrays: its arrays as kernels read them.
-        constants: scalars of the model.
-        state: everything that a step changes.
-        seed: seed of the run's random draws.
-        step_number: steps done so far.
-        n_steps_max: the run is truncated after this step.
-    """
+    """A city, its team and its fire: `state` is everything that a step changes. Truncated after step `n_steps_max`."""
 
     def __init__(self, start: Start, *, seed: int, n_steps_max: int) -> None:
         """Set up the world before its first step.
@@ -130,12 +120,7 @@ class World:
         return choices
 
     def run(self, policy: PolicyArrays, learner: Learner = NO_LEARNER) -> int:
-        """Run the whole episode in compiled code and return the last step; it comes out as step by step.
-
-        Args:
-            policy: what the brigades follow.
-            learner: what they learn meanwhile; by default nothing.
-        """
+        """Run the whole episode in compiled code and return the last step; it comes out as step by step."""
         if self.terminated or self.truncated:
             return self.step_number
         from fireworld.kernels.episode import run_episode  # the largest kernel: compiled only where it is used
