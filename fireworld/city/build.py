@@ -16,15 +16,9 @@ from fireworld.parameters import FireParameters
 
 
 def build_city(plan: Plan, fire: FireParameters, *, seed: int) -> City:
-    """Build a city from its plan; all its arrays are read-only.
+    """Build a city from its plan; all its arrays are read-only. `seed`: of the rays that measure radiation.
 
-    Args:
-        plan: made by a generator or loaded from a file.
-        fire: the physical parameters.
-        seed: of the rays that measure the radiation between buildings.
-
-    Raises:
-        CityError: the plan is too large for the air grid, or a building covers no air cell.
+    Raises CityError if the plan is too large for the air grid, or a building covers no air cell.
     """
     footprints = plan.footprints
     air = cover_cells(footprints, fire.air_cell_mm, where=plan.name)
@@ -46,11 +40,8 @@ def build_city(plan: Plan, fire: FireParameters, *, seed: int) -> City:
 def with_links(city: City, *, ptr: Array, building: Array, share: Array) -> City:
     """Return the city with radiation links measured elsewhere, such as those of a trace; `near` follows them.
 
-    Args:
-        city: the city.
-        ptr: (n+1,) start of each building's links.
-        building: (links,) index of the building that each link leads to, in any order.
-        share: (links,) share of the rays.
+    As CSR: ptr (n+1,) start of each building's links, (links,) the buildings that they lead to, in any order, and
+    shares.
     """
     emitter = np.repeat(np.arange(city.n_buildings), np.diff(ptr))
     rising = np.lexsort((building, emitter))
@@ -66,16 +57,10 @@ def with_order(city: City, order: Array) -> City:
 
 
 def visiting_order(building_id: Int64Array) -> Int32Array:
-    """Order the buildings as the official program does, which walks a hash table of their identifiers.
+    """Return the (n,) indices of the buildings in the order in which the official program visits them.
 
-    The air exchange depends on it. The key is (id ^ id >> 16) modulo the size of the table: the smallest power of two
-    from 16 on that is at most three quarters full. Ties stay in file order.
-
-    Args:
-        building_id: (n,) identifiers, not negative.
-
-    Returns:
-        (n,) indices of the buildings, first visited first.
+    The air exchange depends on it. The program walks a hash table; the key is (id ^ id >> 16) modulo its size: the
+    smallest power of two from 16 on that is at most three quarters full. Ties stay in file order.
     """
     capacity = 16
     while len(building_id) > 0.75 * capacity:

@@ -123,25 +123,10 @@ def generate_plan(
     hydrant_share: float = 0.0,
     name: str = "generated",
 ) -> Plan:
-    """Make a city of columns * rows lots.
+    """Make a city of columns * rows lots; values as those of `GeneratedCity`, CityError for those that make no city.
 
-    Buildings have identifiers from 0 in row order, south-west first. Footprints are rectangles or L-shapes; floors
-    1, 2, 3 come 2:1:1 and wood, steel, concrete 75:20:5, as in the official maps.
-
-    Args:
-        columns: lots from west to east.
-        rows: lots from south to north.
-        seed: another seed, another city of the same size.
-        lot_m: side of a square lot.
-        block: lots of a block, from west to east and from south to north; streets run around every block.
-        street_m: width of a street.
-        refuges: places as fractions of the city from its south-west corner; the nearest free lot becomes a refuge.
-        fill: smallest and largest share of its lot that a footprint covers.
-        hydrant_share: share of the crossings that have a hydrant.
-        name: name of the city.
-
-    Raises:
-        CityError: a value that makes no city.
+    Buildings have identifiers from 0 in row order, south-west first. Footprints are rectangles or L-shapes; floors 1,
+    2, 3 come 2:1:1 and wood, steel, concrete 75:20:5, as in the official maps.
     """
     layout = _Layout(lot=round(lot_m * 1000), street=round(street_m * 1000), block=block)
     _check(name, layout, columns=columns, rows=rows, refuges=refuges, fill=fill, hydrant_share=hydrant_share)
