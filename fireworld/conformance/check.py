@@ -32,14 +32,10 @@ class Tally:
     def add(self, ours: Array, theirs: Array, *, scale: Array | float, resolution: float) -> Array:
         """Compare the values of a step and return where they differ, bool of the same shape.
 
-        A difference is relative to the greater of the trace's value and a scale, because what is left of a building's
-        heat after it was cooled all the way is rounding noise: relative to itself it means nothing.
-
-        Args:
-            ours: computed here.
-            theirs: the trace's.
-            scale: what counts as a small value: for energies the heat capacity, which is one degree.
-            resolution: rounding of the trace's type; the tolerance is not finer than that.
+        A difference is relative to the greater of the trace's value and a scale (for energies the heat capacity, which
+        is one degree), because what is left of a building's heat after it was cooled all the way is rounding noise:
+        relative to itself it means nothing. The tolerance is not finer than `resolution`, the rounding of the trace's
+        type.
         """
         if self.name in EXACT:
             with np.errstate(over="ignore"):
@@ -112,15 +108,9 @@ class Report:
 
 
 def check(city_file: CityFile, path: Path) -> Report:
-    """Replay a trace and compare everything that it has with what the engine makes of its inputs.
+    """Replay a trace and compare everything that it has with what the engine makes of its inputs in that city.
 
-    Args:
-        city_file: the city it was recorded in.
-        path: the trace.
-
-    Raises:
-        TraceError: the trace cannot be read or does not fit the city.
-        CityError: the city cannot be built with the trace's parameters.
+    Raises TraceError if it cannot be read or does not fit, CityError if the city cannot be built with its parameters.
     """
     trace = load_trace(path, city_file)
     own_city, city, fire = prepare(city_file, trace)
@@ -166,12 +156,7 @@ def _is_comparable(series: Series, trace: Trace, city: City) -> bool:
 
 
 class Comparison:
-    """Compares moment after moment with a trace.
-
-    Attributes:
-        tallies: by output, in the order in which a step makes them.
-        first: the first difference so far.
-    """
+    """Compares moment after moment with a trace; `tallies` are by output, in the order in which a step makes them."""
 
     def __init__(self, trace: Trace, city: City) -> None:
         self.first: FirstDifference | None = None

@@ -48,12 +48,7 @@ def fire_parameters(trace: Trace) -> FireParameters:
 def prepare(city_file: CityFile, trace: Trace) -> tuple[City, City, FireParameters]:
     """Build the city as the trace's parameters want it.
 
-    Returns:
-        The city as fireworld builds it, the same with the order and the links of the trace, and the parameters.
-
-    Raises:
-        CityError: it cannot be built, such as with these air cells.
-        TraceError: a parameter is missing or out of bounds.
+    Returns the city as fireworld builds it, the same with the order and the links of the trace, and the parameters.
     """
     fire = fire_parameters(trace)
     named = replace(city_file.plan, name=city_file.where)  # what errors begin with
@@ -67,12 +62,7 @@ def prepare(city_file: CityFile, trace: Trace) -> tuple[City, City, FireParamete
 
 
 def replay(city_file: CityFile, trace: Trace, city: City, parameters: FireParameters) -> Iterator[Moment]:
-    """Run the engine through all steps of a trace and yield the state after each, step 0 first.
-
-    Raises:
-        TraceError: a building burns in more steps than the trace has rates for, or a parameter of the brigades is
-            missing.
-    """
+    """Run the engine through all steps of a trace and yield the state after each, step 0 first."""
     inputs, fire_is = city_file.inputs, fire_constants(parameters)
     tables, fire = city_arrays(city, parameters), fresh_fire(city)
     crew = Crew(city_file, trace, tables, city) if inputs.brigade_id or inputs.requests else None
@@ -135,11 +125,7 @@ class Rates:
 
 
 class Crew:
-    """The brigades of a city file: moved by its rows, refilled and judged by the engine.
-
-    Attributes:
-        team: their state, by rising id.
-    """
+    """The brigades of a city file, by rising id in `team`: moved by its rows, refilled and judged by the engine."""
 
     def __init__(self, city_file: CityFile, trace: Trace, tables: CityArrays, city: City) -> None:
         self._inputs = city_file.inputs
