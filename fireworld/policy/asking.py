@@ -51,7 +51,7 @@ class Adapted(Policy):
 
 
 def complete(given: Any, *, where: str = "policy") -> Policy:
-    """Return a policy with all of a policy's methods: the one given, or one that calls it; errors begin with `where`."""
+    """Return the policy given, or one that calls it and has all of a policy's methods; errors begin with `where`."""
     if Policy in type(given).__mro__:
         policy: Policy = given
         return policy
