@@ -17,8 +17,7 @@ from fireworld.policy.kernel import KernelPolicy, each_another
 from fireworld.records import CityRecord, RunHeader, StepRecord
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.placement import Placement
-from fireworld.simulation.start import prepare_start
-from fireworld.simulation.world import World
+from fireworld.simulation.world import World, prepare_start
 
 N_BRIGADES: Final = 4
 N_CIVILIANS: Final = 10

@@ -16,8 +16,7 @@ from fireworld.scenario import Scenario
 from fireworld.scenario.document import resolve_reward
 from fireworld.simulation.city_arrays import city_arrays
 from fireworld.simulation.placement import Placement, attachments, place, scenario_plan
-from fireworld.simulation.start import Start, prepare_start
-from fireworld.simulation.world import World
+from fireworld.simulation.world import Start, World, prepare_start
 from fireworld.version import __version__
 
 

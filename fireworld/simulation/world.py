@@ -7,17 +7,59 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fireworld.kernels.arrays import BURNING, Array, Learner, PolicyArrays
+from fireworld.city.city import City
+from fireworld.kernels.arrays import BURNING, Array, CityArrays, Constants, Learner, PolicyArrays, WorldState
+from fireworld.kernels.fire import ignite
 from fireworld.kernels.observation import can_choose, find_target, observe
+from fireworld.kernels.outcome import assess
 from fireworld.kernels.sites import find_sites
 from fireworld.kernels.step import finish_step
 from fireworld.outcome import Outcome, outcome_at
+from fireworld.parameters import Parameters
 from fireworld.policy.asking import ask, complete, keeps
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
-from fireworld.simulation.start import Start
-from fireworld.simulation.state import NO_LEARNER, copy_world, rewards_of, score_of
+from fireworld.rewards import Reward, reward_of
+from fireworld.scenario import document
+from fireworld.simulation.city_arrays import city_arrays, world_constants
+from fireworld.simulation.placement import Placement
+from fireworld.simulation.state import NO_LEARNER, copy_world, fresh_world, rewards_of, score_of
 
 NO_DECISION = Decision(-1)
+
+
+@dataclass(frozen=True)
+class Start:
+    """What all worlds of a scenario have in common, and the state each of them begins with; not to be changed."""
+
+    city: City
+    city_arrays: CityArrays
+    constants: Constants
+    state: WorldState
+
+
+def prepare_start(
+    city: City,
+    parameters: Parameters,
+    placement: Placement,
+    *,
+    reward: Reward | None = None,
+    choices: document.Choices = "in-turn",
+    unit_volume_m3: float | None = None,
+    arrays: CityArrays | None = None,
+) -> Start:
+    """Place everybody in a city and set it on fire; arguments are named as in a scenario.
+
+    A reward of None is the paper's; the city's arrays are built unless they are given.
+    """
+    arrays = arrays if arrays is not None else city_arrays(city, parameters.fire)
+    reward = reward if reward is not None else reward_of("stock")
+    constants = world_constants(city, parameters, reward=reward, choices=choices, unit_volume_m3=unit_volume_m3)
+    state = fresh_world(city, parameters, placement)
+    for building in placement.ignited.tolist():
+        ignite(building, arrays.buildings, state.fire)
+    assess(state.fire, state.civilians, arrays.geometry, constants.reward, state.outcome)
+    state.outcome.reward[:] = 0.0  # the start is not rewarded
+    return Start(city, arrays, constants, state)
 
 
 @dataclass(frozen=True)
@@ -33,13 +75,6 @@ class World:
     """A city, its team and its fire: `state` is everything that a step changes. Truncated after step `n_steps_max`."""
 
     def __init__(self, start: Start, *, seed: int, n_steps_max: int) -> None:
-        """Set up the world before its first step.
-
-        Args:
-            start: what it starts from; it stays as it is.
-            seed: seed of all draws.
-            n_steps_max: last step.
-        """
         self.city, self.city_arrays, self.constants = start.city, start.city_arrays, start.constants
         self.state = copy_world(start.state)
         self.seed = seed
@@ -167,7 +202,8 @@ class World:
                 if self._can_keep(brigade, last) and keeps(policy, brigade, last.action, self.step_number):
                     decisions[brigade] = last
                 else:
-                    decisions[brigade] = self._ask(policy, brigade, features[brigade], int(states[brigade]), known)
+                    seen = self._observation(brigade, features[brigade], int(states[brigade]), known)
+                    decisions[brigade] = ask(policy, seen)
                 target = self._target(brigade, decisions[brigade])
             brigades.action[brigade], brigades.target[brigade] = decisions[brigade].action, target
         return Choices(features=features, state_index=states, decisions=tuple(decisions))
@@ -188,9 +224,6 @@ class World:
                 brigade, decision.action, state.brigades, city.buildings, state.fire, city.geometry, state.sites
             )
         )
-
-    def _ask(self, policy: Policy, brigade: int, features: Array, state: int, known: Array) -> Decision:
-        return ask(policy, self._observation(brigade, features, state, known))
 
     def _observation(self, brigade: int, features: Array, state: int, known: Array) -> Observation:
         seen = [int(feature) for feature in features]
