@@ -1,20 +1,22 @@
-"""A scenario with its city built, ready to start any number of worlds; and the cache of the cities built so far."""
+"""A scenario with its city built, the worlds and runs that start from it, and the cache of the cities built so far."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property
-
-import numpy as np
 
 from fireworld.city.build import build_city
 from fireworld.city.city import City, Plan
-from fireworld.city.record import city_record
 from fireworld.kernels.arrays import CityArrays
-from fireworld.records import CityRecord, RunHeader
+from fireworld.policy.asking import begin
+from fireworld.policy.names import NamedPolicy
+from fireworld.policy.protocol import Policy
+from fireworld.records import CityRecord, RunHeader, StepRecord
 from fireworld.scenario import Scenario
 from fireworld.scenario.document import resolve_reward
 from fireworld.simulation.city_arrays import city_arrays
+from fireworld.simulation.observer import Observer, city_record
 from fireworld.simulation.placement import Placement, attachments, place, scenario_plan
 from fireworld.simulation.world import Start, World, prepare_start
 from fireworld.version import __version__
@@ -54,20 +56,9 @@ class BuiltScenario:
 
     def city_record(self) -> CityRecord:
         """Return the city as it is recorded."""
-        parameters = self.scenario.resolved_parameters
-        n_civilians = len(self.placement.civilian_building)
-        return city_record(
-            self.city,
-            civilian_mm=self.placement.civilian_mm,
-            civilian_building=self.placement.civilian_building,
-            civilian_hp=np.full(n_civilians, parameters.health.initial_hp, dtype=np.int32),
-            n_brigades=self.n_brigades,
-            brigades=parameters.brigades,
-        )
+        return city_record(self.city, self.placement, self.scenario.resolved_parameters)
 
-    def header(
-        self, *, seed: int, policy: str, policy_digest: str, n_steps_max: int, forked_from: str = ""
-    ) -> RunHeader:
+    def header(self, *, seed: int, policy: str, policy_digest: str, n_steps_max: int) -> RunHeader:
         """Return what identifies a run of this scenario."""
         return RunHeader(
             scenario=self.scenario.name,
@@ -77,25 +68,15 @@ class BuiltScenario:
             policy_digest=policy_digest,
             fireworld_version=__version__,
             n_steps_max=n_steps_max,
-            forked_from=forked_from,
             attachments=attachments(self.scenario),
         )
-
-
-@dataclass(frozen=True)
-class BareCity:
-    """A city built, without anybody in it."""
-
-    plan: Plan
-    city: City
-    arrays: CityArrays
 
 
 class CityCache:
     """The cities built so far, by what makes them: scenarios in one city build it once."""
 
     def __init__(self) -> None:
-        self._built: dict[str, BareCity] = {}
+        self._built: dict[str, tuple[Plan, City, CityArrays]] = {}
 
     def build(self, scenario: Scenario, *, city_json: bytes | None = None) -> BuiltScenario:
         """Build a scenario's city, or take it from the cache, and place everybody in it.
@@ -103,22 +84,43 @@ class CityCache:
         `city_json` is the content of its city file, where that comes from a recording and not from the disk. Raises
         ScenarioError if the city has not what the scenario asks for, CityError if it cannot be built.
         """
-        key = repr((scenario.city, scenario.city_sha256, scenario.resolved_parameters.fire))
-        bare = self._built.get(key)
-        if bare is None:
-            bare = self._built[key] = _build_bare_city(scenario, city_json=city_json)
-        return BuiltScenario(
-            scenario=scenario, city=bare.city, city_arrays=bare.arrays, placement=place(scenario, bare.plan)
-        )
+        fire = scenario.resolved_parameters.fire
+        key = repr((scenario.city, scenario.city_sha256, fire))
+        if key not in self._built:
+            plan = scenario_plan(scenario, city_json=city_json)
+            city = build_city(plan, fire, seed=scenario.city.ray_seed)
+            self._built[key] = plan, city, city_arrays(city, fire)
+        plan, city, arrays = self._built[key]
+        return BuiltScenario(scenario, city, arrays, place(scenario, plan))
 
 
 def build_scenario(scenario: Scenario, *, city_json: bytes | None = None) -> BuiltScenario:
-    """Build one scenario; arguments and errors as for `CityCache.build`."""
+    """Build one scenario; as `CityCache.build` does."""
     return CityCache().build(scenario, city_json=city_json)
 
 
-def _build_bare_city(scenario: Scenario, *, city_json: bytes | None) -> BareCity:
-    plan = scenario_plan(scenario, city_json=city_json)
-    fire = scenario.resolved_parameters.fire
-    city = build_city(plan, fire, seed=scenario.city.ray_seed)
-    return BareCity(plan=plan, city=city, arrays=city_arrays(city, fire))
+@dataclass(frozen=True)
+class PreparedRun:
+    """A prepared run; iterating runs it, from its start each time."""
+
+    header: RunHeader
+    city: CityRecord
+    start: World
+    policy: Policy
+
+    def __iter__(self) -> Iterator[StepRecord]:
+        """Yield the start and then every step, until nothing burns or the last step is done."""
+        world = self.start.copy()
+        begin(self.policy, world.city_arrays, n_brigades=world.n_brigades, seed=world.seed)
+        observer = Observer(world)
+        yield observer.record()
+        while not (world.terminated or world.truncated):
+            yield observer.record(world.step(self.policy))
+
+
+def prepare_run(built: BuiltScenario, named: NamedPolicy, *, seed: int, n_steps_max: int | None = None) -> PreparedRun:
+    """Prepare a run; its last step is the scenario's unless another is given."""
+    world = built.world(seed=seed, n_steps_max=n_steps_max)
+    header = built.header(seed=seed, policy=named.name, policy_digest=named.digest, n_steps_max=world.n_steps_max)
+    header = replace(header, attachments={**header.attachments, **named.attachments})
+    return PreparedRun(header=header, city=built.city_record(), start=world, policy=named.policy)
