@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fireworld import draws
-from fireworld.city.city import Int32Array, Int64Array, Plan
+from fireworld.city.city import Int32Array, Int64Array, Plan, freeze
 from fireworld.city.formats import read_plan
 from fireworld.city.generator import generate_plan
 from fireworld.errors import CityError, ScenarioError, expected
@@ -78,11 +78,14 @@ def place(scenario: Scenario, plan: Plan) -> Placement:
     refuges = [int(building) for building in np.flatnonzero(plan.footprints.refuge)]
     if not refuges:
         _refuse(scenario, "city", "a city with a refuge, where brigades start and fill their tanks", "none of them")
-    return Placement(
-        ignited=_read_only(ignited),
-        civilian_building=_read_only(civilian_building),
-        civilian_mm=_frozen(plan.footprints.centroid_mm[civilian_building]),
-        brigade_refuge=_read_only([refuges[brigade % len(refuges)] for brigade in range(scenario.brigades.n)]),
+    starts = [refuges[brigade % len(refuges)] for brigade in range(scenario.brigades.n)]
+    return freeze(
+        Placement(
+            ignited=np.array(ignited, dtype=np.int32),
+            civilian_building=np.array(civilian_building, dtype=np.int32),
+            civilian_mm=plan.footprints.centroid_mm[civilian_building],
+            brigade_refuge=np.array(starts, dtype=np.int32),
+        )
     )
 
 
@@ -153,9 +156,9 @@ def _civilian_places(
     eligible[ignited] = False
     offset = plan.footprints.centroid_mm.astype(np.int64) - center_mm
     square = (offset * offset).sum(axis=1)
-    eligible &= square >= _to_mm(civilians.from_m) ** 2
+    eligible &= square >= round(civilians.from_m * 1000) ** 2
     if civilians.to_m is not None:
-        eligible &= square <= _to_mm(civilians.to_m) ** 2
+        eligible &= square <= round(civilians.to_m * 1000) ** 2
 
     def draw(building: int) -> int:
         return draws.hash_key(civilians.seed, draws.PLACEMENT, int(plan.footprints.building_id[building]), 0)
@@ -201,22 +204,6 @@ def _locate(plan: Plan, point: Point) -> tuple[int, int]:
     low, high = plan.footprints.outline_mm.min(axis=0), plan.footprints.outline_mm.max(axis=0)
     x_mm, y_mm = (int(low[axis]) + int(point[axis] * (int(high[axis]) - int(low[axis]))) for axis in (0, 1))
     return x_mm, y_mm
-
-
-def _to_mm(length_m: float) -> int:
-    """Turn metres into whole millimetres."""
-    return round(length_m * 1000)
-
-
-def _read_only(buildings: list[int]) -> Int32Array:
-    """Turn indices into an array that no one changes."""
-    return _frozen(np.array(buildings, dtype=np.int32))
-
-
-def _frozen(array: Int32Array) -> Int32Array:
-    """Make an array read-only."""
-    array.setflags(write=False)
-    return array
 
 
 def _refuse(scenario: Scenario, key: str, wanted: str, got: object, hint: str = "") -> NoReturn:
