@@ -12,7 +12,6 @@ from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 from pkgutil import resolve_name
-from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
 
 from fireworld.errors import PolicyError, expected
@@ -30,8 +29,8 @@ from fireworld.policy.parameter_text import (
     write_parameters,
 )
 from fireworld.policy.protocol import Policy
+from fireworld.policy.teams import team_names, team_path
 from fireworld.policy.teams.npz import SUFFIX, read_bytes
-from fireworld.policy.teams.shipped import team_names, team_path
 from fireworld.policy.teams.team import Team, load_team, parse_team
 from fireworld.records import ACTIONS
 
@@ -260,13 +259,8 @@ def _team_by_name(source: str) -> NamedPolicy:
 
 def _named_team(team: Team, content: bytes = b"") -> NamedPolicy:
     """Return the policy of a team, with its file."""
-    if not content:
-        with TemporaryDirectory() as folder:
-            path = Path(folder) / TEAM_ATTACHMENT
-            team.save(path)
-            content = path.read_bytes()
-    policy = team.policy()
-    return NamedPolicy("team", policy.digest, policy, {TEAM_ATTACHMENT: content}, team.choices, given=team)
+    policy, attachments = team.policy(), {TEAM_ATTACHMENT: content or team.to_bytes()}
+    return NamedPolicy("team", policy.digest, policy, attachments, team.choices, given=team)
 
 
 def _unknown(name: str) -> PolicyError:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from fireworld.errors import PolicyError, expected
@@ -42,14 +41,6 @@ def features_of(state: int) -> tuple[int, ...]:
         state, value = divmod(state, len(feature.values))
         found.append(value)
     return tuple(reversed(found))
-
-
-def state_of(features: Sequence[int]) -> int:
-    """Return the state of eight features."""
-    state = 0
-    for feature, value in zip(FEATURES, features, strict=True):
-        state = state * len(feature.values) + value
-    return state
 
 
 def describe_state(state: int, *, with_others: bool = True) -> str:

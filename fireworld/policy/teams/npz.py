@@ -12,7 +12,6 @@ from typing import IO, Any, Final
 import numpy as np
 
 from fireworld.errors import TrainingError, expected
-from fireworld.files import check_output, written_beside
 from fireworld.records import Array
 
 SUFFIX: Final = ".npz"
@@ -21,18 +20,8 @@ SIZE_MAX_BYTES: Final = 300_000_000
 """Above the tables of a thousand brigades, which are the most that a scenario can have."""
 
 
-def write_arrays(path: Path, header: Mapping[str, Any], arrays: Mapping[str, Array], *, force: bool = False) -> None:
-    """Write arrays by name and a header of plain values, beside and renamed; equal content gives equal bytes.
-
-    The header's `format` says what kind of file it is.
-    """
-    check_output(path, force=force)
-    with written_beside(path) as partial:
-        pack_arrays(partial, header, arrays)
-
-
 def pack_arrays(place: Path | IO[bytes], header: Mapping[str, Any], arrays: Mapping[str, Array]) -> None:
-    """Write the content of such a file to a path or a binary stream."""
+    """Write arrays and a header of plain values, whose `format` says what they are; equal content gives equal bytes."""
     text = np.frombuffer(json.dumps(header, sort_keys=True).encode(), dtype=np.uint8)
     with zipfile.ZipFile(place, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, array in {"header": text, **arrays}.items():

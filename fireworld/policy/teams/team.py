@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any, ClassVar, Final, Self
 
 from fireworld.errors import PolicyError, TrainingError, expected
+from fireworld.files import check_output, written_beside
 from fireworld.kernels.arrays import Array
 from fireworld.policy.kernel import KernelPolicy
-from fireworld.policy.teams.npz import SUFFIX, pack_arrays, parse_arrays, read_bytes, write_arrays
-from fireworld.policy.teams.shipped import team_names, team_path
+from fireworld.policy.teams import team_names, team_path
+from fireworld.policy.teams.npz import SUFFIX, pack_arrays, parse_arrays, read_bytes
 from fireworld.shown import SHOWN_MAX, Block, Shown
 
 FORMAT: Final = "fireworld-team/2"
@@ -221,7 +222,9 @@ def read_team(path: Path) -> tuple[Team, dict[str, Array]]:
 
 def write_team(team: Team, path: Path, *, force: bool = False, extra: Mapping[str, Array] | None = None) -> None:
     """Write a team file as `Team.save` does, with `extra` arrays by name, as a checkpoint has."""
-    write_arrays(path, _header(team), {**team.arrays(), **(extra or {})}, force=force)
+    check_output(path, force=force)
+    with written_beside(path) as partial:
+        pack_arrays(partial, _header(team), {**team.arrays(), **(extra or {})})
 
 
 def kinds() -> Mapping[str, type[Team]]:
