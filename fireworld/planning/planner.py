@@ -33,11 +33,11 @@ BURNING_COST: Final = 0.005
 class PlannerOptions:
     """How far, how often and with how many rollouts the planner looks ahead; whole numbers from 1 to 1000."""
 
-    horizon: int = 30
+    horizon: int
     """Steps of a rollout."""
-    interval: int = 4
+    interval: int
     """Steps for which a plan is followed."""
-    rollouts: int = 1
+    rollouts: int
     """Rollouts of each assignment, each with random draws of its own."""
 
     def __post_init__(self) -> None:
@@ -124,8 +124,8 @@ class Planner(Policy):
     plan.
     """
 
-    def __init__(self, options: PlannerOptions | None = None) -> None:
-        self.options = options if options is not None else PlannerOptions()
+    def __init__(self, *, horizon: int = 30, interval: int = 4, rollouts: int = 1) -> None:
+        self.options = PlannerOptions(horizon, interval, rollouts)
         self.digest = hashlib.sha256(repr((astuple(self.options), BURNING_COST)).encode()).hexdigest()
         self._room: WorldState | None = None
         self._planned_at = -1
@@ -159,13 +159,3 @@ class Planner(Policy):
             starts.append(self._plan)
         self._plan = climb(forecast.value, starts)
         self._values = tuple(action_values(forecast.value, self._plan, brigade) for brigade in range(n_brigades))
-
-
-def planner(
-    *,
-    horizon: int = PlannerOptions.horizon,
-    interval: int = PlannerOptions.interval,
-    rollouts: int = PlannerOptions.rollouts,
-) -> Planner:
-    """Return a planner, by its parameters on the command line; errors as for `PlannerOptions`."""
-    return Planner(PlannerOptions(horizon, interval, rollouts))

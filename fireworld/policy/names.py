@@ -51,8 +51,8 @@ RULES: Final = {
     "chief": "one protects civilians, the others the front",
 }
 """What each rule does."""
-PLANNERS: Final = {"planner": "fireworld.planning.planner:planner"}
-"""Where the functions are that make planners: they use the world, which this layer does not know."""
+PLANNERS: Final = {"planner": "fireworld.planning.planner:Planner"}
+"""Where the classes of planners are: they use the world, which this layer does not know."""
 TEAM_ATTACHMENT: Final = "policy.npz"
 """What a recording calls the team file that its brigades followed."""
 _FILE: Final = re.compile(rf"(.+?(?:{re.escape(CODE_SUFFIX)}|{re.escape(SUFFIX)}))(?::(.*))?", re.DOTALL)
@@ -134,18 +134,10 @@ class NamedPolicy:
 
 
 def find_policy(given: object, *, parameters: Parameters | None = None) -> NamedPolicy:
-    """Return a policy by what a user gives.
+    """Return a policy by what a user gives: a name, as docs/policies.md has them, a class, an object or a function.
 
-    Args:
-        given: the name of a policy or team that comes with fireworld, or a team file; FILE.py:CLASS or MODULE:CLASS,
-            without the class where there is only one, and instead of it also a function that returns a policy, a
-            function of the observation, or an object; all of these with parameters, as in `mine.py:Mine:k=3,near=true`.
-            Or a class, an object with a method `decide`, a function of the observation, a team, or a NamedPolicy.
-        parameters: plain values that the class or function takes as keywords; more of them, if `given` has some.
-
-    Raises:
-        PolicyError: there is no such policy, it does not take the parameters, or making it fails.
-        TrainingError: a team file that cannot be read or makes no sense.
+    The parameters, plain values, are keywords of the class or function; more of them, if the name has some. Raises
+    PolicyError if there is no such policy, or making it fails, TrainingError for a team file that makes no sense.
     """
     if isinstance(given, NamedPolicy | Team):
         named = given if isinstance(given, NamedPolicy) else _named_team(given)
