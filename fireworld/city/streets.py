@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from fireworld.city.city import Array, Int32Array, Int64Array, StreetMap, Streets
+from fireworld.city.city import Int32Array, Int64Array, StreetMap, Streets
 
 UNREACHED: Final = 1 << 60
 
@@ -20,7 +20,8 @@ def streets_of(street_map: StreetMap, centroid_mm: Int32Array) -> Streets:
     node = street_map.node_mm.astype(np.int64)
     street = street_map.street.astype(np.int64)
     span = node[street[:, 1]] - node[street[:, 0]]
-    length = np.maximum(1, _rounded_root((span * span).sum(axis=1)))
+    exact = np.sqrt((span * span).sum(axis=1).astype(np.float64))
+    length = np.maximum(1, np.floor(exact + 0.5).astype(np.int64))
     distance, next_node = shortest_ways(node, street, length)
     access_street, access_offset, access_mm = _access_points(node, street, length, centroid_mm.astype(np.int64))
     return Streets(
@@ -109,8 +110,3 @@ def _access_points(
     best = np.lexsort((candidate, (away * away).sum(axis=1), building))
     best = best[np.unique(building[best], return_index=True)[1]]
     return candidate[best], offset[best], point[best]
-
-
-def _rounded_root(square: Array) -> Int64Array:
-    """Return square roots rounded to whole numbers."""
-    return np.floor(np.sqrt(square.astype(np.float64)) + 0.5).astype(np.int64)

@@ -12,7 +12,7 @@ from fireworld.city.city import Array, City
 from fireworld.conformance.city_file import CityFile, Placement, Request
 from fireworld.conformance.configuration import BRIGADE_KEYS, BURN_KEYS, FIRE_KEYS, RAY_KEYS
 from fireworld.conformance.trace import Trace
-from fireworld.kernels.arrays import BrigadeConstants, BrigadeState, CityArrays, FireState
+from fireworld.kernels.arrays import BrigadeState, CityArrays, FireState
 from fireworld.kernels.brigades import ACCEPTED, UNKNOWN_BRIGADE, distance_square, judge_request, refill, spray
 from fireworld.kernels.fire import advance_fire, ignite
 from fireworld.parameters import BrigadeParameters, FireParameters
@@ -132,7 +132,9 @@ class Crew:
         self._geometry = tables.geometry
         self._index = {identifier: k for k, identifier in enumerate(self._inputs.brigade_id)}
         self._building = {int(identifier): b for b, identifier in enumerate(city.footprints.building_id)}
-        self._constants = _brigade_constants(trace)
+        parameters = trace.configuration.parameters(BrigadeParameters, BRIGADE_KEYS)
+        range_mm = trace.configuration.number("water_distance")  # not rounded: exactly at the range is allowed
+        self._constants = brigade_constants(parameters)._replace(range_square=range_mm * range_mm)
         anywhere = np.zeros(len(self._index), dtype=np.int64)
         self.team: BrigadeState = fresh_brigades(city, anywhere, tank_litres=0, hp=1)
         self.team.tank[:] = self._inputs.tank_litres
@@ -164,10 +166,3 @@ class Crew:
         if result == ACCEPTED:
             spray(k, target, request.litres, team, fire)
         return int(result)
-
-
-def _brigade_constants(trace: Trace) -> BrigadeConstants:
-    """Read the brigades' parameters; the range stays in whole millimetres, because exactly at the range is allowed."""
-    parameters = trace.configuration.parameters(BrigadeParameters, BRIGADE_KEYS)
-    range_mm = trace.configuration.number("water_distance")
-    return brigade_constants(parameters)._replace(range_square=range_mm * range_mm)

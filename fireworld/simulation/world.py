@@ -10,17 +10,23 @@ import numpy as np
 from fireworld.city.city import City
 from fireworld.kernels.arrays import BURNING, Array, CityArrays, Constants, Learner, PolicyArrays, WorldState
 from fireworld.kernels.fire import ignite
-from fireworld.kernels.observation import can_choose, find_target, observe
+from fireworld.kernels.observation import can_choose, observe
 from fireworld.kernels.outcome import assess
 from fireworld.kernels.sites import find_sites
 from fireworld.kernels.step import finish_step
 from fireworld.outcome import Outcome, outcome_at
 from fireworld.parameters import Parameters
 from fireworld.policy.asking import ask, complete, keeps
-from fireworld.policy.protocol import Action, Decision, Observation, Policy
+from fireworld.policy.protocol import Action, Decision, Observation, Policy, named_target
 from fireworld.rewards import Reward, reward_of
 from fireworld.scenario import document
-from fireworld.simulation.city_arrays import city_arrays, world_constants
+from fireworld.simulation.city_arrays import (
+    brigade_constants,
+    city_arrays,
+    fire_constants,
+    health_constants,
+    observation_constants,
+)
 from fireworld.simulation.placement import Placement
 from fireworld.simulation.state import NO_LEARNER, copy_world, fresh_world, rewards_of, score_of
 
@@ -52,8 +58,13 @@ def prepare_start(
     A reward of None is the paper's; the city's arrays are built unless they are given.
     """
     arrays = arrays if arrays is not None else city_arrays(city, parameters.fire)
-    reward = reward if reward is not None else reward_of("stock")
-    constants = world_constants(city, parameters, reward=reward, choices=choices, unit_volume_m3=unit_volume_m3)
+    constants = Constants(
+        fire=fire_constants(parameters.fire),
+        health=health_constants(parameters.health),
+        brigades=brigade_constants(parameters.brigades),
+        observation=observation_constants(city, unit_volume_m3, in_turn=choices == "in-turn"),
+        reward=reward if reward is not None else reward_of("stock"),
+    )
     state = fresh_world(city, parameters, placement)
     for building in placement.ignited.tolist():
         ignite(building, arrays.buildings, state.fire)
@@ -218,12 +229,7 @@ class World:
     def _target(self, brigade: int, decision: Decision) -> int:
         if decision.action == Action.OWN_TARGET and decision.target is not None:
             return decision.target
-        city, state = self.city_arrays, self.state
-        return int(
-            find_target(
-                brigade, decision.action, state.brigades, city.buildings, state.fire, city.geometry, state.sites
-            )
-        )
+        return named_target(brigade, decision.action, self.city_arrays, self.state)
 
     def _observation(self, brigade: int, features: Array, state: int, known: Array) -> Observation:
         seen = [int(feature) for feature in features]
