@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from fireworld.city.city import Array, City, Float64Array
+from fireworld.city.city import Array, City
 from fireworld.conformance.city_file import CityFile
 from fireworld.conformance.configuration import RAY_KEYS
 from fireworld.conformance.derived import RELATIVE_TOLERANCE, TableDifference, differing_tables
@@ -41,19 +41,14 @@ class Tally:
             with np.errstate(over="ignore"):
                 differs: Array = ours != theirs.astype(ours.dtype)
         else:
-            gap = relative_gap(ours, theirs, scale)
+            with np.errstate(all="ignore"):
+                gap = np.abs(ours - theirs) / np.maximum(np.abs(theirs), scale)
+            gap = np.where(np.isfinite(gap), gap, np.inf)
             self.largest = max(self.largest or 0.0, float(gap.max(initial=0.0)))
             differs = gap > max(RELATIVE_TOLERANCE, resolution)
         self.n_compared += differs.size
         self.n_differing += int(np.count_nonzero(differs))
         return differs
-
-
-def relative_gap(ours: Array, theirs: Array, scale: Array | float) -> Float64Array:
-    """Return |ours - theirs| / max(|theirs|, scale), infinite where ours is not finite."""
-    with np.errstate(all="ignore"):
-        gap = np.abs(ours - theirs) / np.maximum(np.abs(theirs), scale)
-    return np.where(np.isfinite(gap), gap, np.inf)
 
 
 @dataclass(frozen=True)
@@ -175,14 +170,10 @@ class Comparison:
         for series in self._series.values():
             row = series.at(moment.step)
             if row is not None:
-                ours = self._in_order_of_trace(series, moment.outputs[series.name])
+                ours = moment.outputs[series.name]
+                if series.name == "tank" and self._trace.brigade_id is not None:  # its columns are in another order
+                    ours = ours[np.argsort(np.argsort(self._trace.brigade_id))]
                 self._compare(series.name, moment, ours, row, resolution=series.resolution)
-
-    def _in_order_of_trace(self, series: Series, ours: Array) -> Array:
-        """Return an output with its entries where the trace has them: the tanks' columns are the trace's brigades."""
-        if series.name != "tank" or self._trace.brigade_id is None:
-            return ours
-        return ours[np.argsort(np.argsort(self._trace.brigade_id))]
 
     def _compare(self, name: str, moment: Moment, ours: Array, theirs: Array, *, resolution: float) -> None:
         """Compare one output of a moment, and note the first difference of all."""

@@ -25,7 +25,6 @@ from fireworld.policy.protocol import Decision, Observation, Policy
 from fireworld.records import ACTIONS
 
 NO_TABLES: Final = np.zeros((1, 1, 4))
-NO_RANKINGS: Final = np.zeros((1, N_WEIGHTS))
 
 
 @dataclass
@@ -43,7 +42,7 @@ class KernelPolicy(Policy):
     epsilon: float = 0.0
     commit: int = 1
     """Steps for which a choice is repeated."""
-    rankings: Array = field(default_factory=NO_RANKINGS.copy)
+    rankings: Array = field(default_factory=lambda: np.zeros((1, N_WEIGHTS)))
     """(rankings, 17) float64, weights."""
     stateless = True
     _ready: PolicyArrays | None = field(default=None, init=False, repr=False, compare=False)

@@ -14,19 +14,17 @@ from typing import Final, NoReturn
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from fireworld import draws
-from fireworld.city.city import Int32Array, Int64Array, Plan, freeze
+from fireworld.city.city import Int32Array, Plan, freeze
 from fireworld.city.formats import read_plan
 from fireworld.city.generator import generate_plan
 from fireworld.errors import CityError, ScenarioError, expected
-from fireworld.scenario.document import Civilians, Direction, Fire, Point
+from fireworld.scenario.document import Civilians, Fire, Point
 from fireworld.scenario.scenario import Scenario, read_city_file
 
 SCENARIO_ATTACHMENT: Final = "scenario.yaml"
 CITY_ATTACHMENT: Final = "city.json"
-BoolArray = NDArray[np.bool_]
 UNKNOWN_SHOWN_MAX: Final = 5
 
 
@@ -163,18 +161,13 @@ def _civilian_places(
     def draw(building: int) -> int:
         return draws.hash_key(civilians.seed, draws.PLACEMENT, int(plan.footprints.building_id[building]), 0)
 
-    return [
-        sorted((int(building) for building in np.flatnonzero(eligible & _lies(offset, direction))), key=draw)
-        for direction in civilians.directions
-    ]
-
-
-def _lies(offset: Int64Array, direction: Direction) -> BoolArray:
-    """Tell which offsets, (n, 2), point into the quarter around a direction; diagonals belong to both."""
-    east, north = offset[:, 0], offset[:, 1]
-    ahead, aside = {"N": (north, east), "E": (east, north), "S": (-north, east), "W": (-east, north)}[direction]
-    quarter: BoolArray = ahead >= np.abs(aside)
-    return quarter
+    east, north = offset.T
+    ahead_and_aside = {"N": (north, east), "E": (east, north), "S": (-north, east), "W": (-east, north)}
+    places = []
+    for direction in civilians.directions:
+        ahead, aside = ahead_and_aside[direction]  # a quarter around the direction; diagonals belong to both
+        places.append(sorted(np.flatnonzero(eligible & (ahead >= np.abs(aside))).tolist(), key=draw))
+    return places
 
 
 def _center_of_people(scenario: Scenario, plan: Plan) -> tuple[int, int]:
