@@ -124,7 +124,8 @@ def _page(trainer: Trainer[Any, Any]) -> str:
 def _play_run(play: Play) -> PlayRun:
     def run() -> tuple[str, RunHeader, CityRecord, list[StepRecord]]:
         from fireworld.policy.names import NamedPolicy
-        from fireworld.simulation.built import build_scenario, prepare_run
+        from fireworld.simulation.built import build_scenario
+        from fireworld.simulation.prepared_run import prepare_run
 
         policy = play.team.policy()
         named = NamedPolicy("team in training", policy.digest, policy)

@@ -76,7 +76,8 @@ def command(
     announce_compilation()
     from fireworld.policy.names import find_policy, note_on_team
     from fireworld.scenario import load_scenario, split_settings
-    from fireworld.simulation.built import build_scenario, prepare_run
+    from fireworld.simulation.built import build_scenario
+    from fireworld.simulation.prepared_run import prepare_run
 
     named = find_policy(policy)
     chosen = load_scenario(scenario).with_settings(split_settings(settings))

@@ -31,8 +31,8 @@ from fireworld.recording.replay import build_recorded, check_replay
 from fireworld.recording.resume import Resumed, recorded_policy, resume
 from fireworld.recording.run import Run
 from fireworld.records import CityRecord, MemoryRecording, RunHeader, StepRecord, StoredRun
-from fireworld.simulation.built import PreparedRun
 from fireworld.simulation.observer import Observer
+from fireworld.simulation.prepared_run import PreparedRun
 from fireworld.simulation.world import World
 from fireworld.version import __version__
 

@@ -121,7 +121,8 @@ def run(
     """
     from fireworld.policy.names import find_policy
     from fireworld.scenario import find_scenario
-    from fireworld.simulation.built import build_scenario, prepare_run
+    from fireworld.simulation.built import build_scenario
+    from fireworld.simulation.prepared_run import prepare_run
 
     seed = seed_of(seed)
     n_steps_max = last_step_of(steps)

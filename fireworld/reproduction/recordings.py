@@ -21,7 +21,8 @@ from fireworld.reproduction import paper
 from fireworld.reproduction.repetitions import Repetition
 from fireworld.reproduction.study import ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS, LearningCurve, Study
 from fireworld.scenario import load_scenario
-from fireworld.simulation.built import CityCache, prepare_run
+from fireworld.simulation.built import CityCache
+from fireworld.simulation.prepared_run import prepare_run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -1,22 +1,18 @@
-"""A scenario with its city built, the worlds and runs that start from it, and the cache of the cities built so far."""
+"""A scenario with its city built, ready to start any number of worlds; and the cache of the cities built so far."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 from fireworld.city.build import build_city
 from fireworld.city.city import City, Plan
 from fireworld.kernels.arrays import CityArrays
-from fireworld.policy.asking import begin
-from fireworld.policy.names import NamedPolicy
-from fireworld.policy.protocol import Policy
-from fireworld.records import CityRecord, RunHeader, StepRecord
+from fireworld.records import CityRecord, RunHeader
 from fireworld.scenario import Scenario
 from fireworld.scenario.document import resolve_reward
 from fireworld.simulation.city_arrays import city_arrays
-from fireworld.simulation.observer import Observer, city_record
+from fireworld.simulation.observer import city_record
 from fireworld.simulation.placement import Placement, attachments, place, scenario_plan
 from fireworld.simulation.world import Start, World, prepare_start
 from fireworld.version import __version__
@@ -97,30 +93,3 @@ class CityCache:
 def build_scenario(scenario: Scenario, *, city_json: bytes | None = None) -> BuiltScenario:
     """Build one scenario; as `CityCache.build` does."""
     return CityCache().build(scenario, city_json=city_json)
-
-
-@dataclass(frozen=True)
-class PreparedRun:
-    """A prepared run; iterating runs it, from its start each time."""
-
-    header: RunHeader
-    city: CityRecord
-    start: World
-    policy: Policy
-
-    def __iter__(self) -> Iterator[StepRecord]:
-        """Yield the start and then every step, until nothing burns or the last step is done."""
-        world = self.start.copy()
-        begin(self.policy, world.city_arrays, n_brigades=world.n_brigades, seed=world.seed)
-        observer = Observer(world)
-        yield observer.record()
-        while not (world.terminated or world.truncated):
-            yield observer.record(world.step(self.policy))
-
-
-def prepare_run(built: BuiltScenario, named: NamedPolicy, *, seed: int, n_steps_max: int | None = None) -> PreparedRun:
-    """Prepare a run; its last step is the scenario's unless another is given."""
-    world = built.world(seed=seed, n_steps_max=n_steps_max)
-    header = built.header(seed=seed, policy=named.name, policy_digest=named.digest, n_steps_max=world.n_steps_max)
-    header = replace(header, attachments={**header.attachments, **named.attachments})
-    return PreparedRun(header=header, city=built.city_record(), start=world, policy=named.policy)

@@ -10,7 +10,8 @@ from fireworld.executors import threads
 from fireworld.outcome import COLUMNS
 from fireworld.policy.names import BUILT_IN, find_policy
 from fireworld.scenario import load_scenario
-from fireworld.simulation.built import build_scenario, prepare_run
+from fireworld.simulation.built import build_scenario
+from fireworld.simulation.prepared_run import prepare_run
 
 SEEDS = [3, 1, 4]
 

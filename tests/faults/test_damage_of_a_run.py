@@ -12,7 +12,8 @@ from fireworld.errors import LogError
 from fireworld.policy.names import find_policy
 from fireworld.recording.replay import Replay
 from fireworld.scenario import load_scenario
-from fireworld.simulation.built import build_scenario, prepare_run
+from fireworld.simulation.built import build_scenario
+from fireworld.simulation.prepared_run import prepare_run
 
 pytestmark = pytest.mark.slow
 

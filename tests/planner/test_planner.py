@@ -15,7 +15,8 @@ from fireworld.policy.names import find_policy
 from fireworld.recording.replay import Replay
 from fireworld.records import MemoryRecording
 from fireworld.scenario import load_scenario
-from fireworld.simulation.built import build_scenario, prepare_run
+from fireworld.simulation.built import build_scenario
+from fireworld.simulation.prepared_run import prepare_run
 from fireworld.testing import PolicyConformance
 from tests.simulation.town import town_world
 

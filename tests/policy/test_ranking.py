@@ -149,7 +149,8 @@ def test_what_is_written_is_what_was_recorded(here, fireworld):
     """The values of a log are those of the run, bit by bit."""
     fireworld("run", "quick", "--policy", "all.npz", "--record", "a.mcap", "--steps", 9)
     from fireworld.scenario import load_scenario
-    from fireworld.simulation.built import build_scenario, prepare_run
+    from fireworld.simulation.built import build_scenario
+    from fireworld.simulation.prepared_run import prepare_run
 
     built = build_scenario(load_scenario("quick"))
     records = list(prepare_run(built, find_policy("all.npz"), seed=1, n_steps_max=9))

@@ -15,7 +15,8 @@ from fireworld_recorder.chain import Digest
 
 from fireworld.policy.names import find_policy
 from fireworld.scenario import load_scenario
-from fireworld.simulation.built import build_scenario, prepare_run
+from fireworld.simulation.built import build_scenario
+from fireworld.simulation.prepared_run import prepare_run
 
 PATH: Final = Path(__file__).with_name("golden.json")
 RUNS: Final = {

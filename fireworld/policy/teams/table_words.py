@@ -62,19 +62,6 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class TableSummary:
-    """What one table does overall."""
-
-    n_visited: int
-    n_by_action: tuple[int, ...]
-    """Visited states in which the table prefers each action."""
-
-    def share(self, action: int) -> str:
-        """Return the share of the visited states in which it prefers an action, as text."""
-        return f"{100 * self.n_by_action[action] / self.n_visited:.0f} %" if self.n_visited else "-"
-
-
-@dataclass(frozen=True)
 class TableDifference(TeamDifference):
     """In which states two teams differ."""
 

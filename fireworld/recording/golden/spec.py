@@ -17,7 +17,8 @@ from fireworld.recording.replay import build_recorded
 from fireworld.recording.resume import refind_policy
 from fireworld.records import RunHeader
 from fireworld.scenario import load_scenario, scenario_names
-from fireworld.simulation.built import CityCache, PreparedRun, prepare_run
+from fireworld.simulation.built import CityCache
+from fireworld.simulation.prepared_run import PreparedRun, prepare_run
 from fireworld.version import __version__
 
 SPEC_ATTACHMENT: Final = "golden.json"
