@@ -15,7 +15,7 @@ from benchmarks.learning_fires import N_THREADS, TESTS, Fires, shares
 from fireworld.executors import threads
 from fireworld.kernels.arrays import Array
 from fireworld.kernels.choice import FIXED
-from fireworld.planning.planner import planner
+from fireworld.planning.planner import Planner
 from fireworld.policy.asking import begin
 from fireworld.policy.kernel import NO_TABLES, KernelPolicy, from_tables
 from fireworld.policy.names import BUILT_IN
@@ -127,7 +127,7 @@ def contestants(size: Size, fires: Fires, folder: Path, cities: CityCache) -> li
             1,
             lambda _, group: best_joint(fires[group]),
         ),
-        Contestant("planner", "rollouts at run time; the upper bound", 1, lambda _, __: planner(), SEEDS_OF_PLANNER),
+        Contestant("planner", "rollouts at run time; the upper bound", 1, lambda _, __: Planner(), SEEDS_OF_PLANNER),
         *(replace(rival, n_seeds=SEEDS_OF_RIVALS) for rival in rivals),
         Contestant("own-alone", f"search, own targets{SIGHT_WORDS['alone']}", n, workshop.ranking("own", "alone")),
         Contestant(
@@ -287,7 +287,7 @@ def planned_values(curriculum: Curriculum, cities: CityCache) -> Array:
     rows = []
     for number, scenario in enumerate(curriculum.stages[0].scenarios):
         world = cities.build(scenario).world(seed=SEED_OF_DISTILLING + number)
-        teacher = planner()
+        teacher = Planner()
         begin(teacher, world.city_arrays, n_brigades=world.n_brigades, seed=world.seed)
         while not (world.terminated or world.truncated):
             choices = world.step(teacher)

@@ -15,8 +15,8 @@ from typing import Final
 import click
 
 from benchmarks.machine import describe
-from fireworld.planning.planner import planner
 from fireworld.policy.asking import begin
+from fireworld.policy.names import find_policy
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import BuiltScenario, CityCache, build_scenario
 
@@ -76,7 +76,7 @@ def play(built: BuiltScenario, options: str, seeds: Iterable[int]) -> Result:
     """Run the planner on several seeds."""
     scores, seconds = [], []
     for seed in seeds:
-        world, policy = built.world(seed=seed), planner(options)
+        world, policy = built.world(seed=seed), find_policy(f"planner:{options}" if options else "planner").policy
         started = time.process_time()
         begin(policy, world.city_arrays, n_brigades=world.n_brigades, seed=seed)
         while not (world.terminated or world.truncated):

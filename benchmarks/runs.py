@@ -11,14 +11,12 @@ from fireworld_recorder.writer import LogWriter
 
 from benchmarks.fires import city_of, tables_of
 from fireworld.city.city import Array, City
-from fireworld.city.record import city_record
 from fireworld.parameters import PAPER, Parameters
 from fireworld.policy.kernel import KernelPolicy, each_another
 from fireworld.records import CityRecord, RunHeader, StepRecord
-from fireworld.simulation.observer import Observer
+from fireworld.simulation.observer import Observer, city_record
 from fireworld.simulation.placement import Placement
-from fireworld.simulation.start import prepare_start
-from fireworld.simulation.world import World
+from fireworld.simulation.world import World, prepare_start
 
 N_BRIGADES: Final = 4
 N_CIVILIANS: Final = 10
@@ -89,15 +87,10 @@ def header(n_steps: int) -> RunHeader:
 
 def record_of(world: World) -> CityRecord:
     """Make the city record of a world."""
-    people = world.state.civilians
-    return city_record(
-        world.city,
-        civilian_mm=np.stack([people.x, people.y], axis=1),
-        civilian_building=people.building,
-        civilian_hp=people.hp,
-        n_brigades=world.n_brigades,
-        brigades=PAPER.brigades,
-    )
+    people, nobody = world.state.civilians, np.zeros(0, dtype=np.int32)
+    brigades = np.zeros(world.n_brigades, dtype=np.int32)
+    start = Placement(nobody, people.building, np.stack([people.x, people.y], axis=1), brigades)
+    return city_record(world.city, start, PAPER)
 
 
 def write_log(path: Path, world: World) -> None:

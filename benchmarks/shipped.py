@@ -16,7 +16,7 @@ from typing import Final
 
 import click
 
-from fireworld.policy.teams.shipped import team_path
+from fireworld.policy.teams import team_path
 from fireworld.policy.teams.table_team import TableTeam
 from fireworld.policy.teams.team import Team, load_team
 

@@ -82,24 +82,13 @@ def column(
     unit: str = "",
     added: bool = False,
 ) -> Any:
-    """Declare a packed repeated field: a one-dimensional array.
+    """Declare a packed repeated field: a one-dimensional array, with `width` entries for each of what it is `per`.
 
-    Args:
-        number: of the field in its message.
-        wire: how its numbers travel.
-        doc: what they mean; nothing but text is made of it.
-        per: what the array has entries for; with the topic it decides in which exported table they are.
-        width: entries for each of these, one after another.
-        names: what the numbers 0, 1, 2, ... stand for.
-        unit: where the field's name does not end in it.
-        added: the field came later: it is empty in recordings made before, and so by default.
+    `doc` says what its numbers mean, `names` what 0, 1, 2, ... stand for; the unit is there if the field's name does
+    not end in it. A field that was `added` later is empty in recordings made before, and so by default.
     """
     metadata = {"number": number, "wire": wire, "doc": doc, "unit": unit, "per": per, "width": width, "names": names}
-    return field(metadata=metadata, default_factory=_empty) if added else field(metadata=metadata)
-
-
-def _empty() -> Array:
-    return np.zeros(0)
+    return field(metadata=metadata, default_factory=lambda: np.zeros(0)) if added else field(metadata=metadata)
 
 
 def value(number: int, wire: Wire, doc: str, *, unit: str = "") -> Any:
@@ -371,17 +360,9 @@ _STEP_TOPICS: Final = {topic.topic.removeprefix("/"): topic for topic in STEP_TO
 
 @cache
 def find_field(topic: str, name: str = "") -> tuple[type[Any], Field[Any]]:
-    """Find a recorded field of a step; this is the one place that knows how one can be called.
+    """Return the record type and the field, with its metadata, of "/buildings" and a name, or "buildings.temperature".
 
-    Args:
-        topic: as "buildings" or "/buildings", or with the field, as "buildings.temperature".
-        name: of the field, where `topic` does not have it.
-
-    Returns:
-        The record type of the topic, and the field with what it declares as metadata.
-
-    Raises:
-        FieldError: there is none; with all there are, and the nearest.
+    This is the one place that knows how a field can be called. Raises FieldError with all there are, and the nearest.
     """
     full = f"{topic}.{name}" if name else topic
     topic, _, name = full.removeprefix("/").partition(".")
@@ -421,9 +402,7 @@ class Recording(Steps, Protocol):
     def column(self, topic: str, name: str = "") -> Array:
         """Return one field, named as for `find_field`, over all steps: (k, width) of an array field, (k,) of a value.
 
-        Raises:
-            FieldError: there is no such field, or its length changes from step to step (sites, events); for those
-                there is `ragged`.
+        Raises FieldError if its length changes from step to step (sites, events); for those there is `ragged`.
         """
 
     def ragged(self, topic: str, name: str = "") -> Sequence[Array]:
@@ -449,11 +428,7 @@ class StoredRun(Recording, Protocol):
     def __len__(self) -> int: ...
 
     def step(self, number: int) -> StepRecord:
-        """Return one step.
-
-        Raises:
-            LogError: there is no such step.
-        """
+        """Return one step; LogError if there is no such step."""
 
 
 class RecordingBase(ABC):
@@ -472,12 +447,7 @@ class RecordingBase(ABC):
         """Yield a field, as `find_field` returns it, of every step."""
 
     def column(self, topic: str, name: str = "") -> Array:
-        """Return one field over all steps, as `Recording` defines it.
-
-        Raises:
-            FieldError: there is no such field, or its length changes from step to step; then use `ragged`.
-            LogError: the recording changed since it was opened.
-        """
+        """Return one field over all steps, as `Recording` defines it; LogError if the file changed meanwhile."""
         record_type, item = find_field(topic, name)
         dtype = DTYPES[item.metadata["wire"]]
         table = np.empty((0, 0) if "per" in item.metadata else 0, dtype)
@@ -495,11 +465,7 @@ class RecordingBase(ABC):
         return [np.asarray(value, DTYPES[item.metadata["wire"]]) for value in self.values(record_type, item)]
 
     def position(self, number: int) -> int:
-        """Return the position of a step in `steps`.
-
-        Raises:
-            LogError: there is no such step.
-        """
+        """Return the position of a step in `steps`; LogError if there is no such step."""
         steps = self.steps
         found = np.flatnonzero(steps == number)
         if not len(found):

@@ -25,15 +25,8 @@ def cover_cells(footprints: Footprints, cell_mm: int, *, where: str = "city") ->
     The grid starts at the minimum of all corners and has 1 + span // cell_mm cells a side. Cover in per cent is how
     many of a cell's 10 * 10 sample points, from its lower left corner in steps of a tenth, lie in the building:
     even-odd rule, half-open in y, and a point on a wall belongs to the building if the inside is at its right.
-    Everything is whole numbers (in tenths of a millimetre, so that any cell size has exact samples).
-
-    Args:
-        footprints: the buildings.
-        cell_mm: side of a cell.
-        where: name of the city in errors.
-
-    Raises:
-        CityError: the city is too large for the grid, or a building covers no sample point.
+    Everything is whole numbers (in tenths of a millimetre, so that any cell size has exact samples). Raises CityError,
+    which begins with `where`, for a city too large, and for a building that covers no sample point.
     """
     low, high = bounding_boxes(footprints)
     origin, span = low.min(axis=0), high.max(axis=0) - low.min(axis=0)
@@ -76,13 +69,8 @@ def _count_samples(footprints: Footprints, corner_mm: Int64Array, blocks: Int64A
     """Count the sample points inside each building, cell by cell of its bounding box, x outer, y inner.
 
     Every building has a raster of samples, one row per sample y. Each crossing of a wall with a row flips all samples
-    at and right of it; a row has an even number of crossings, so one running parity over all rows will do.
-
-    Args:
-        footprints: the buildings.
-        corner_mm: (n, 2) lower left corner of each building's block of cells.
-        blocks: (n, 2) cells of each block along x and y.
-        cell_mm: side of a cell.
+    at and right of it; a row has an even number of crossings, so one running parity over all rows will do. `corner_mm`
+    (n, 2) is the lower left of each building's block of cells, `blocks` (n, 2) their number along x and y.
     """
     walls = walls_of(footprints)
     rows, width = blocks[:, 1] * SAMPLES, blocks[:, 0] * SAMPLES + 1  # one spare sample takes crossings at the end

@@ -3,28 +3,37 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
 from fireworld.city.air import cover_cells
-from fireworld.city.city import Array, City, Int32Array, Int64Array, Links, Plan, freeze
+from fireworld.city.city import (
+    Array,
+    City,
+    Float32Array,
+    Float64Array,
+    Footprints,
+    Int32Array,
+    Int64Array,
+    Links,
+    Plan,
+    freeze,
+)
 from fireworld.city.links import radiation_links
 from fireworld.city.near import near_relation
-from fireworld.city.physics import physics_of
+from fireworld.city.outlines import walls_of
 from fireworld.city.streets import streets_of
 from fireworld.parameters import FireParameters
+from fireworld.records import MATERIALS
+
+FLOOR_HEIGHT_M: Final = 3
 
 
 def build_city(plan: Plan, fire: FireParameters, *, seed: int) -> City:
-    """Build a city from its plan; all its arrays are read-only.
+    """Build a city from its plan; all its arrays are read-only. `seed`: of the rays that measure radiation.
 
-    Args:
-        plan: made by a generator or loaded from a file.
-        fire: the physical parameters.
-        seed: of the rays that measure the radiation between buildings.
-
-    Raises:
-        CityError: the plan is too large for the air grid, or a building covers no air cell.
+    Raises CityError if the plan is too large for the air grid, or a building covers no air cell.
     """
     footprints = plan.footprints
     air = cover_cells(footprints, fire.air_cell_mm, where=plan.name)
@@ -46,11 +55,8 @@ def build_city(plan: Plan, fire: FireParameters, *, seed: int) -> City:
 def with_links(city: City, *, ptr: Array, building: Array, share: Array) -> City:
     """Return the city with radiation links measured elsewhere, such as those of a trace; `near` follows them.
 
-    Args:
-        city: the city.
-        ptr: (n+1,) start of each building's links.
-        building: (links,) index of the building that each link leads to, in any order.
-        share: (links,) share of the rays.
+    As CSR: ptr (n+1,) start of each building's links, (links,) the buildings that they lead to, in any order, and
+    shares.
     """
     emitter = np.repeat(np.arange(city.n_buildings), np.diff(ptr))
     rising = np.lexsort((building, emitter))
@@ -66,19 +72,49 @@ def with_order(city: City, order: Array) -> City:
 
 
 def visiting_order(building_id: Int64Array) -> Int32Array:
-    """Order the buildings as the official program does, which walks a hash table of their identifiers.
+    """Return the (n,) indices of the buildings in the order in which the official program visits them.
 
-    The air exchange depends on it. The key is (id ^ id >> 16) modulo the size of the table: the smallest power of two
-    from 16 on that is at most three quarters full. Ties stay in file order.
-
-    Args:
-        building_id: (n,) identifiers, not negative.
-
-    Returns:
-        (n,) indices of the buildings, first visited first.
+    The air exchange depends on it. The program walks a hash table; the key is (id ^ id >> 16) modulo its size: the
+    smallest power of two from 16 on that is at most three quarters full. Ties stay in file order.
     """
     capacity = 16
     while len(building_id) > 0.75 * capacity:
         capacity *= 2
     key = (building_id ^ (building_id >> 16)) & (capacity - 1)
     return np.argsort(key, kind="stable").astype(np.int32)
+
+
+def physics_of(footprints: Footprints, fire: FireParameters) -> dict[str, Array]:
+    """Work out the constants of each building, (n,) by their names in `City`; MODEL section 1.
+
+    volume = ground area * floors * 3 m; fuel and heat capacity are proportional to it by material. All but the walls
+    are single precision, as in the official program.
+    """
+    floors = footprints.floors.astype(np.float32)
+    volume = footprints.ground_area_m2 * floors * np.float32(FLOOR_HEIGHT_M)
+    return {
+        "volume_m3": volume,
+        "heat_capacity": volume * _by_material(footprints, fire, "heat_capacity"),
+        "initial_fuel": volume * _by_material(footprints, fire, "fuel_density"),
+        "ignition_point": _by_material(footprints, fire, "ignition_point"),
+        "wall_area_m2": wall_area_m2(footprints),
+    }
+
+
+def wall_area_m2(footprints: Footprints) -> Float64Array:
+    """Return the radiating wall of each building, (n,): one storey high, without the closing wall.
+
+    Summed wall by wall in the official order of operations, so that even the last bit agrees.
+    """
+    walls = walls_of(footprints)
+    area_mm_m = walls.length_mm * (FLOOR_HEIGHT_M * 1000)
+    counted = ~walls.closing
+    # bincount adds one after another, unlike numpy's sums, which split a long row differently on each processor.
+    total = np.bincount(walls.building[counted], weights=area_mm_m[counted], minlength=len(footprints.building_id))
+    return total.astype(np.float64) / 1e6
+
+
+def _by_material(footprints: Footprints, fire: FireParameters, name: str) -> Float32Array:
+    """Look up a parameter of each building by its material."""
+    values = [getattr(fire, f"{name}_{material}") for material in MATERIALS]
+    return np.array(values, dtype=np.float32)[footprints.material]

@@ -38,21 +38,15 @@ def footpaths(footprints: Footprints, hydrants_mm: Sequence[Corner]) -> StreetMa
     )
 
 
-def _distance_square(node: Int64Array, rows: Int64Array) -> Int64Array:
-    """Return the squared distances from some nodes to all, FAR from a node to itself."""
-    away = node[rows, None, :] - node[None, :, :]
-    square: Int64Array = (away * away).sum(axis=2)
-    square[np.arange(len(rows)), rows] = FAR
-    return square
-
-
 def _nearest_pairs(node: Int64Array) -> Int64Array:
     """List (node, one of its nearest), six for every node if there are as many others."""
     count = min(N_NEAREST, len(node) - 1)
     pairs = []
     for begin in range(0, len(node), ROWS_AT_ONCE):
         rows = np.arange(begin, min(begin + ROWS_AT_ONCE, len(node)))
-        square = _distance_square(node, rows)
+        away = node[rows, None, :] - node[None, :, :]
+        square = (away * away).sum(axis=2)
+        square[np.arange(len(rows)), rows] = FAR  # from a node to itself
         farthest = np.partition(square, count - 1, axis=1)[:, count - 1]
         row, other = np.nonzero(square <= farthest[:, None])  # more than six where the sixth is a tie
         nearest = np.lexsort((other, square[row, other], row))

@@ -123,28 +123,16 @@ def generate_plan(
     hydrant_share: float = 0.0,
     name: str = "generated",
 ) -> Plan:
-    """Make a city of columns * rows lots.
+    """Make a city of columns * rows lots, of values that `GeneratedCity` allows; CityError if it is too large.
 
-    Buildings have identifiers from 0 in row order, south-west first. Footprints are rectangles or L-shapes; floors
-    1, 2, 3 come 2:1:1 and wood, steel, concrete 75:20:5, as in the official maps.
-
-    Args:
-        columns: lots from west to east.
-        rows: lots from south to north.
-        seed: another seed, another city of the same size.
-        lot_m: side of a square lot.
-        block: lots of a block, from west to east and from south to north; streets run around every block.
-        street_m: width of a street.
-        refuges: places as fractions of the city from its south-west corner; the nearest free lot becomes a refuge.
-        fill: smallest and largest share of its lot that a footprint covers.
-        hydrant_share: share of the crossings that have a hydrant.
-        name: name of the city.
-
-    Raises:
-        CityError: a value that makes no city.
+    Buildings have identifiers from 0 in row order, south-west first. Footprints are rectangles or L-shapes; floors 1,
+    2, 3 come 2:1:1 and wood, steel, concrete 75:20:5, as in the official maps.
     """
     layout = _Layout(lot=round(lot_m * 1000), street=round(street_m * 1000), block=block)
-    _check(name, layout, columns=columns, rows=rows, refuges=refuges, fill=fill, hydrant_share=hydrant_share)
+    span = max(layout.lot_start(0, columns), layout.lot_start(1, rows))
+    if span > SPAN_MAX_MM:
+        wanted = f"a city of at most {SPAN_MAX_MM // 1000} m a side"
+        raise CityError(expected(name, "columns, rows", wanted, f"{span // 1000}"))
     refuge_lots = _refuge_lots(layout, columns, rows, refuges)
     buildings = [
         _Lot(layout, seed, column, row).building(
@@ -155,36 +143,6 @@ def generate_plan(
     ]
     streets = _streets(layout, seed, columns, rows, hydrant_share)
     return freeze(Plan(name=name, footprints=assemble(buildings), streets=streets))
-
-
-def _check(
-    name: str,
-    layout: _Layout,
-    *,
-    columns: int,
-    rows: int,
-    refuges: Sequence[tuple[float, float]],
-    fill: tuple[float, float],
-    hydrant_share: float,
-) -> None:
-    """Raise CityError for values that make no city."""
-
-    def demand(holds: bool, key: str, wanted: str, got: object) -> None:
-        if not holds:
-            raise CityError(expected(name, key, wanted, got))
-
-    demand(columns >= 1, "columns", "at least 1", columns)
-    demand(rows >= 1, "rows", "at least 1", rows)
-    demand(min(layout.block) >= 1, "block", "at least 1 lot each way", layout.block)
-    demand(layout.lot >= 3000, "lot_m", "at least 3 m", layout.lot / 1000)
-    demand(layout.street >= 2, "street_m", "at least 0.002 m", layout.street / 1000)
-    span = max(layout.lot_start(0, columns), layout.lot_start(1, rows))
-    demand(span <= SPAN_MAX_MM, "columns, rows", f"a city of at most {SPAN_MAX_MM // 1000} m a side", f"{span // 1000}")
-    demand(len(refuges) <= columns * rows, "refuges", f"at most {columns * rows}, one a lot", len(refuges))
-    for place in refuges:
-        demand(all(0.0 <= part <= 1.0 for part in place), "refuges", "fractions of the city from 0 to 1", place)
-    demand(0.25 <= fill[0] <= fill[1] <= 1.0, "fill", "two rising shares of a lot from 0.25 to 1", fill)
-    demand(0.0 <= hydrant_share <= 1.0, "hydrant_share", "a share from 0 to 1", hydrant_share)
 
 
 def _refuge_lots(

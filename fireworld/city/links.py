@@ -20,11 +20,7 @@ CELL_SIDE_MIN_MM: Final = 1000
 def radiation_links(footprints: Footprints, order: Int32Array, fire: FireParameters, *, seed: int) -> Links:
     """Send every building's rays; a link's share is its hits over all rays, self-hits and misses included.
 
-    Args:
-        footprints: the buildings.
-        order: (n,) in which the official program visits the buildings.
-        fire: gives the number and the length of the rays.
-        seed: of the rays.
+    `order` (n,): in which the official program visits the buildings. `fire` has the number and the length of the rays.
     """
     walls = wall_table(footprints, order, fire)
     ptr, building, n_hits = count_hits(walls, wall_grid(walls), footprints.building_id, seed, fire.ray_range_mm)

@@ -17,8 +17,7 @@ PAIRS_AT_ONCE: Final = 500_000
 def near_relation(footprints: Footprints, links: Links) -> Links:
     """Relate the buildings that are linked in either direction, or whose outlines are closer than 30 m.
 
-    Returns:
-        A symmetric relation as CSR, neighbours rising, all shares 1; no building is near itself.
+    The relation is symmetric, as CSR, neighbours rising, all shares 1; no building is near itself.
     """
     n = len(footprints.building_id)
     emitter = np.repeat(np.arange(n, dtype=np.int64), np.diff(links.ptr))

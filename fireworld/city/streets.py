@@ -7,22 +7,21 @@ from typing import Any, Final
 
 import numpy as np
 
-from fireworld.city.city import Array, Int32Array, Int64Array, StreetMap, Streets
+from fireworld.city.city import Int32Array, Int64Array, StreetMap, Streets
 
 UNREACHED: Final = 1 << 60
 
 
 def streets_of(street_map: StreetMap, centroid_mm: Int32Array) -> Streets:
-    """Work out the shortest ways on a street map and the access points of buildings.
+    """Work out the shortest ways on a street map and the access points of buildings, by their (n, 2) centroids.
 
-    Args:
-        street_map: nodes and streets; at least one street. It need not be connected.
-        centroid_mm: (n, 2) centroids of the buildings.
+    It has at least one street and need not be connected.
     """
     node = street_map.node_mm.astype(np.int64)
     street = street_map.street.astype(np.int64)
     span = node[street[:, 1]] - node[street[:, 0]]
-    length = np.maximum(1, _rounded_root((span * span).sum(axis=1)))
+    exact = np.sqrt((span * span).sum(axis=1).astype(np.float64))
+    length = np.maximum(1, np.floor(exact + 0.5).astype(np.int64))
     distance, next_node = shortest_ways(node, street, length)
     access_street, access_offset, access_mm = _access_points(node, street, length, centroid_mm.astype(np.int64))
     return Streets(
@@ -39,19 +38,12 @@ def streets_of(street_map: StreetMap, centroid_mm: Int32Array) -> Streets:
 
 
 def shortest_ways(node_mm: Int64Array, street: Int64Array, length_mm: Int64Array) -> tuple[Int64Array, Int32Array]:
-    """Find the shortest way between any two nodes.
+    """Find the shortest way between any two of m nodes, by k streets that can be driven both ways.
 
     Every node in turn learns from its neighbours, in sweeps to and fro along the two diagonals of the map, until a
-    round brings nothing new. On street maps a few rounds do, and each is a handful of operations on whole rows.
-
-    Args:
-        node_mm: (m, 2) positions.
-        street: (k, 2) the nodes of each street; it can be driven both ways.
-        length_mm: (k,) at least 1.
-
-    Returns:
-        distance_mm (m, m) int64, -1 where there is no way; and next_node (m, m) int32, [from, to] the next node on a
-        shortest way (ties: lowest index), -1 where there is none and from a node to itself.
+    round brings nothing new. On street maps a few rounds do, and each is a handful of operations on whole rows. Returns
+    distance_mm (m, m) int64, -1 where there is no way; and next_node (m, m) int32, [from, to] the next node on a
+    shortest way (ties: lowest index), -1 where there is none and from a node to itself.
     """
     m = len(node_mm)
     neighbours = _neighbours(m, street, length_mm)
@@ -96,8 +88,7 @@ def _access_points(
 ) -> tuple[Int64Array, Int64Array, Int64Array]:
     """Find the point of any street nearest to each centroid; ties go to the lowest street.
 
-    Returns:
-        street (n,), way from its first node (n,) mm, and the point (n, 2) mm.
+    Returns the street (n,), the way from its first node (n,) mm, and the point (n, 2) mm.
     """
     import shapely
 
@@ -119,8 +110,3 @@ def _access_points(
     best = np.lexsort((candidate, (away * away).sum(axis=1), building))
     best = best[np.unique(building[best], return_index=True)[1]]
     return candidate[best], offset[best], point[best]
-
-
-def _rounded_root(square: Array) -> Int64Array:
-    """Return square roots rounded to whole numbers."""
-    return np.floor(np.sqrt(square.astype(np.float64)) + 0.5).astype(np.int64)

@@ -8,7 +8,7 @@ from typing import Any, Final, TypeVar
 
 import click
 
-from fireworld.policy.teams.shipped import team_names
+from fireworld.policy.teams import team_names
 
 POLICY_HELP: Final = (
     "easiest, nearest-to-civilian, nearest-to-center, nearest-to-me, each-another, random, chief, planner; "

@@ -103,11 +103,7 @@ class Arrays:
 
 
 def read_arrays(path: Path, keys: Iterable[str]) -> Arrays:
-    """Read those of the named arrays that a file has; others stay unread. Nothing in a file is ever executed.
-
-    Raises:
-        TraceError: the file cannot be read or is damaged.
-    """
+    """Read those of the named arrays that a file has; others stay unread. Nothing in a file is ever executed."""
     where = str(path)
     try:
         with path.open("rb") as file:

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from fireworld.city.city import Array, City, Float64Array
+from fireworld.city.city import Array, City
 from fireworld.conformance.city_file import CityFile
 from fireworld.conformance.configuration import RAY_KEYS
 from fireworld.conformance.derived import RELATIVE_TOLERANCE, TableDifference, differing_tables
@@ -32,32 +32,23 @@ class Tally:
     def add(self, ours: Array, theirs: Array, *, scale: Array | float, resolution: float) -> Array:
         """Compare the values of a step and return where they differ, bool of the same shape.
 
-        A difference is relative to the greater of the trace's value and a scale, because what is left of a building's
-        heat after it was cooled all the way is rounding noise: relative to itself it means nothing.
-
-        Args:
-            ours: computed here.
-            theirs: the trace's.
-            scale: what counts as a small value: for energies the heat capacity, which is one degree.
-            resolution: rounding of the trace's type; the tolerance is not finer than that.
+        A difference is relative to the greater of the trace's value and a scale (for energies the heat capacity, which
+        is one degree), because what is left of a building's heat after it was cooled all the way is rounding noise:
+        relative to itself it means nothing. The tolerance is not finer than `resolution`, the rounding of the trace's
+        type.
         """
         if self.name in EXACT:
             with np.errstate(over="ignore"):
                 differs: Array = ours != theirs.astype(ours.dtype)
         else:
-            gap = relative_gap(ours, theirs, scale)
+            with np.errstate(all="ignore"):
+                gap = np.abs(ours - theirs) / np.maximum(np.abs(theirs), scale)
+            gap = np.where(np.isfinite(gap), gap, np.inf)
             self.largest = max(self.largest or 0.0, float(gap.max(initial=0.0)))
             differs = gap > max(RELATIVE_TOLERANCE, resolution)
         self.n_compared += differs.size
         self.n_differing += int(np.count_nonzero(differs))
         return differs
-
-
-def relative_gap(ours: Array, theirs: Array, scale: Array | float) -> Float64Array:
-    """Return |ours - theirs| / max(|theirs|, scale), infinite where ours is not finite."""
-    with np.errstate(all="ignore"):
-        gap = np.abs(ours - theirs) / np.maximum(np.abs(theirs), scale)
-    return np.where(np.isfinite(gap), gap, np.inf)
 
 
 @dataclass(frozen=True)
@@ -112,15 +103,9 @@ class Report:
 
 
 def check(city_file: CityFile, path: Path) -> Report:
-    """Replay a trace and compare everything that it has with what the engine makes of its inputs.
+    """Replay a trace and compare everything that it has with what the engine makes of its inputs in that city.
 
-    Args:
-        city_file: the city it was recorded in.
-        path: the trace.
-
-    Raises:
-        TraceError: the trace cannot be read or does not fit the city.
-        CityError: the city cannot be built with the trace's parameters.
+    Raises TraceError if it cannot be read or does not fit, CityError if the city cannot be built with its parameters.
     """
     trace = load_trace(path, city_file)
     own_city, city, fire = prepare(city_file, trace)
@@ -166,12 +151,7 @@ def _is_comparable(series: Series, trace: Trace, city: City) -> bool:
 
 
 class Comparison:
-    """Compares moment after moment with a trace.
-
-    Attributes:
-        tallies: by output, in the order in which a step makes them.
-        first: the first difference so far.
-    """
+    """Compares moment after moment with a trace; `tallies` are by output, in the order in which a step makes them."""
 
     def __init__(self, trace: Trace, city: City) -> None:
         self.first: FirstDifference | None = None
@@ -190,14 +170,10 @@ class Comparison:
         for series in self._series.values():
             row = series.at(moment.step)
             if row is not None:
-                ours = self._in_order_of_trace(series, moment.outputs[series.name])
+                ours = moment.outputs[series.name]
+                if series.name == "tank" and self._trace.brigade_id is not None:  # its columns are in another order
+                    ours = ours[np.argsort(np.argsort(self._trace.brigade_id))]
                 self._compare(series.name, moment, ours, row, resolution=series.resolution)
-
-    def _in_order_of_trace(self, series: Series, ours: Array) -> Array:
-        """Return an output with its entries where the trace has them: the tanks' columns are the trace's brigades."""
-        if series.name != "tank" or self._trace.brigade_id is None:
-            return ours
-        return ours[np.argsort(np.argsort(self._trace.brigade_id))]
 
     def _compare(self, name: str, moment: Moment, ours: Array, theirs: Array, *, resolution: float) -> None:
         """Compare one output of a moment, and note the first difference of all."""

@@ -64,11 +64,7 @@ class CityFile:
 
 
 def load_city_file(path: Path) -> CityFile:
-    """Read a city file.
-
-    Raises:
-        CityError: it cannot be read, makes no city, or names something that the city does not have.
-    """
+    """Read a city file; CityError if it makes no city, or names something that the city does not have."""
     try:
         text = path.read_bytes()
     except OSError as error:

@@ -63,15 +63,7 @@ class Configuration:
         return all(self.values.get(PREFIX + key) is not None for key in keys)
 
     def parameters(self, section: type[Section], keys: Mapping[str, str]) -> Section:
-        """Return a section of parameters, the named ones from the configuration and the others at their defaults.
-
-        Args:
-            section: which one.
-            keys: parameter of each key to read.
-
-        Raises:
-            TraceError: a key is missing or its value out of bounds.
-        """
+        """Return a section of parameters, the named ones from the configuration and the others at their defaults."""
         kinds = {item.name: str(item.type) for item in fields(section)}
         values: dict[str, Any] = {name: self._number(key, name, kinds[name]) for key, name in keys.items()}
         return section(**values)

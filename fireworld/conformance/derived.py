@@ -54,16 +54,9 @@ class TableDifference:
 
 
 def differing_tables(arrays: Arrays, city: City, fire: FireParameters, *, with_rays: bool) -> list[TableDifference]:
-    """Compare every table that a trace has with fireworld's own.
+    """Compare every table that a trace has with fireworld's own: of a city that has nothing from the trace.
 
-    Args:
-        arrays: of the trace.
-        city: as fireworld builds it, nothing of it taken from the trace.
-        fire: the trace's parameters.
-        with_rays: whether these hold the trace's rate of rays, so that their number can be compared.
-
-    Raises:
-        TraceError: a table has a wrong shape or something that is no number.
+    `with_rays`: the parameters hold the trace's rate of rays, so that their number can be compared.
     """
     derived = {name: table(city) for name, table in {**BUILDING_TABLES, **OTHER_TABLES}.items()}
     if with_rays:

@@ -12,7 +12,7 @@ from fireworld.city.city import Array, City
 from fireworld.conformance.city_file import CityFile, Placement, Request
 from fireworld.conformance.configuration import BRIGADE_KEYS, BURN_KEYS, FIRE_KEYS, RAY_KEYS
 from fireworld.conformance.trace import Trace
-from fireworld.kernels.arrays import BrigadeConstants, BrigadeState, CityArrays, FireState
+from fireworld.kernels.arrays import BrigadeState, CityArrays, FireState
 from fireworld.kernels.brigades import ACCEPTED, UNKNOWN_BRIGADE, distance_square, judge_request, refill, spray
 from fireworld.kernels.fire import advance_fire, ignite
 from fireworld.parameters import BrigadeParameters, FireParameters
@@ -48,12 +48,7 @@ def fire_parameters(trace: Trace) -> FireParameters:
 def prepare(city_file: CityFile, trace: Trace) -> tuple[City, City, FireParameters]:
     """Build the city as the trace's parameters want it.
 
-    Returns:
-        The city as fireworld builds it, the same with the order and the links of the trace, and the parameters.
-
-    Raises:
-        CityError: it cannot be built, such as with these air cells.
-        TraceError: a parameter is missing or out of bounds.
+    Returns the city as fireworld builds it, the same with the order and the links of the trace, and the parameters.
     """
     fire = fire_parameters(trace)
     named = replace(city_file.plan, name=city_file.where)  # what errors begin with
@@ -67,12 +62,7 @@ def prepare(city_file: CityFile, trace: Trace) -> tuple[City, City, FireParamete
 
 
 def replay(city_file: CityFile, trace: Trace, city: City, parameters: FireParameters) -> Iterator[Moment]:
-    """Run the engine through all steps of a trace and yield the state after each, step 0 first.
-
-    Raises:
-        TraceError: a building burns in more steps than the trace has rates for, or a parameter of the brigades is
-            missing.
-    """
+    """Run the engine through all steps of a trace and yield the state after each, step 0 first."""
     inputs, fire_is = city_file.inputs, fire_constants(parameters)
     tables, fire = city_arrays(city, parameters), fresh_fire(city)
     crew = Crew(city_file, trace, tables, city) if inputs.brigade_id or inputs.requests else None
@@ -135,18 +125,16 @@ class Rates:
 
 
 class Crew:
-    """The brigades of a city file: moved by its rows, refilled and judged by the engine.
-
-    Attributes:
-        team: their state, by rising id.
-    """
+    """The brigades of a city file, by rising id in `team`: moved by its rows, refilled and judged by the engine."""
 
     def __init__(self, city_file: CityFile, trace: Trace, tables: CityArrays, city: City) -> None:
         self._inputs = city_file.inputs
         self._geometry = tables.geometry
         self._index = {identifier: k for k, identifier in enumerate(self._inputs.brigade_id)}
         self._building = {int(identifier): b for b, identifier in enumerate(city.footprints.building_id)}
-        self._constants = _brigade_constants(trace)
+        parameters = trace.configuration.parameters(BrigadeParameters, BRIGADE_KEYS)
+        range_mm = trace.configuration.number("water_distance")  # not rounded: exactly at the range is allowed
+        self._constants = brigade_constants(parameters)._replace(range_square=range_mm * range_mm)
         anywhere = np.zeros(len(self._index), dtype=np.int64)
         self.team: BrigadeState = fresh_brigades(city, anywhere, tank_litres=0, hp=1)
         self.team.tank[:] = self._inputs.tank_litres
@@ -178,10 +166,3 @@ class Crew:
         if result == ACCEPTED:
             spray(k, target, request.litres, team, fire)
         return int(result)
-
-
-def _brigade_constants(trace: Trace) -> BrigadeConstants:
-    """Read the brigades' parameters; the range stays in whole millimetres, because exactly at the range is allowed."""
-    parameters = trace.configuration.parameters(BrigadeParameters, BRIGADE_KEYS)
-    range_mm = trace.configuration.number("water_distance")
-    return brigade_constants(parameters)._replace(range_square=range_mm * range_mm)

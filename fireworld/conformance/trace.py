@@ -57,11 +57,7 @@ class Trace:
 
 
 def load_trace(path: Path, city: CityFile) -> Trace:
-    """Read a trace.
-
-    Raises:
-        TraceError: it cannot be read, has something missing or wrong, or is not of this city.
-    """
+    """Read a trace; TraceError if it has something missing or wrong, or is not of this city."""
     arrays = read_arrays(path, {*INPUTS, *OUTPUTS, *LABELS, *DERIVED})
     configuration = read_configuration(arrays.where, arrays.text("params"))
     identifiers = city.plan.footprints.building_id

@@ -24,12 +24,8 @@ NO_TARGET = np.int64(-1)
 def judge_request(litres: int, sprayed: int, tank: int, distance_square: float, constants: BrigadeConstants) -> int:
     """Return the official result code of an extinguish request of a known brigade; MODEL 2.2.
 
-    Args:
-        litres: water asked for.
-        sprayed: litres of this brigade's requests already accepted in this step.
-        tank: litres in its tank.
-        distance_square: squared distance from the brigade to the building's centroid, mm^2.
-        constants: power, range.
+    `sprayed`: litres of its requests already accepted in this step. `distance_square`: to the building's centroid,
+    mm^2.
     """
     if sprayed + litres > constants.power:
         return OVER_POWER
@@ -209,12 +205,7 @@ def nearest_refuge(street: int, offset: int, streets: StreetArrays) -> np.int64:
 def refill(refuge: Array, hydrant: Array, hp: Array, tank: Array, constants: BrigadeConstants) -> None:
     """Fill the tanks of the brigades at a refuge, and of the lowest one at each hydrant; MODEL 2.1.
 
-    Args:
-        refuge: (b,) int32, the refuge building a brigade stands at, -1 none.
-        hydrant: (b,) int32, the hydrant it stands at, -1 none.
-        hp: (b,) int32; the dead do nothing.
-        tank: (b,) int32 litres; changed.
-        constants: rates and size of the tank.
+    All (b,) int32: refuge and hydrant that a brigade stands at, -1 none; health (the dead do nothing); litres, changed.
     """
     for brigade in range(len(tank)):
         if hp[brigade] <= 0:

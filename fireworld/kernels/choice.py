@@ -31,15 +31,7 @@ def explores(brigade: int, policy: PolicyArrays, seed: int, step: int) -> bool:
 
 @kernel
 def choose(brigade: int, state: int, policy: PolicyArrays, seed: int, step: int) -> int:
-    """Return the action a brigade picks in a state.
-
-    Args:
-        brigade: who chooses.
-        state: 0..4319, or 0..269 where the tables have 270 states (the flags are then left out).
-        policy: kinds and tables.
-        seed: seed of the run.
-        step: simulated step.
-    """
+    """Return the action a brigade picks in a state 0..4319, or 0..269 where the tables leave the flags out."""
     kind = policy.kind[brigade]
     if kind == FIXED:
         return policy.action[brigade]

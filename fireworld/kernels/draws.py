@@ -40,15 +40,9 @@ def mix(word: np.uint64) -> np.uint64:
 
 @inner
 def hash_key(seed: int, purpose: int, entity: int, step: int) -> np.uint64:
-    """Return the 64-bit key of one draw.
+    """Return the 64-bit key of one draw for a purpose, one of the constants of `fireworld.draws`.
 
     The entity comes last, so that the compiler lifts the rest of the chain out of a loop over entities.
-
-    Args:
-        seed: seed of the run or the city, any integer.
-        purpose: one of the constants of `fireworld.draws`.
-        entity: index of what the draw is for.
-        step: simulated step, or a second index.
     """
     word = mix(np.uint64(seed))
     word = mix(word ^ np.uint64(purpose))
@@ -94,14 +88,7 @@ def below(seed: int, purpose: int, entity: int, step: int, bound: int) -> np.int
 
 @kernel
 def fill_normals(seed: int, purpose: int, step: int, out: Array) -> None:
-    """Fill a matrix with deviates of N(0, 1); the entity of each is its place, row after row.
-
-    Args:
-        seed: seed of the run.
-        purpose: one of the constants of `fireworld.draws`.
-        step: second index of the draws.
-        out: (rows, columns) float64, written.
-    """
+    """Fill a float64 matrix with deviates of N(0, 1); the entity of each is its place, row after row."""
     rows, columns = out.shape
     for row in range(rows):
         for column in range(columns):

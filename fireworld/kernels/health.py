@@ -38,19 +38,9 @@ def harm(
 ) -> float:
     """Hurt the people inside burning buildings and let all hurt people lose health; MODEL 3.
 
-    Args:
-        building: (p,) int32 building each person is in, -1 outdoors.
-        hp: (p,) int32 health points; changed.
-        damage: (p,) float64 health points lost per step; changed.
-        fieryness: (n,) codes of the buildings.
-        constants: the damage model.
-        share: part of the damage that these people take (brigades are protected).
-        seed: seed of the run.
-        step: simulated step.
-        first: entity number of the first person, for the draws.
-
-    Returns:
-        The sum of the damage draws and noise, by which runs with different draws differ.
+    Per person, (p,): int32 building, -1 outdoors; int32 health points and float64 points lost per step, both changed.
+    `share` is the part of the damage that they take (brigades are protected), `first` the entity of the first, for the
+    draws. Returns the sum of the damage draws and noise, by which runs with different draws differ.
     """
     total = 0.0
     for person in range(len(hp)):

@@ -16,14 +16,10 @@ NO_CHOICE, GREEDY, EXPLORED, KEPT = 0, 1, 2, 3
 
 @inner
 def value_of(rule: int, values: Array, action: int, epsilon: float) -> float:
-    """Return what the next state is worth to the rule of learning.
+    """Return what the next state, of (4,) values, is worth to the rule of learning.
 
-    Args:
-        rule: SARSA: the value of the action taken; expected SARSA: the mean over the epsilon-greedy choice; Q-learning:
-            the highest value.
-        values: (4,) values of the next state.
-        action: the action taken there.
-        epsilon: probability of a random action.
+    SARSA: the value of the action taken; expected SARSA: the mean over the epsilon-greedy choice; Q-learning: the
+    highest.
     """
     if rule == SARSA:
         return values[action]
@@ -54,16 +50,7 @@ def update(brigade: int, table: int, next_value: float, learner: Learner) -> Non
 
 @kernel
 def choose_and_learn(brigade: int, table: int, state: int, action: int, epsilon: float, learner: Learner) -> None:
-    """Learn from the choice before, now that the next is known, and remember this one.
-
-    Args:
-        brigade: who has chosen.
-        table: its table.
-        state: row of the table it is in.
-        action: what it has chosen.
-        epsilon: probability of a random action.
-        learner: tables and memory; changed.
-    """
+    """Learn from the choice before, now that the next is known, and remember this one. `state`: a row of the table."""
     value = value_of(learner.rule[0], learner.tables[table, state], action, epsilon)
     update(brigade, table, value, learner)
     learner.state[brigade], learner.action[brigade] = state, action

@@ -70,16 +70,10 @@ def observe(
 ) -> int:
     """Write the eight features that a brigade sees and return its state; -1 (features 0) without a site. MODEL 5.
 
-    Given `brigades.action`, into which choices are written one after another, the flags are what the others chose:
-    those before it in this step, those after it in the last one.
-
-    Args:
-        brigade: who looks.
-        actions: (b,) what the brigades do, -1 nothing; a target of one's own has no flag.
-        site_of: (b,) number of each brigade's fire site.
-        sites: fire sites of the moment.
-        constants: thresholds.
-        features: (8,) int64, written.
+    `features` is (8,) int64, written. `actions` (b,) are what the brigades do, -1 nothing; a target of one's own has no
+    flag. Given `brigades.action`, into which choices are written one after another, the flags are what the others
+    chose: those before it in this step, those after it in the last one. `site_of` (b,) are the numbers of their fire
+    sites.
     """
     for k in range(N_FEATURES):
         features[k] = 0
@@ -134,12 +128,5 @@ def find_target(
 
 @kernel
 def can_choose(brigade: int, hp: Array, refilling: Array, site_counts: Array) -> bool:
-    """Return whether a brigade picks an action: alive, not refilling, something burns.
-
-    Args:
-        brigade: which one.
-        hp: (b,) health points of the team.
-        refilling: (b,) 1 from an empty tank until it is full.
-        site_counts: (3,) `SiteState.counts`.
-    """
+    """Return whether a brigade picks an action: alive, not refilling, something burns, by `SiteState.counts`."""
     return hp[brigade] > 0 and refilling[brigade] == 0 and site_counts[0] > 0

@@ -42,20 +42,10 @@ def describe_building(
     power: int,
     out: Array,
 ) -> None:
-    """Write the features of a burning building that are the same for every brigade; MODEL 7.
+    """Write the features of a burning building that are the same for every brigade, (7,) float64; MODEL 7.
 
-    Only arithmetic and roots: they give the same bits on every machine.
-
-    Args:
-        b: the building.
-        buildings: the city's.
-        links: radiation between them.
-        geometry: their sizes.
-        fire: heat, fuel, water and codes of the moment.
-        sites: how far each burning building is from a civilian.
-        fire_constants: heat that water takes.
-        power: litres that a brigade sprays in a step.
-        out: (7,) float64, written.
+    Only arithmetic and roots: they give the same bits on every machine. `power`: litres that a brigade sprays in a
+    step.
     """
     capacity = buildings.capacity[b]
     out[0] = fire.energy[b] / capacity / DEGREES
@@ -88,17 +78,9 @@ def value_of_target(
     geometry: GeometryArrays,
     range_square: float,
 ) -> float:
-    """Return a brigade's value of a building: its weighted features, those of the brigade and the team included.
+    """Return a brigade's value of a building: its features, those of the brigade and the team, by the (17,) weights.
 
-    Args:
-        brigade: who looks.
-        b: the building.
-        known: (b,) what the brigades go for, -1 nothing.
-        weights: (17,) of the ranking.
-        described: (7,) features of the building.
-        brigades: the team, with what each went for in the last step.
-        geometry: where the buildings are.
-        range_square: of the pumps, mm^2.
+    `known` (b,) is what the brigades go for, -1 nothing; `described` (7,) the building's features; the range in mm^2.
     """
     value = 0.0
     for k in range(N_OF_BUILDING):
@@ -151,24 +133,10 @@ def rank(
     name a target of its own, all burning buildings of its site are instead, and its action is OWN_TARGET. Ties: the
     lowest action, the lowest building id.
 
-    Args:
-        brigade: who chooses.
-        own: it may name a target of its own.
-        step: of the moment; what is known of a building is worked out once a step.
-        known: (b,) what the brigades go for, as far as this one knows, -1 nothing.
-        weights: (17,) of the ranking.
-        described: (n, 7) float64, scratch.
-        described_at: (n,) int64, scratch: the step that a row of it is of; -1 at first.
-        brigades: the team.
-        buildings: the city's.
-        links: radiation between them.
-        geometry: where they are and how big.
-        fire: of the moment.
-        sites: fire sites of the moment.
-        fire_constants: heat that water takes.
-        brigade_constants: litres that a brigade sprays in a step, and how far.
-        values: (5,) float64, written: of the four targets, without the weights of the actions where it may name its
-            own, and of the one chosen.
+    `weights` (17,) are the ranking's, `known` (b,) what the brigades go for, as far as this one knows, -1 nothing. What
+    is known of a building is worked out once a step: in `described` (n, 7) float64, each row in the step of
+    `described_at` (n,) int64, -1 at first. Written: `values` (5,) float64, of the four targets, without the weights of
+    the actions where it may name its own, and of the one chosen.
     """
     best_action, best = np.int64(-1), np.int64(-1)
     site = site_place(brigade, brigades.site, sites)

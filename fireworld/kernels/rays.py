@@ -67,12 +67,9 @@ def meet(walls: WallTable, w: int, px: int, py: int, rx: int, ry: int) -> float:
 
 @inner
 def first_hit(walls: WallTable, grid: WallGrid, source: int, px: int, py: int, rx: int, ry: int) -> int:
-    """Find the first wall other than `source` on the way from (px, py) to (px + rx, py + ry).
+    """Return the first wall other than `source` on the way from (px, py) to (px + rx, py + ry), MISS if there is none.
 
     Walks from cell to cell of the grid until a wall is met no farther than the edge of the cell.
-
-    Returns:
-        Index of the wall, MISS if there is none.
     """
     cell_x, cell_y = (px - grid.x_mm) // grid.side_mm, (py - grid.y_mm) // grid.side_mm
     step_x, step_y = (1 if rx > 0 else -1), (1 if ry > 0 else -1)
@@ -104,35 +101,11 @@ def first_hit(walls: WallTable, grid: WallGrid, source: int, px: int, py: int, r
     return best
 
 
-@making_arrays
-def first_hits(walls: WallTable, grid: WallGrid, source: Array, start: Array, end: Array) -> Array:
-    """Find the first wall that each of r given rays meets.
-
-    Args:
-        walls: the walls.
-        grid: the same walls in cells.
-        source: (r,) wall that each ray leaves from.
-        start: (r, 2) int64 start of each ray, mm.
-        end: (r, 2) int64 end of each ray, mm.
-
-    Returns:
-        (r,) int64 index of a wall, MISS if there is none.
-    """
-    hits = np.empty(len(source), dtype=np.int64)
-    for r in range(len(source)):
-        px, py = start[r, 0], start[r, 1]
-        hits[r] = first_hit(walls, grid, source[r], px, py, end[r, 0] - px, end[r, 1] - py)
-    return hits
-
-
 @inner
 def random_ray(walls: WallTable, w: int, key: np.uint64, range_mm: int) -> tuple[int, int, int, int]:
-    """Draw a ray from a random point of wall w in a random direction of the full circle.
+    """Draw a ray from a random point of wall w in a random direction: its start and the way from there to its end, mm.
 
     The direction is a random point of the disc, stretched to the circle: no sine, which differs between processors.
-
-    Returns:
-        px, py, rx, ry: the start and the way from there to the end, mm.
     """
     place = uniform_of(key)
     px = walls.x[w] + math.floor(place * walls.dx[w])
@@ -154,19 +127,10 @@ def count_hits(
 ) -> tuple[Array, Array, Array]:
     """Send the rays of all walls and count, for every building, which others they hit.
 
-    A building's rays are numbered across its walls and keyed by its identifier, so they are the same whatever else
-    the city holds.
-
-    Args:
-        walls: the walls, building by building.
-        grid: the same walls in cells.
-        building_id: (n,) int64 identifiers.
-        seed: of the draws.
-        range_mm: length of a ray.
-
-    Returns:
-        ptr (n+1,), building (links,) and hits (links,), all int64: as CSR, the buildings that each building's rays
-        hit, in the order of the first hit, and how often. Rays that hit nothing or their own building are left out.
+    A building's rays are numbered across its walls and keyed by its identifier, (n,) int64, so they are the same
+    whatever else the city holds. Returns ptr (n+1,), building (links,) and hits (links,), all int64: as CSR, the
+    buildings that each building's rays hit, in the order of the first hit, and how often. Rays that hit nothing or
+    their own building are left out.
     """
     n = len(building_id)
     n_rays = 0

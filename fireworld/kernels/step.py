@@ -38,16 +38,6 @@ def finish_step(
     """Act, burn, hurt, assess: carry out what the brigades decided, and compute what the step is worth.
 
     Takes what it needs of the world, group by group: every array that Python hands over costs time.
-
-    Args:
-        city: the city's arrays.
-        fire: changed.
-        civilians: changed.
-        brigades: the team, with its decisions; changed.
-        outcome: written.
-        constants: of the model.
-        seed: seed of the run.
-        step: simulated step.
     """
     outcome.water[0] += act(brigades, fire, city.streets, city.geometry, constants.brigades)
     outcome.draws[0] = draw_burn_rates(city.buildings, fire, constants.fire, seed, step)

@@ -1,31 +1,43 @@
-"""The planner: every few steps, the joint assignment of actions that comes out best in rollouts."""
+"""The planner: every few steps, the joint assignment of actions that comes out best on copies of the world.
+
+An assignment is tried out in rollouts; the search starts from the best of a few and changes one brigade's action at a
+time.
+"""
 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable, Iterable
 from dataclasses import astuple, dataclass
 from typing import Final
 
 from fireworld.errors import PolicyError, expected
 from fireworld.kernels.arrays import CityArrays, WorldState
-from fireworld.planning.forecast import BURNING_COST, Assignment, Forecast
-from fireworld.planning.search import action_values, climb
+from fireworld.policy.kernel import always
 from fireworld.policy.protocol import Decision, Observation, Policy
 from fireworld.records import ACTIONS
-from fireworld.simulation.state import copy_world
+from fireworld.simulation.state import NO_LEARNER, copy_into, copy_world, score_of
+
+Assignment = tuple[int, ...]
+"""(b,) the action of each brigade."""
+Value = Callable[[Assignment], float]
 
 OPTION_MAX: Final = 1000
+FIRST_SEED: Final = 1 << 32
+"""Seeds of runs lie below, those of rollouts at and above: no plan knows the random draws of the run."""
+BURNING_COST: Final = 0.005
+"""Cost of a building that still burns at the end of a rollout, as a share of the maximal score."""
 
 
 @dataclass(frozen=True)
 class PlannerOptions:
     """How far, how often and with how many rollouts the planner looks ahead; whole numbers from 1 to 1000."""
 
-    horizon: int = 30
+    horizon: int
     """Steps of a rollout."""
-    interval: int = 4
+    interval: int
     """Steps for which a plan is followed."""
-    rollouts: int = 1
+    rollouts: int
     """Rollouts of each assignment, each with random draws of its own."""
 
     def __post_init__(self) -> None:
@@ -36,6 +48,74 @@ class PlannerOptions:
                 raise PolicyError(expected("--policy", f"planner:{name}", wanted, number))
 
 
+class Forecast:
+    """Values of assignments at one moment; each is computed once, in rollouts that overwrite a copy of the world.
+
+    All assignments see the same random draws, so their values differ by what the brigades do, not by chance.
+    """
+
+    def __init__(self, observation: Observation, copy: WorldState, options: PlannerOptions) -> None:
+        self._observation, self._copy, self._options = observation, copy, options
+        self._policy = always(0).for_brigades(len(observation.world.brigades.action))
+        self._values: dict[Assignment, float] = {}
+
+    def value(self, assignment: Assignment) -> float:
+        """Return the value of an assignment that all brigades follow until the horizon: a mean over the rollouts.
+
+        score / maximal score - 0.005 * burning buildings, at the end of the rollout. The second term stands for the
+        further cost of the fire that is left.
+        """
+        held = self._values.get(assignment)
+        if held is None:
+            self._policy.action[:] = assignment
+            n_rollouts, total = self._options.rollouts, 0.0
+            for rollout in range(n_rollouts):
+                total += self._roll_out(self._observation.step * n_rollouts + rollout)
+            held = self._values[assignment] = total / n_rollouts
+        return held
+
+    def _roll_out(self, number: int) -> float:
+        from fireworld.kernels.episode import run_episode  # the largest kernel: compiled only where it is used
+
+        moment, copy = self._observation, self._copy
+        copy_into(copy, moment.world)
+        seed, last_step = FIRST_SEED + number, moment.step + self._options.horizon - 1
+        run_episode(moment.city, copy, moment.constants, self._policy, NO_LEARNER, seed, moment.step, last_step)
+        score = score_of(copy)
+        return score.score / score.score_max - BURNING_COST * score.n_burning
+
+
+def with_action(assignment: Assignment, brigade: int, action: int) -> Assignment:
+    """Return an assignment in which one brigade takes another action."""
+    return (*assignment[:brigade], action, *assignment[brigade + 1 :])
+
+
+def action_values(value: Value, assignment: Assignment, brigade: int) -> tuple[float, ...]:
+    """Return the values of a brigade's four actions while the others follow the assignment."""
+    return tuple(value(with_action(assignment, brigade, action)) for action in range(len(ACTIONS)))
+
+
+def climb(value: Value, starts: Iterable[Assignment]) -> Assignment:
+    """Return an assignment that no brigade can improve alone: coordinate ascent.
+
+    The best start (ties: the lowest assignment) is improved brigade after brigade, until a whole round changes
+    nothing. A change must be worth strictly more, so the climb ends; equal changes: the lowest action. The number of
+    values grows with the number of brigades, that of all assignments as its power.
+    """
+    best = max(sorted(starts), key=value)
+    n_settled = 0
+    brigade = 0
+    while n_settled < len(best):
+        values = action_values(value, best, brigade)
+        action = values.index(max(values))
+        if values[action] > values[best[brigade]]:
+            best = with_action(best, brigade, action)
+            n_settled = 0
+        n_settled += 1
+        brigade = (brigade + 1) % len(best)
+    return best
+
+
 class Planner(Policy):
     """Tries out joint assignments of actions in copies of the world, through the kernels that run the world itself.
 
@@ -44,8 +124,8 @@ class Planner(Policy):
     plan.
     """
 
-    def __init__(self, options: PlannerOptions | None = None) -> None:
-        self.options = options if options is not None else PlannerOptions()
+    def __init__(self, *, horizon: int = 30, interval: int = 4, rollouts: int = 1) -> None:
+        self.options = PlannerOptions(horizon, interval, rollouts)
         self.digest = hashlib.sha256(repr((astuple(self.options), BURNING_COST)).encode()).hexdigest()
         self._room: WorldState | None = None
         self._planned_at = -1
@@ -72,20 +152,10 @@ class Planner(Policy):
         if self._room is None:
             self._room = copy_world(observation.world)
         self._planned_at = observation.step
-        options, n_brigades = self.options, len(observation.world.brigades.action)
-        forecast = Forecast(observation, self._room, horizon=options.horizon, rollouts=options.rollouts)
+        n_brigades = len(observation.world.brigades.action)
+        forecast = Forecast(observation, self._room, self.options)
         starts = [(action,) * n_brigades for action in range(len(ACTIONS))]
         if self._plan:
             starts.append(self._plan)
         self._plan = climb(forecast.value, starts)
         self._values = tuple(action_values(forecast.value, self._plan, brigade) for brigade in range(n_brigades))
-
-
-def planner(
-    *,
-    horizon: int = PlannerOptions.horizon,
-    interval: int = PlannerOptions.interval,
-    rollouts: int = PlannerOptions.rollouts,
-) -> Planner:
-    """Return a planner, by its parameters on the command line; errors as for `PlannerOptions`."""
-    return Planner(PlannerOptions(horizon, interval, rollouts))

@@ -34,11 +34,7 @@ Value = TypeVar("Value")
 
 
 class Adapted(Policy):
-    """A policy made of what a user brought; what that lacks of a policy's methods is the default.
-
-    Attributes:
-        given: an object with a method `decide`, or a function of the observation.
-    """
+    """A policy made of what a user brought; what that lacks of a policy's methods is the default."""
 
     def __init__(self, given: Any) -> None:
         self.given = given
@@ -55,15 +51,7 @@ class Adapted(Policy):
 
 
 def complete(given: Any, *, where: str = "policy") -> Policy:
-    """Return a policy with all of a policy's methods: the one given, or one that calls it.
-
-    Args:
-        given: an object with a method `decide`, or a function of the observation.
-        where: what errors call it.
-
-    Raises:
-        PolicyError: what is given has no method `decide` and is no function.
-    """
+    """Return the policy given, or one that calls it and has all of a policy's methods; errors begin with `where`."""
     if Policy in type(given).__mro__:
         policy: Policy = given
         return policy
@@ -74,21 +62,13 @@ def complete(given: Any, *, where: str = "policy") -> Policy:
 
 
 def begin(policy: Policy, city: CityArrays, *, n_brigades: int, seed: int) -> None:
-    """Let a policy prepare for a run.
-
-    Raises:
-        PolicyError: the policy's own `begin` fails.
-    """
+    """Let a policy prepare for a run; raise PolicyError if its own `begin` fails."""
     with users_code(policy, "begin"):
         complete(policy).begin(city, n_brigades, seed)
 
 
 def ask(policy: Policy, observation: Observation) -> Decision:
-    """Return a policy's decision, checked and in plain Python values.
-
-    Raises:
-        PolicyError: the policy fails, or answers with something that is no decision.
-    """
+    """Return a policy's decision, checked and in plain Python values; PolicyError if it fails or makes no sense."""
     try:
         return _checked(policy.decide(observation), policy, observation)
     except PASSING:
@@ -98,11 +78,7 @@ def ask(policy: Policy, observation: Observation) -> Decision:
 
 
 def keeps(policy: Policy, brigade: int, last_action: int, step: int) -> bool:
-    """Return whether a policy lets a brigade repeat its last action; False if it has none.
-
-    Raises:
-        PolicyError: the policy's own `keeps` fails.
-    """
+    """Return whether a policy lets a brigade repeat its last action, False if it has none; PolicyError if it fails."""
     try:
         return last_action >= 0 and bool(policy.keeps(brigade, last_action, step))
     except PASSING:
@@ -115,9 +91,7 @@ def keeps(policy: Policy, brigade: int, last_action: int, step: int) -> bool:
 def users_code(what: object, moment: str) -> Iterator[None]:
     """Turn whatever a user's code raises into a PolicyError; only Ctrl-C and fireworld's own errors pass.
 
-    Args:
-        what: a policy, or what the message begins with.
-        moment: when the code runs, which the message says next.
+    Its message begins with `what`, a policy or words, and says next the `moment` in which the code runs.
     """
     try:
         yield

@@ -15,19 +15,16 @@ from fireworld.records import ACTIONS
 HIGH: Final = 2
 
 
-def rule(distance_from_civilian: int, *, others_protect: bool) -> Action:
-    """Return an action: protect civilians near the fire, unless another brigade does; else fight the front."""
-    if distance_from_civilian < HIGH and not others_protect:
-        return Action.NEAREST_TO_CIVILIAN
-    return Action.NEAREST_TO_ME
-
-
 def chief_table() -> Array:
-    """Return the rule as a table of action values, (4320, 4): 1 for the action it names, 0 for the others."""
+    """Return the rule as a table of action values, (4320, 4): 1 for the action it names, 0 for the others.
+
+    A brigade protects civilians near the fire, unless another one does; else it fights the front.
+    """
     table = np.zeros((N_STATES, len(ACTIONS)))
     for state in range(N_STATES):
-        features = features_of(state)
-        table[state, rule(features[2], others_protect=bool(features[5]))] = 1.0
+        _, _, distance_from_civilian, _, _, others_protect, *_ = features_of(state)
+        protects = distance_from_civilian < HIGH and not others_protect
+        table[state, Action.NEAREST_TO_CIVILIAN if protects else Action.NEAREST_TO_ME] = 1.0
     return table
 
 

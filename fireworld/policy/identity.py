@@ -36,12 +36,7 @@ class _UntoldError(Exception):
 
 
 def covering(digest: str, values: Any) -> str:
-    """Return a digest that covers another one and values; the other one itself if there are none.
-
-    Args:
-        digest: of a source; "" if there is none.
-        values: what JSON can hold.
-    """
+    """Return a digest that covers another one, "" if there is none, and values that JSON can hold, if there are any."""
     if not (digest and values):
         return digest
     return hashlib.sha256(json.dumps([digest, values], sort_keys=True).encode()).hexdigest()
@@ -145,8 +140,10 @@ def _members(kind: type, seen: set[int]) -> Iterator[Any]:
     for name, member in vars(kind).items():
         if name in _NO_MEMBERS or isinstance(member, GetSetDescriptorType | MemberDescriptorType):
             continue
-        if name.startswith("__") and not (isinstance(member, FunctionType) and _has_text(inspect.unwrap(member))):
-            continue  # Python's own, or made by @dataclass of what is seen here anyway
+        if name.startswith("__"):  # most are Python's own, or made by @dataclass of what is seen here anyway
+            source: Any = inspect.unwrap(member) if isinstance(member, FunctionType) else None
+            if source is None or not linecache.getlines(source.__code__.co_filename):
+                continue
         within = [getattr(member, part) for part in _WITHIN.get(type(member), ())] or [member]
         yield [name, type(member).__name__, [_plain(part, seen) for part in within]]
 
@@ -157,10 +154,6 @@ def _globals_of(code: CodeType) -> list[str]:
     for inner in code.co_consts:
         names += _globals_of(inner) if isinstance(inner, CodeType) else []
     return sorted(set(names))
-
-
-def _has_text(function: Any) -> bool:
-    return bool(linecache.getlines(function.__code__.co_filename))
 
 
 def _text_of(code: CodeType) -> str:

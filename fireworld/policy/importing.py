@@ -37,11 +37,7 @@ class _Loader(SourceFileLoader):
 
 
 def import_source(source: str) -> ModuleType:
-    """Import a module by its name, as seen from the current folder, or a file by its path.
-
-    Raises:
-        PolicyError: there is none, or its code fails.
-    """
+    """Import a module by its name, as seen from the current folder, or a file by its path; PolicyError if it fails."""
     if source.endswith(CODE_SUFFIX):
         return _import_file(Path(source))
     _find_first_in(Path.cwd())
@@ -51,11 +47,7 @@ def import_source(source: str) -> ModuleType:
 
 
 def find_in(module: ModuleType, target: str, *, where: str) -> Any:
-    """Return the class, function or object of that name in a module; without a name, its only policy class.
-
-    Raises:
-        PolicyError: no such name, or no policy class, or several.
-    """
+    """Return the class, function or object of that name in a module; without a name, its only policy class."""
     classes = [name for name, one in vars(module).items() if _is_policy_class(name, one, module)]
     if not target:
         if len(classes) != 1:
@@ -72,14 +64,7 @@ def find_in(module: ModuleType, target: str, *, where: str) -> Any:
 def make_policy(thing: Any, parameters: Parameters, *, where: str, as_function: bool = False) -> Policy:
     """Make a policy of a class, of a function that returns one, of a function of the observation, or of an object.
 
-    Args:
-        thing: one of these.
-        parameters: what the class or function takes as keywords.
-        where: what errors call it.
-        as_function: a function that takes an observation is a policy, even if it could be called without one.
-
-    Raises:
-        PolicyError: it does not take the parameters, or fails, or what it makes is no policy.
+    `as_function`: a function that takes an observation is a policy, even if it could be called without one.
     """
     if not (inspect.isclass(thing) or isinstance(thing, FunctionType)):
         check_no_parameters(parameters, where=where)

@@ -25,7 +25,6 @@ from fireworld.policy.protocol import Decision, Observation, Policy
 from fireworld.records import ACTIONS
 
 NO_TABLES: Final = np.zeros((1, 1, 4))
-NO_RANKINGS: Final = np.zeros((1, N_WEIGHTS))
 
 
 @dataclass
@@ -43,7 +42,7 @@ class KernelPolicy(Policy):
     epsilon: float = 0.0
     commit: int = 1
     """Steps for which a choice is repeated."""
-    rankings: Array = field(default_factory=NO_RANKINGS.copy)
+    rankings: Array = field(default_factory=lambda: np.zeros((1, N_WEIGHTS)))
     """(rankings, 17) float64, weights."""
     stateless = True
     _ready: PolicyArrays | None = field(default=None, init=False, repr=False, compare=False)
@@ -153,24 +152,13 @@ def at_random() -> KernelPolicy:
 
 
 def from_tables(tables: Array, *, epsilon: float = 0.0, commit: int = 1) -> KernelPolicy:
-    """Return the policy that follows one table per brigade.
-
-    Args:
-        tables: (tables, 4320 or 270, 4) values.
-        epsilon: probability of a random action.
-        commit: steps for which a choice is repeated.
-    """
+    """Return the policy that follows one table per brigade, (tables, 4320 or 270, 4) values."""
     n = len(tables)
     return KernelPolicy((TABLE,) * n, (0,) * n, tuple(range(n)), tables, epsilon, commit)
 
 
 def from_rankings(rankings: Array, *, own_targets: bool) -> KernelPolicy:
-    """Return the policy that follows one ranking of targets per brigade, or one for all.
-
-    Args:
-        rankings: (rankings, 17) weights.
-        own_targets: brigades go for any burning building of their site, not only for the four that actions name.
-    """
+    """Return the policy that follows one ranking of targets per brigade, or one for all, (rankings, 17) weights."""
     n = len(rankings)
     kind = RANK_ALL if own_targets else RANK_NAMED
     return KernelPolicy((kind,) * n, (0,) * n, tuple(range(n)), NO_TABLES, rankings=rankings)

@@ -12,7 +12,6 @@ from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 from pkgutil import resolve_name
-from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
 
 from fireworld.errors import PolicyError, expected
@@ -30,8 +29,8 @@ from fireworld.policy.parameter_text import (
     write_parameters,
 )
 from fireworld.policy.protocol import Policy
+from fireworld.policy.teams import team_names, team_path
 from fireworld.policy.teams.npz import SUFFIX, read_bytes
-from fireworld.policy.teams.shipped import team_names, team_path
 from fireworld.policy.teams.team import Team, load_team, parse_team
 from fireworld.records import ACTIONS
 
@@ -52,8 +51,8 @@ RULES: Final = {
     "chief": "one protects civilians, the others the front",
 }
 """What each rule does."""
-PLANNERS: Final = {"planner": "fireworld.planning.planner:planner"}
-"""Where the functions are that make planners: they use the world, which this layer does not know."""
+PLANNERS: Final = {"planner": "fireworld.planning.planner:Planner"}
+"""Where the classes of planners are: they use the world, which this layer does not know."""
 TEAM_ATTACHMENT: Final = "policy.npz"
 """What a recording calls the team file that its brigades followed."""
 _FILE: Final = re.compile(rf"(.+?(?:{re.escape(CODE_SUFFIX)}|{re.escape(SUFFIX)}))(?::(.*))?", re.DOTALL)
@@ -135,18 +134,10 @@ class NamedPolicy:
 
 
 def find_policy(given: object, *, parameters: Parameters | None = None) -> NamedPolicy:
-    """Return a policy by what a user gives.
+    """Return a policy by what a user gives: a name, as docs/policies.md has them, a class, an object or a function.
 
-    Args:
-        given: the name of a policy or team that comes with fireworld, or a team file; FILE.py:CLASS or MODULE:CLASS,
-            without the class where there is only one, and instead of it also a function that returns a policy, a
-            function of the observation, or an object; all of these with parameters, as in `mine.py:Mine:k=3,near=true`.
-            Or a class, an object with a method `decide`, a function of the observation, a team, or a NamedPolicy.
-        parameters: plain values that the class or function takes as keywords; more of them, if `given` has some.
-
-    Raises:
-        PolicyError: there is no such policy, it does not take the parameters, or making it fails.
-        TrainingError: a team file that cannot be read or makes no sense.
+    The parameters, plain values, are keywords of the class or function; more of them, if the name has some. Raises
+    PolicyError if there is no such policy, or making it fails, TrainingError for a team file that makes no sense.
     """
     if isinstance(given, NamedPolicy | Team):
         named = given if isinstance(given, NamedPolicy) else _named_team(given)
@@ -190,10 +181,7 @@ def with_file(name: str, changed: Callable[[str], str]) -> str:
 def note_on_team(named: NamedPolicy, n_brigades: int, *, choices: str = "") -> str:
     """Return how a team is used differently from its training, a line each; nothing about other policies.
 
-    Args:
-        named: the policy.
-        n_brigades: brigades of the scenario.
-        choices: of the scenario; left out, they are not compared.
+    The scenario's `choices` are compared unless they are left out.
     """
     if TEAM_ATTACHMENT not in named.attachments or not isinstance(named.policy, KernelPolicy):
         return ""
@@ -263,13 +251,8 @@ def _team_by_name(source: str) -> NamedPolicy:
 
 def _named_team(team: Team, content: bytes = b"") -> NamedPolicy:
     """Return the policy of a team, with its file."""
-    if not content:
-        with TemporaryDirectory() as folder:
-            path = Path(folder) / TEAM_ATTACHMENT
-            team.save(path)
-            content = path.read_bytes()
-    policy = team.policy()
-    return NamedPolicy("team", policy.digest, policy, {TEAM_ATTACHMENT: content}, team.choices, given=team)
+    policy, attachments = team.policy(), {TEAM_ATTACHMENT: content or team.to_bytes()}
+    return NamedPolicy("team", policy.digest, policy, attachments, team.choices, given=team)
 
 
 def _unknown(name: str) -> PolicyError:

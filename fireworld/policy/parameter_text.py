@@ -23,15 +23,7 @@ _BARE: Final = re.compile(r"[A-Za-z_./][\w./+-]*")
 
 
 def read_parameters(text: str, *, where: str) -> dict[str, Any]:
-    """Return the parameters that a text says; values are YAML scalars and lists, nothing is evaluated.
-
-    Args:
-        text: as in "k=3,near=true,name='a, b',weights=[1, 2]"; empty: none.
-        where: what errors call the policy.
-
-    Raises:
-        PolicyError: the text has another form, or says a name twice.
-    """
+    """Return the parameters that a text says, as in "k=3,near=true,name='a, b'"; YAML values, nothing is evaluated."""
     values: dict[str, Any] = {}
     at = 0
     while at < len(text):
@@ -52,11 +44,7 @@ def write_parameters(parameters: Parameters) -> str:
 
 
 def check_plain(parameters: Parameters, *, where: str) -> dict[str, Any]:
-    """Return parameters given in Python, as plain values.
-
-    Raises:
-        PolicyError: a name is no word, or a value could not stand on the command line.
-    """
+    """Return parameters given in Python as plain values; PolicyError for what could not stand on the command line."""
     for name, value in parameters.items():
         if not (isinstance(name, str) and name.isidentifier()):
             raise PolicyError(expected(where, "", "names of parameters", name))

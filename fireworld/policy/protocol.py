@@ -43,6 +43,11 @@ class Decision:
     epsilon: float = 0.0
 
 
+def named_target(brigade: int, action: int, city: CityArrays, world: WorldState) -> int:
+    """Return the building that one of the four actions names for a brigade, -1 without a site."""
+    return int(find_target(brigade, action, world.brigades, city.buildings, world.fire, city.geometry, world.sites))
+
+
 @dataclass(frozen=True)
 class Observation:
     """What one brigade sees before it decides: the eight features, and on demand everything the team knows."""
@@ -75,8 +80,8 @@ class Observation:
     @cached_property
     def targets(self) -> tuple[int, int, int, int]:
         """The building that each of the four actions names."""
-        named = [self._target(action) for action in range(4)]
-        return named[0], named[1], named[2], named[3]
+        one, two, three, four = (named_target(self.brigade, action, self.city, self.world) for action in range(4))
+        return one, two, three, four
 
     @cached_property
     def burning(self) -> NDArray[np.uint32]:
@@ -85,19 +90,6 @@ class Observation:
         place = int(site_place(self.brigade, self.world.brigades.site, sites))
         here: NDArray[np.uint32] = sites.member[sites.start[place] : sites.start[place + 1]]
         return here if place >= 0 else here[:0]
-
-    def _target(self, action: int) -> int:
-        return int(
-            find_target(
-                self.brigade,
-                action,
-                self.world.brigades,
-                self.city.buildings,
-                self.world.fire,
-                self.city.geometry,
-                self.world.sites,
-            )
-        )
 
     @cached_property
     def temperature(self) -> NDArray[np.float64]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from fireworld.errors import PolicyError, expected
@@ -44,21 +43,8 @@ def features_of(state: int) -> tuple[int, ...]:
     return tuple(reversed(found))
 
 
-def state_of(features: Sequence[int]) -> int:
-    """Return the state of eight features."""
-    state = 0
-    for feature, value in zip(FEATURES, features, strict=True):
-        state = state * len(feature.values) + value
-    return state
-
-
 def describe_state(state: int, *, with_others: bool = True) -> str:
-    """Return in words what a brigade sees in a state.
-
-    Args:
-        state: 0..4319.
-        with_others: include what the other brigades do, which a table of 270 states does not see.
-    """
+    """Return in words what a brigade sees in a state 0..4319; a table of 270 states does not see what the others do."""
     edges, center, civilian, volume, *others = features_of(state)
     fire = (
         f"free to spread over {edges} side{'' if edges == 1 else 's'}, distance from center {LEVELS[center]}, "
@@ -80,11 +66,7 @@ def short_state(state: int, *, with_others: bool = True) -> str:
 
 
 def find_states(text: str) -> list[int]:
-    """Return the states that a user names: by a number, or by features as in "free_edges=3,volume=high".
-
-    Raises:
-        PolicyError: no such state, feature or value.
-    """
+    """Return the states that a user names: by a number, or by features as in "free_edges=3,volume=high"."""
     if text.strip().isdecimal() and text.isascii():
         number = int(text) if len(text) < 10 else N_STATES
         if number >= N_STATES:

@@ -25,12 +25,9 @@ class Fault(NamedTuple):
 
 
 def find_faults(value: object, kind: inspect.Type, key: str = "") -> Iterator[Fault]:
-    """Yield what in a document does not fit a type, in the order of the document.
+    """Yield what in a document, as a YAML or JSON reader returned it, does not fit a type, in the document's order.
 
-    Args:
-        value: what a YAML or JSON reader returned.
-        kind: the type it should have, of `msgspec.inspect.type_info`.
-        key: dotted path of the value in the document.
+    `key` is the dotted path of the value in the document.
     """
     kind = bare(kind)
     if isinstance(kind, inspect.UnionType):

@@ -144,16 +144,9 @@ class Scenario(Document, frozen=True, kw_only=True):
 
 
 def parse_scenario(text: bytes | str, *, source: str, folder: Path | None = None) -> Scenario:
-    """Read a scenario from YAML.
+    """Read a scenario from YAML; ScenarioError, which names the source, if it makes no sense.
 
-    Args:
-        text: the YAML.
-        source: the file to name in errors.
-        folder: where city files are relative to; None leaves their names as written, for a scenario whose city
-            comes with it in a recording.
-
-    Raises:
-        ScenarioError: broken YAML, or a scenario that makes no sense.
+    City files are relative to the folder; None leaves their names as written, where the city comes with a recording.
     """
     document = read_yaml(text, source=source)
     if not isinstance(document, dict):
@@ -163,11 +156,7 @@ def parse_scenario(text: bytes | str, *, source: str, folder: Path | None = None
 
 
 def to_plain(values: Mapping[str, Any], *, source: str) -> dict[str, Any]:
-    """Return values as a YAML reader would: dicts, lists, text, numbers, booleans and None.
-
-    Raises:
-        ScenarioError: there is something else among them.
-    """
+    """Return values as a YAML reader would: dicts, lists, text, numbers, booleans and None; else ScenarioError."""
     try:
         plain = msgspec.to_builtins(values, enc_hook=_plain_number)
     except (TypeError, NotImplementedError, ValueError) as error:
@@ -207,15 +196,7 @@ def scenario_of(values: Mapping[str, Any], *, source: str, folder: Path | None) 
 
 
 def read_scenario(path: Path, *, source: str | None = None) -> Scenario:
-    """Read a scenario file; its name is the file's unless it has another.
-
-    Args:
-        path: the file.
-        source: what errors call it; by default its path.
-
-    Raises:
-        ScenarioError: no such file, broken YAML, or a scenario that makes no sense.
-    """
+    """Read a scenario file; its name is the file's unless it has another. Errors name the source, else the path."""
     source = source or str(path)
     try:
         with path.open("rb") as file:
@@ -229,11 +210,7 @@ def read_scenario(path: Path, *, source: str | None = None) -> Scenario:
 
 
 def read_city_file(scenario: Scenario) -> bytes:
-    """Read the city file that a scenario names.
-
-    Raises:
-        ScenarioError: it cannot be read.
-    """
+    """Read the city file that a scenario names."""
     try:
         return Path(scenario.city.file or "").read_bytes()
     except (OSError, ValueError) as error:
@@ -242,15 +219,7 @@ def read_city_file(scenario: Scenario) -> bytes:
 
 
 def split_settings(settings: Iterable[str], *, example: str = "brigades.n=7") -> dict[str, str]:
-    """Split the command line's KEY=VALUE into what `Scenario.with_settings` takes.
-
-    Args:
-        settings: what was given.
-        example: what the error suggests.
-
-    Raises:
-        ScenarioError: no "=", or a key said twice.
-    """
+    """Split the command line's KEY=VALUE into what `Scenario.with_settings` takes; errors suggest the example."""
     values: dict[str, str] = {}
     for setting in settings:
         key, equals, text = setting.partition("=")

@@ -17,11 +17,7 @@ def scenario_names() -> list[str]:
 
 
 def load_scenario(name_or_path: str | Path) -> Scenario:
-    """Load a shipped scenario by its name, or a scenario file by its path.
-
-    Raises:
-        ScenarioError: nothing of that name, or a scenario that makes no sense.
-    """
+    """Load a shipped scenario by its name, or a scenario file by its path."""
     names = scenario_names()
     if str(name_or_path) in names:
         return read_scenario(shipped_folder() / f"{name_or_path}.yaml", source=str(name_or_path))
@@ -33,11 +29,7 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
 
 
 def find_scenario(given: str | Path | Scenario | Mapping[str, Any]) -> Scenario:
-    """Return a scenario by its name or file, or made of the keys and values of one, or itself.
-
-    Raises:
-        ScenarioError: there is none of that name, or it makes no sense.
-    """
+    """Return a scenario by its name or file, or made of the keys and values of one, or itself."""
     if isinstance(given, Scenario):
         return given
     if isinstance(given, str | Path):

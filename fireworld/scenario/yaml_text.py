@@ -98,17 +98,9 @@ _Writer.add_implicit_resolver(CORE + "float", FLOAT, None)
 
 
 def read_yaml(text: bytes | str, *, source: str) -> Any:
-    """Read one YAML document.
+    """Read one YAML document: None, bool, int, float, str, and lists and dicts (with text keys) of these.
 
-    Args:
-        text: the document; bytes must be UTF-8.
-        source: the file (or flag) to name in errors.
-
-    Returns:
-        None, bool, int, float, str, and lists and dicts (with text keys) of these.
-
-    Raises:
-        ScenarioError: the text is not the YAML that a scenario may use; names line and column.
+    Raises ScenarioError, which names source, line and column, for what is not the YAML that a scenario may use.
     """
     try:
         if isinstance(text, bytes):

@@ -6,19 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-
 from fireworld.city.build import build_city
 from fireworld.city.city import City, Plan
-from fireworld.city.record import city_record
 from fireworld.kernels.arrays import CityArrays
 from fireworld.records import CityRecord, RunHeader
 from fireworld.scenario import Scenario
 from fireworld.scenario.document import resolve_reward
 from fireworld.simulation.city_arrays import city_arrays
+from fireworld.simulation.observer import city_record
 from fireworld.simulation.placement import Placement, attachments, place, scenario_plan
-from fireworld.simulation.start import Start, prepare_start
-from fireworld.simulation.world import World
+from fireworld.simulation.world import Start, World, prepare_start
 from fireworld.version import __version__
 
 
@@ -51,30 +48,14 @@ class BuiltScenario:
         )
 
     def world(self, *, seed: int, n_steps_max: int | None = None) -> World:
-        """Start a world.
-
-        Args:
-            seed: of the run's random draws.
-            n_steps_max: last step; None: the scenario's.
-        """
+        """Start a world; its last step is the scenario's unless another is given."""
         return World(self.start, seed=seed, n_steps_max=self.scenario.steps if n_steps_max is None else n_steps_max)
 
     def city_record(self) -> CityRecord:
         """Return the city as it is recorded."""
-        parameters = self.scenario.resolved_parameters
-        n_civilians = len(self.placement.civilian_building)
-        return city_record(
-            self.city,
-            civilian_mm=self.placement.civilian_mm,
-            civilian_building=self.placement.civilian_building,
-            civilian_hp=np.full(n_civilians, parameters.health.initial_hp, dtype=np.int32),
-            n_brigades=self.n_brigades,
-            brigades=parameters.brigades,
-        )
+        return city_record(self.city, self.placement, self.scenario.resolved_parameters)
 
-    def header(
-        self, *, seed: int, policy: str, policy_digest: str, n_steps_max: int, forked_from: str = ""
-    ) -> RunHeader:
+    def header(self, *, seed: int, policy: str, policy_digest: str, n_steps_max: int) -> RunHeader:
         """Return what identifies a run of this scenario."""
         return RunHeader(
             scenario=self.scenario.name,
@@ -84,18 +65,8 @@ class BuiltScenario:
             policy_digest=policy_digest,
             fireworld_version=__version__,
             n_steps_max=n_steps_max,
-            forked_from=forked_from,
             attachments=attachments(self.scenario),
         )
-
-
-@dataclass(frozen=True)
-class BareCity:
-    """A city built, without anybody in it."""
-
-    plan: Plan
-    city: City
-    arrays: CityArrays
 
 
 class CityCache:
@@ -107,36 +78,25 @@ class CityCache:
 
     def __init__(self, files: Mapping[str, bytes] | None = None) -> None:
         self._files = files or {}
-        self._built: dict[str, BareCity] = {}
+        self._built: dict[str, tuple[Plan, City, CityArrays]] = {}
 
     def build(self, scenario: Scenario, *, city_json: bytes | None = None) -> BuiltScenario:
         """Build a scenario's city, or take it from the cache, and place everybody in it.
 
-        Args:
-            scenario: the scenario.
-            city_json: content of its city file, where it comes from a recording; None reads the file.
-
-        Raises:
-            ScenarioError: the city has not what the scenario asks for.
-            CityError: the city cannot be built.
+        `city_json` is the content of its city file, where that comes from a recording and not from the disk. Raises
+        ScenarioError if the city has not what the scenario asks for, CityError if it cannot be built.
         """
-        key = repr((scenario.city, scenario.city_sha256, scenario.resolved_parameters.fire))
-        bare = self._built.get(key)
-        if bare is None:
-            city_json = city_json or self._files.get(scenario.city_sha256 or "")
-            bare = self._built[key] = _build_bare_city(scenario, city_json=city_json)
-        return BuiltScenario(
-            scenario=scenario, city=bare.city, city_arrays=bare.arrays, placement=place(scenario, bare.plan)
-        )
+        fire = scenario.resolved_parameters.fire
+        key = repr((scenario.city, scenario.city_sha256, fire))
+        if key not in self._built:
+            content = city_json or self._files.get(scenario.city_sha256 or "")
+            plan = scenario_plan(scenario, city_json=content)
+            city = build_city(plan, fire, seed=scenario.city.ray_seed)
+            self._built[key] = plan, city, city_arrays(city, fire)
+        plan, city, arrays = self._built[key]
+        return BuiltScenario(scenario, city, arrays, place(scenario, plan))
 
 
 def build_scenario(scenario: Scenario, *, city_json: bytes | None = None) -> BuiltScenario:
-    """Build one scenario; arguments and errors as for `CityCache.build`."""
+    """Build one scenario; as `CityCache.build` does."""
     return CityCache().build(scenario, city_json=city_json)
-
-
-def _build_bare_city(scenario: Scenario, *, city_json: bytes | None) -> BareCity:
-    plan = scenario_plan(scenario, city_json=city_json)
-    fire = scenario.resolved_parameters.fire
-    city = build_city(plan, fire, seed=scenario.city.ray_seed)
-    return BareCity(plan=plan, city=city, arrays=city_arrays(city, fire))

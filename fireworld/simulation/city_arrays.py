@@ -12,7 +12,6 @@ from fireworld.kernels.arrays import (
     BrigadeConstants,
     BuildingArrays,
     CityArrays,
-    Constants,
     CoverArrays,
     FireConstants,
     GeometryArrays,
@@ -23,9 +22,7 @@ from fireworld.kernels.arrays import (
     StreetArrays,
 )
 from fireworld.kernels.fire import STEFAN_BOLTZMANN
-from fireworld.parameters import BrigadeParameters, FireParameters, HealthParameters, Parameters
-from fireworld.rewards import Reward
-from fireworld.scenario.document import Choices
+from fireworld.parameters import BrigadeParameters, FireParameters, HealthParameters
 
 CIVILIAN_LOW_M = 30.0
 CIVILIAN_MEDIUM_M = 80.0
@@ -202,24 +199,6 @@ def observation_constants(city: City, unit_volume_m3: float | None, *, in_turn: 
         civilian_medium_square=medium * medium,
         unit_volume=float(unit_volume_m3) if unit_volume_m3 is not None else 2.0 * mean_volume,
         in_turn=in_turn,
-    )
-
-
-def world_constants(
-    city: City,
-    parameters: Parameters,
-    *,
-    reward: Reward,
-    choices: Choices,
-    unit_volume_m3: float | None,
-) -> Constants:
-    """Collect all scalars of a world."""
-    return Constants(
-        fire=fire_constants(parameters.fire),
-        health=health_constants(parameters.health),
-        brigades=brigade_constants(parameters.brigades),
-        observation=observation_constants(city, unit_volume_m3, in_turn=choices == "in-turn"),
-        reward=reward,
     )
 
 

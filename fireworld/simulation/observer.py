@@ -1,20 +1,24 @@
-"""Observer: turns what a world did in a step into a StepRecord, events included."""
+"""What is recorded of a world: its city, and what it did in a step, events included."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from fireworld.city.city import City
 from fireworld.draws import STEP, hash_key
 from fireworld.kernels.arrays import DRAWS, Array
 from fireworld.kernels.brigades import REFILLING
+from fireworld.parameters import Parameters
+from fireworld.policy.words import FEATURES
 from fireworld.records import (
     EVENT_KINDS,
     SNAPSHOT_EVERY_STEPS,
     Brigades,
     Buildings,
+    CityRecord,
     Civilians,
     Decisions,
     Draws,
@@ -23,23 +27,60 @@ from fireworld.records import (
     Snapshot,
     StepRecord,
 )
+from fireworld.simulation.placement import Placement
 from fireworld.simulation.state import rewards_of, score_of, take_snapshot
 from fireworld.simulation.world import Choices, World
 
 KIND = {name: index for index, name in enumerate(EVENT_KINDS)}
 
 
-@dataclass(frozen=True)
-class _Before:
-    """What the events of the next step follow from."""
+def city_record(city: City, placement: Placement, parameters: Parameters) -> CityRecord:
+    """Return a city, and who is in it at the start, as it is recorded once a run, in metres."""
+    footprints, streets, air = city.footprints, city.streets, city.air
+    middle_x, middle_y = city.middle_mm
+    brigades, n_brigades = parameters.brigades, len(placement.brigade_refuge)
+    return CityRecord(
+        name=city.name,
+        building_id=footprints.building_id.astype(np.int32),
+        outline_ptr=footprints.outline_ptr,
+        **_in_metres("outline", footprints.outline_mm),
+        **_in_metres("center", footprints.centroid_mm),
+        floors=footprints.floors,
+        material=footprints.material,
+        inflammable=footprints.inflammable,
+        ground_area_m2=footprints.ground_area_m2,
+        volume_m3=city.volume_m3,
+        initial_fuel=city.initial_fuel,
+        heat_capacity=city.heat_capacity,
+        ignition_point=city.ignition_point,
+        wall_area_m2=city.wall_area_m2,
+        link_ptr=city.links.ptr,
+        link_building=city.links.building,
+        link_share=city.links.share,
+        **_in_metres("node", streets.node_mm),
+        street_from=np.ascontiguousarray(streets.street[:, 0]),
+        street_to=np.ascontiguousarray(streets.street[:, 1]),
+        refuge_building=np.flatnonzero(footprints.refuge).astype(np.int32),
+        **_in_metres("hydrant", streets.node_mm[streets.hydrant_node]),
+        **_in_metres("civilian", placement.civilian_mm),
+        civilian_building=placement.civilian_building,
+        civilian_hp=np.full(len(placement.civilian_building), parameters.health.initial_hp, dtype=np.int32),
+        brigade_tank_litres=np.full(n_brigades, brigades.tank_litres, dtype=np.int32),
+        brigade_power_litres=np.full(n_brigades, brigades.power_litres, dtype=np.int32),
+        brigade_range_m=np.full(n_brigades, brigades.range_m, dtype=np.float64),
+        air_origin_x_m=air.origin_mm[0] / 1000.0,
+        air_origin_y_m=air.origin_mm[1] / 1000.0,
+        air_cell_m=air.cell_mm / 1000.0,
+        air_nx=air.shape[0],
+        air_ny=air.shape[1],
+        middle_x_m=middle_x / 1000.0,
+        middle_y_m=middle_y / 1000.0,
+    )
 
-    fieryness: Array
-    civilian_hp: Array
-    civilian_damage: Array
-    brigade_hp: Array
-    brigade_damage: Array
-    tank: Array
-    refilling: Array
+
+def _in_metres(name: str, points_mm: Array) -> dict[str, Any]:
+    """Return the fields with the coordinates of points, (n, 2) whole millimetres."""
+    return {f"{name}_{axis}_m": points_mm[:, k] / 1000.0 for k, axis in enumerate("xy")}
 
 
 class Observer:
@@ -47,14 +88,10 @@ class Observer:
 
     def __init__(self, world: World) -> None:
         self.world = world
-        self._before = self._remember()
+        self._remember()
 
     def record(self, choices: Choices | None = None) -> StepRecord:
-        """Return the record of the step just done, or of the start.
-
-        Args:
-            choices: what `World.step` returned; None before the first step.
-        """
+        """Return the record of the step just done, with what `World.step` returned; without that, of the start."""
         world = self.world
         events = self._events() if choices is not None else _events([])
         snapshot_due = world.step_number % SNAPSHOT_EVERY_STEPS == 0
@@ -76,20 +113,24 @@ class Observer:
             truncated=world.truncated,
             snapshot=Snapshot(take_snapshot(world.state)) if snapshot_due else None,
         )
-        self._before = self._remember()
+        self._remember()
         return record
 
-    def _remember(self) -> _Before:
-        arrays = self.world.state
-        return _Before(
-            fieryness=arrays.fire.fieryness.copy(),
-            civilian_hp=arrays.civilians.hp.copy(),
-            civilian_damage=arrays.civilians.damage.copy(),
-            brigade_hp=arrays.brigades.hp.copy(),
-            brigade_damage=arrays.brigades.damage.copy(),
-            tank=arrays.brigades.tank.copy(),
-            refilling=arrays.brigades.refilling.copy(),
-        )
+    def _watched(self) -> dict[str, Array]:
+        """Return the arrays that events follow from."""
+        state = self.world.state
+        return {
+            "fieryness": state.fire.fieryness,
+            "civilian_hp": state.civilians.hp,
+            "civilian_damage": state.civilians.damage,
+            "brigade_hp": state.brigades.hp,
+            "brigade_damage": state.brigades.damage,
+            "tank": state.brigades.tank,
+            "refilling": state.brigades.refilling,
+        }
+
+    def _remember(self) -> None:
+        self._before = {name: array.copy() for name, array in self._watched().items()}
 
     def _observations(self, choices: Choices | None) -> Observations:
         arrays = self.world.state
@@ -104,7 +145,7 @@ class Observer:
         order = sites.number[:n].argsort(kind="stable")
         return Observations(
             site=site,
-            **dict(zip(FEATURES, features, strict=True)),
+            **{feature.name: column for feature, column in zip(FEATURES, features, strict=True)},
             state_index=states,
             site_id=sites.number[order],
             site_free_sides=sites.free_sides[order],
@@ -163,30 +204,29 @@ class Observer:
 
     def _events(self) -> Events:
         """Return what changed, in the order of the phases."""
-        before, arrays = self._before, self.world.state
-        brigades, civilians = arrays.brigades, arrays.civilians
-        refilled = _zero_against_more(brigades.refilling, before.refilling)
+        before, now = self._before, self._watched()
+        refilled = _zero_against_more(now["refilling"], before["refilling"])
+        activity = self.world.state.brigades.activity
         return _events(
             [
-                ("refilled", [brigade for brigade in refilled if brigades.activity[brigade] == REFILLING]),
-                ("tank-empty", _zero_against_more(brigades.tank, before.tank)),
+                ("refilled", [brigade for brigade in refilled if activity[brigade] == REFILLING]),
+                ("tank-empty", _zero_against_more(now["tank"], before["tank"])),
                 *self._fire_events(),
-                ("civilian-hurt", _zero_against_more(before.civilian_damage, civilians.damage)),
-                ("civilian-died", _zero_against_more(civilians.hp, before.civilian_hp)),
-                ("brigade-hurt", _zero_against_more(before.brigade_damage, brigades.damage)),
-                ("brigade-died", _zero_against_more(brigades.hp, before.brigade_hp)),
+                ("civilian-hurt", _zero_against_more(before["civilian_damage"], now["civilian_damage"])),
+                ("civilian-died", _zero_against_more(now["civilian_hp"], before["civilian_hp"])),
+                ("brigade-hurt", _zero_against_more(before["brigade_damage"], now["brigade_damage"])),
+                ("brigade-died", _zero_against_more(now["brigade_hp"], before["brigade_hp"])),
             ]
         )
 
     def _fire_events(self) -> list[tuple[str, Sequence[int]]]:
         """Return what happened to buildings and sites; most steps change few codes, so only those are looked at."""
         code, site = self.world.state.fire.fieryness, self.world.state.sites.label
-        changed = (code != self._before.fieryness).nonzero()[0]
+        before = self._before["fieryness"]
+        changed = (code != before).nonzero()[0]
         if len(changed) == 0:
             return []
-        changes = list(
-            zip(changed.tolist(), self._before.fieryness[changed].tolist(), code[changed].tolist(), strict=True)
-        )
+        changes = list(zip(changed.tolist(), before[changed].tolist(), code[changed].tolist(), strict=True))
         stopped = [building for building, old, new in changes if old in BURNING and new not in BURNING]
         return [
             ("ignited", [building for building, old, new in changes if new in BURNING and old not in BURNING]),
@@ -200,16 +240,6 @@ BURNING = range(1, 4)
 BURNT_OUT = 8
 TEMPERATURE_STEPS = 64.0
 """Recorded temperatures are rounded to this part of a degree: noise in the last bits would not compress."""
-FEATURES = (
-    "free_edges",
-    "distance_from_center",
-    "distance_from_civilian",
-    "volume",
-    "others_easiest",
-    "others_nearest_to_civilian",
-    "others_nearest_to_center",
-    "others_nearest_to_me",
-)
 
 
 def _sites_out(site: Array, code: Array, stopped: Sequence[int]) -> list[int]:

@@ -14,19 +14,17 @@ from typing import Final, NoReturn
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from fireworld import draws
-from fireworld.city.city import Int32Array, Int64Array, Plan
+from fireworld.city.city import Int32Array, Plan, freeze
 from fireworld.city.formats import read_plan
 from fireworld.city.generator import generate_plan
 from fireworld.errors import CityError, ScenarioError, expected
-from fireworld.scenario.document import Civilians, Direction, Fire, Point
+from fireworld.scenario.document import Civilians, Fire, Point
 from fireworld.scenario.scenario import Scenario, read_city_file
 
 SCENARIO_ATTACHMENT: Final = "scenario.yaml"
 CITY_ATTACHMENT: Final = "city.json"
-BoolArray = NDArray[np.bool_]
 UNKNOWN_SHOWN_MAX: Final = 5
 
 
@@ -41,15 +39,9 @@ class Placement:
 
 
 def scenario_plan(scenario: Scenario, *, city_json: bytes | None = None) -> Plan:
-    """Make or load the plan of a scenario's city.
+    """Make or load the plan of a scenario's city; `city_json` is the content of its file, where that is in a recording.
 
-    Args:
-        scenario: the scenario.
-        city_json: content of the city file, where it comes from a recording; None reads the file.
-
-    Raises:
-        ScenarioError: figures that make no city, or another city file than the scenario names.
-        CityError: a city file that makes no city.
+    Raises ScenarioError for figures that make no city or another city file, CityError for a file that makes none.
     """
     generated = scenario.city.generated
     if generated is None:
@@ -75,11 +67,7 @@ def attachments(scenario: Scenario) -> dict[str, bytes]:
 
 
 def place(scenario: Scenario, plan: Plan) -> Placement:
-    """Place a scenario's fires, civilians and brigades in its city.
-
-    Raises:
-        ScenarioError: the city has not the buildings, places or refuges that the scenario asks for.
-    """
+    """Place a scenario's fires, civilians and brigades in its city; ScenarioError if it has not what they need."""
     ignited: list[int] = []
     for index, fire in enumerate(scenario.fires):
         ignited += _ignite(scenario, plan, fire, key=f"fires.{index}", taken=ignited)
@@ -88,11 +76,14 @@ def place(scenario: Scenario, plan: Plan) -> Placement:
     refuges = [int(building) for building in np.flatnonzero(plan.footprints.refuge)]
     if not refuges:
         _refuse(scenario, "city", "a city with a refuge, where brigades start and fill their tanks", "none of them")
-    return Placement(
-        ignited=_read_only(ignited),
-        civilian_building=_read_only(civilian_building),
-        civilian_mm=_frozen(plan.footprints.centroid_mm[civilian_building]),
-        brigade_refuge=_read_only([refuges[brigade % len(refuges)] for brigade in range(scenario.brigades.n)]),
+    starts = [refuges[brigade % len(refuges)] for brigade in range(scenario.brigades.n)]
+    return freeze(
+        Placement(
+            ignited=np.array(ignited, dtype=np.int32),
+            civilian_building=np.array(civilian_building, dtype=np.int32),
+            civilian_mm=plan.footprints.centroid_mm[civilian_building],
+            brigade_refuge=np.array(starts, dtype=np.int32),
+        )
     )
 
 
@@ -163,25 +154,20 @@ def _civilian_places(
     eligible[ignited] = False
     offset = plan.footprints.centroid_mm.astype(np.int64) - center_mm
     square = (offset * offset).sum(axis=1)
-    eligible &= square >= _to_mm(civilians.from_m) ** 2
+    eligible &= square >= round(civilians.from_m * 1000) ** 2
     if civilians.to_m is not None:
-        eligible &= square <= _to_mm(civilians.to_m) ** 2
+        eligible &= square <= round(civilians.to_m * 1000) ** 2
 
     def draw(building: int) -> int:
         return draws.hash_key(civilians.seed, draws.PLACEMENT, int(plan.footprints.building_id[building]), 0)
 
-    return [
-        sorted((int(building) for building in np.flatnonzero(eligible & _lies(offset, direction))), key=draw)
-        for direction in civilians.directions
-    ]
-
-
-def _lies(offset: Int64Array, direction: Direction) -> BoolArray:
-    """Tell which offsets, (n, 2), point into the quarter around a direction; diagonals belong to both."""
-    east, north = offset[:, 0], offset[:, 1]
-    ahead, aside = {"N": (north, east), "E": (east, north), "S": (-north, east), "W": (-east, north)}[direction]
-    quarter: BoolArray = ahead >= np.abs(aside)
-    return quarter
+    east, north = offset.T
+    ahead_and_aside = {"N": (north, east), "E": (east, north), "S": (-north, east), "W": (-east, north)}
+    places = []
+    for direction in civilians.directions:
+        ahead, aside = ahead_and_aside[direction]  # a quarter around the direction; diagonals belong to both
+        places.append(sorted(np.flatnonzero(eligible & (ahead >= np.abs(aside))).tolist(), key=draw))
+    return places
 
 
 def _center_of_people(scenario: Scenario, plan: Plan) -> tuple[int, int]:
@@ -211,22 +197,6 @@ def _locate(plan: Plan, point: Point) -> tuple[int, int]:
     low, high = plan.footprints.outline_mm.min(axis=0), plan.footprints.outline_mm.max(axis=0)
     x_mm, y_mm = (int(low[axis]) + int(point[axis] * (int(high[axis]) - int(low[axis]))) for axis in (0, 1))
     return x_mm, y_mm
-
-
-def _to_mm(length_m: float) -> int:
-    """Turn metres into whole millimetres."""
-    return round(length_m * 1000)
-
-
-def _read_only(buildings: list[int]) -> Int32Array:
-    """Turn indices into an array that no one changes."""
-    return _frozen(np.array(buildings, dtype=np.int32))
-
-
-def _frozen(array: Int32Array) -> Int32Array:
-    """Make an array read-only."""
-    array.setflags(write=False)
-    return array
 
 
 def _refuse(scenario: Scenario, key: str, wanted: str, got: object, hint: str = "") -> NoReturn:

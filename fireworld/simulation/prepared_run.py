@@ -16,14 +16,7 @@ from fireworld.simulation.world import World
 
 @dataclass(frozen=True)
 class PreparedRun:
-    """A prepared run; iterating runs it, from its start each time.
-
-    Attributes:
-        header: what identifies the run.
-        city: where it takes place.
-        start: the world before the first step; it stays as it is.
-        policy: what the brigades follow.
-    """
+    """A prepared run; iterating runs it, from its start each time."""
 
     header: RunHeader
     city: CityRecord
@@ -41,14 +34,7 @@ class PreparedRun:
 
 
 def prepare_run(built: BuiltScenario, named: NamedPolicy, *, seed: int, n_steps_max: int | None = None) -> PreparedRun:
-    """Prepare a run.
-
-    Args:
-        built: the scenario, built.
-        named: the policy.
-        seed: of the run's random draws.
-        n_steps_max: last step; None: the scenario's.
-    """
+    """Prepare a run; its last step is the scenario's unless another is given."""
     world = built.world(seed=seed, n_steps_max=n_steps_max)
     header = built.header(seed=seed, policy=named.name, policy_digest=named.digest, n_steps_max=world.n_steps_max)
     header = replace(header, attachments={**header.attachments, **named.attachments})

@@ -67,20 +67,6 @@ def fresh_fire(city: City) -> FireState:
     )
 
 
-def fresh_civilians(buildings: Array, positions_mm: Array, hp: int) -> CivilianState:
-    """Return healthy civilians. buildings: (c,) index or -1; positions_mm: (c, 2)."""
-    c = len(buildings)
-    positions = np.asarray(positions_mm, dtype=np.float64).reshape(c, 2)
-    return CivilianState(
-        building=np.array(buildings, dtype=np.int32),
-        x=positions[:, 0].copy(),
-        y=positions[:, 1].copy(),
-        full_hp=np.full(c, hp, dtype=np.int32),
-        hp=np.full(c, hp, dtype=np.int32),
-        damage=np.zeros(c),
-    )
-
-
 def fresh_brigades(city: City, refuges: Array, tank_litres: int, hp: int) -> BrigadeState:
     """Return healthy brigades with full tanks, each at the entrance of its refuge. refuges: (b,) building index."""
     refuges = np.asarray(refuges, dtype=np.int64)
@@ -124,18 +110,6 @@ def fresh_sites(n: int) -> SiteState:
     )
 
 
-def fresh_outcome() -> Outcome:
-    """Return an outcome of which nothing is known yet."""
-    return Outcome(
-        reward=np.zeros(len(REWARDS)),
-        stock=np.zeros(len(TERMS)),
-        score=np.zeros(3),
-        counts=np.zeros(4, dtype=np.int32),
-        water=np.zeros(1),
-        draws=np.zeros(2),
-    )
-
-
 def fresh_learner(
     tables: Array, n_brigades: int, *, rule: int = 0, alpha: float = 0.7, alpha_decay: float = 0.0, gamma: float = 0.5
 ) -> Learner:
@@ -174,13 +148,28 @@ NO_LEARNER: Final = fresh_learner(np.zeros((1, 1, 4)), 0)._replace(learning=np.z
 
 def fresh_world(city: City, parameters: Parameters, placement: Placement) -> WorldState:
     """Return the state before anything burns."""
-    hp = parameters.health.initial_hp
+    hp, n_civilians = parameters.health.initial_hp, len(placement.civilian_building)
+    x, y = placement.civilian_mm.astype(np.float64).T.copy()
     return WorldState(
         fire=fresh_fire(city),
-        civilians=fresh_civilians(placement.civilian_building, placement.civilian_mm, hp),
+        civilians=CivilianState(
+            building=placement.civilian_building.astype(np.int32),
+            x=x,
+            y=y,
+            full_hp=np.full(n_civilians, hp, dtype=np.int32),
+            hp=np.full(n_civilians, hp, dtype=np.int32),
+            damage=np.zeros(n_civilians),
+        ),
         brigades=fresh_brigades(city, placement.brigade_refuge, parameters.brigades.tank_litres, hp),
         sites=fresh_sites(city.n_buildings),
-        outcome=fresh_outcome(),
+        outcome=Outcome(
+            reward=np.zeros(len(REWARDS)),
+            stock=np.zeros(len(TERMS)),
+            score=np.zeros(3),
+            counts=np.zeros(4, dtype=np.int32),
+            water=np.zeros(1),
+            draws=np.zeros(2),
+        ),
     )
 
 
@@ -223,11 +212,7 @@ def take_snapshot(world: WorldState) -> dict[str, Array]:
 
 
 def restore_snapshot(world: WorldState, snapshot: Mapping[str, Array]) -> None:
-    """Put a snapshot back into a world of the same city and team.
-
-    Raises:
-        LogError: an array is missing or of another shape or type.
-    """
+    """Put a snapshot back into a world of the same city and team; LogError if an array is missing or does not fit."""
     for name, array in named_arrays(world):
         if name in SCRATCH:
             continue

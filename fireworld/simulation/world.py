@@ -7,17 +7,70 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fireworld.kernels.arrays import BURNING, Array, Learner, PolicyArrays
-from fireworld.kernels.observation import can_choose, find_target, observe
+from fireworld.city.city import City
+from fireworld.kernels.arrays import BURNING, Array, CityArrays, Constants, Learner, PolicyArrays, WorldState
+from fireworld.kernels.fire import ignite
+from fireworld.kernels.observation import can_choose, observe
+from fireworld.kernels.outcome import assess
 from fireworld.kernels.sites import find_sites
 from fireworld.kernels.step import finish_step
 from fireworld.outcome import Outcome, outcome_at
+from fireworld.parameters import Parameters
 from fireworld.policy.asking import ask, complete, keeps
-from fireworld.policy.protocol import Action, Decision, Observation, Policy
-from fireworld.simulation.start import Start
-from fireworld.simulation.state import NO_LEARNER, copy_world, rewards_of, score_of
+from fireworld.policy.protocol import Action, Decision, Observation, Policy, named_target
+from fireworld.rewards import Reward, reward_of
+from fireworld.scenario import document
+from fireworld.simulation.city_arrays import (
+    brigade_constants,
+    city_arrays,
+    fire_constants,
+    health_constants,
+    observation_constants,
+)
+from fireworld.simulation.placement import Placement
+from fireworld.simulation.state import NO_LEARNER, copy_world, fresh_world, rewards_of, score_of
 
 NO_DECISION = Decision(-1)
+
+
+@dataclass(frozen=True)
+class Start:
+    """What all worlds of a scenario have in common, and the state each of them begins with; not to be changed."""
+
+    city: City
+    city_arrays: CityArrays
+    constants: Constants
+    state: WorldState
+
+
+def prepare_start(
+    city: City,
+    parameters: Parameters,
+    placement: Placement,
+    *,
+    reward: Reward | None = None,
+    choices: document.Choices = "in-turn",
+    unit_volume_m3: float | None = None,
+    arrays: CityArrays | None = None,
+) -> Start:
+    """Place everybody in a city and set it on fire; arguments are named as in a scenario.
+
+    A reward of None is the paper's; the city's arrays are built unless they are given.
+    """
+    arrays = arrays if arrays is not None else city_arrays(city, parameters.fire)
+    constants = Constants(
+        fire=fire_constants(parameters.fire),
+        health=health_constants(parameters.health),
+        brigades=brigade_constants(parameters.brigades),
+        observation=observation_constants(city, unit_volume_m3, in_turn=choices == "in-turn"),
+        reward=reward if reward is not None else reward_of("stock"),
+    )
+    state = fresh_world(city, parameters, placement)
+    for building in placement.ignited.tolist():
+        ignite(building, arrays.buildings, state.fire)
+    assess(state.fire, state.civilians, arrays.geometry, constants.reward, state.outcome)
+    state.outcome.reward[:] = 0.0  # the start is not rewarded
+    return Start(city, arrays, constants, state)
 
 
 @dataclass(frozen=True)
@@ -30,26 +83,9 @@ class Choices:
 
 
 class World:
-    """A city, its team and its fire.
-
-    Attributes:
-        city: the City.
-        city_arrays: its arrays as kernels read them.
-        constants: scalars of the model.
-        state: everything that a step changes.
-        seed: seed of the run's random draws.
-        step_number: steps done so far.
-        n_steps_max: the run is truncated after this step.
-    """
+    """A city, its team and its fire: `state` is everything that a step changes. Truncated after step `n_steps_max`."""
 
     def __init__(self, start: Start, *, seed: int, n_steps_max: int) -> None:
-        """Set up the world before its first step.
-
-        Args:
-            start: what it starts from; it stays as it is.
-            seed: seed of all draws.
-            n_steps_max: last step.
-        """
         self.city, self.city_arrays, self.constants = start.city, start.city_arrays, start.constants
         self.state = copy_world(start.state)
         self.seed = seed
@@ -130,12 +166,7 @@ class World:
         return choices
 
     def run(self, policy: PolicyArrays, learner: Learner = NO_LEARNER) -> int:
-        """Run the whole episode in compiled code and return the last step; it comes out as step by step.
-
-        Args:
-            policy: what the brigades follow.
-            learner: what they learn meanwhile; by default nothing.
-        """
+        """Run the whole episode in compiled code and return the last step; it comes out as step by step."""
         if self.terminated or self.truncated:
             return self.step_number
         from fireworld.kernels.episode import run_episode  # the largest kernel: compiled only where it is used
@@ -182,7 +213,8 @@ class World:
                 if self._can_keep(brigade, last) and keeps(policy, brigade, last.action, self.step_number):
                     decisions[brigade] = last
                 else:
-                    decisions[brigade] = self._ask(policy, brigade, features[brigade], int(states[brigade]), known)
+                    seen = self._observation(brigade, features[brigade], int(states[brigade]), known)
+                    decisions[brigade] = ask(policy, seen)
                 target = self._target(brigade, decisions[brigade])
             brigades.action[brigade], brigades.target[brigade] = decisions[brigade].action, target
         return Choices(features=features, state_index=states, decisions=tuple(decisions))
@@ -197,15 +229,7 @@ class World:
     def _target(self, brigade: int, decision: Decision) -> int:
         if decision.action == Action.OWN_TARGET and decision.target is not None:
             return decision.target
-        city, state = self.city_arrays, self.state
-        return int(
-            find_target(
-                brigade, decision.action, state.brigades, city.buildings, state.fire, city.geometry, state.sites
-            )
-        )
-
-    def _ask(self, policy: Policy, brigade: int, features: Array, state: int, known: Array) -> Decision:
-        return ask(policy, self._observation(brigade, features, state, known))
+        return named_target(brigade, decision.action, self.city_arrays, self.state)
 
     def _observation(self, brigade: int, features: Array, state: int, known: Array) -> Observation:
         seen = [int(feature) for feature in features]

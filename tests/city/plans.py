@@ -10,7 +10,7 @@ import numpy as np
 from fireworld.city.city import Array, Footprints, Int32Array, Int64Array, Plan, StreetMap
 from fireworld.city.links import wall_grid, wall_table
 from fireworld.city.outlines import Building, Corner, assemble, centroid_mm, doubled_area_mm2
-from fireworld.kernels.rays import first_hits
+from fireworld.kernels.rays import first_hit
 from fireworld.parameters import FireParameters
 
 
@@ -98,6 +98,7 @@ def walls_hit(
         end_mm: (r, 2) end of each ray.
     """
     walls = wall_table(footprints, order, FireParameters())
-    rays = (source.astype(np.int64), start_mm.astype(np.int64), end_mm.astype(np.int64))
-    hits: Int64Array = first_hits(walls, wall_grid(walls), *rays)
-    return hits
+    grid = wall_grid(walls)
+    starts, ways = start_mm.astype(np.int64), (end_mm - start_mm).astype(np.int64)
+    rays = zip(source.tolist(), starts.tolist(), ways.tolist(), strict=True)
+    return np.array([first_hit(walls, grid, wall, *start, *way) for wall, start, way in rays], dtype=np.int64)

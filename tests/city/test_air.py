@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from fireworld.city.air import cover_cells
-from fireworld.city.build import visiting_order
-from fireworld.city.physics import physics_of
+from fireworld.city.build import physics_of, visiting_order
 from fireworld.errors import CityError
 from fireworld.parameters import FireParameters
 from tests.city.plans import footprints, rectangle

@@ -14,10 +14,8 @@ import pytest
 from fireworld.city.build import build_city
 from fireworld.city.city import City
 from fireworld.city.generator import generate_plan
-from fireworld.city.record import city_record
 from fireworld.errors import CityError
-from fireworld.parameters import BrigadeParameters, FireParameters
-from fireworld.records import DTYPES
+from fireworld.parameters import FireParameters
 from tests.city.plans import plan, rectangle
 
 DIGEST = "d62f76caf11efe383776054e1d8dd10caeca1e58bbb062ac038bc3238355ea78"
@@ -62,8 +60,8 @@ def test_the_city_is_the_same_in_every_process(setting):
     assert run.stdout.strip() == DIGEST
 
 
-def test_plans_and_records_need_no_compiler():
-    modules = ["city.generator", "city.formats.json_plan", "city.record", "draws"]
+def test_plans_need_no_compiler():
+    modules = ["city.generator", "city.formats.json_plan", "draws"]
     code = f"import sys, {', '.join(f'fireworld.{name}' for name in modules)}; print('numba' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "False"
@@ -125,40 +123,3 @@ def test_one_building_is_a_city():
     city = build_city(plan(rectangle(0, 0, 5000, 5000)), FireParameters(), seed=1)
     assert city.n_buildings == 1
     assert len(city.links.building) == len(city.near.building) == 0
-
-
-def test_the_record_has_every_field_in_its_type():
-    record = city_record(
-        CITY,
-        civilian_mm=CITY.footprints.centroid_mm[[3, 5]],
-        civilian_building=np.array([3, 5]),
-        civilian_hp=np.array([1000, 1000]),
-        n_brigades=3,
-        brigades=BrigadeParameters(),
-    )
-    for item in fields(record):
-        held, wire = getattr(record, item.name), item.metadata["wire"]
-        if "per" in item.metadata:
-            assert held.dtype == np.dtype(DTYPES[wire]), item.name
-            assert held.ndim == 1, item.name
-        else:
-            assert isinstance(held, {"string": str, "double": float, "sfixed32": int}[wire]), item.name
-    assert record.civilian_x_m.tolist() == (CITY.footprints.centroid_mm[[3, 5], 0] / 1000).tolist()
-    assert record.brigade_tank_litres.tolist() == [7500] * 3
-    assert record.brigade_range_m.tolist() == [50.0] * 3
-    assert record.refuge_building.tolist() == np.flatnonzero(CITY.footprints.refuge).tolist()
-    assert len(record.hydrant_x_m) == len(CITY.streets.hydrant_node) > 0
-    assert (record.air_cell_m, record.air_nx, record.air_ny) == (5.0, *CITY.air.shape)
-    assert record.outline_ptr[-1] == len(record.outline_x_m) == len(record.outline_y_m)
-
-
-def test_the_record_of_a_city_without_civilians_or_brigades():
-    record = city_record(
-        CITY,
-        civilian_mm=np.empty((0, 2), np.int32),
-        civilian_building=np.empty(0, np.int32),
-        civilian_hp=np.empty(0, np.int32),
-        n_brigades=0,
-        brigades=BrigadeParameters(),
-    )
-    assert len(record.civilian_x_m) == len(record.civilian_hp) == len(record.brigade_range_m) == 0

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from fireworld.city.air import cover_cells
-from fireworld.city.build import build_city, visiting_order, with_links, with_order
+from fireworld.city.build import build_city, physics_of, visiting_order, with_links, with_order
 from fireworld.city.city import City
 from fireworld.city.links import radiation_links
 from fireworld.city.outlines import walls_of
-from fireworld.city.physics import physics_of
 from fireworld.conformance.city_file import load_city_file
 from tests.city.plans import walls_hit
 from tests.reference import traces

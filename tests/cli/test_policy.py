@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
+from fireworld.policy.teams import team_path
 from fireworld.policy.teams.ranking_team import RankingTeam
 from fireworld.policy.teams.ranking_words import WEIGHTS
-from fireworld.policy.teams.shipped import team_path
 
 pytestmark = pytest.mark.usefixtures("policies_file")
 

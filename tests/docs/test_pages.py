@@ -8,7 +8,7 @@ import pytest
 
 from fireworld.cli import root
 from fireworld.policy.names import BUILT_IN, PLANNERS
-from fireworld.policy.teams.shipped import team_names
+from fireworld.policy.teams import team_names
 from fireworld.scenario import scenario_names
 from tests.docs.pages import PAGES, README, ROOT, anchors, commands, links, page_name
 

@@ -10,7 +10,7 @@ from pathlib import Path, PurePosixPath
 
 import pytest
 
-from fireworld.policy.teams.shipped import team_names
+from fireworld.policy.teams import team_names
 from fireworld.scenario import scenario_names
 from tests.docs.pages import ROOT
 from tests.installed.names import FRONT_DOOR

@@ -14,8 +14,7 @@ from fireworld.kernels.outcome import assess as assess_kernel
 from fireworld.parameters import PAPER, Parameters
 from fireworld.rewards import Reward
 from fireworld.simulation.placement import Placement
-from fireworld.simulation.start import prepare_start
-from fireworld.simulation.world import World
+from fireworld.simulation.world import World, prepare_start
 from tests.city.plans import footprints, rectangle, street_map
 
 METRE = 1000

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fireworld.planning.forecast import BURNING_COST, FIRST_SEED, Forecast
+from fireworld.planning.planner import BURNING_COST, FIRST_SEED, Forecast, PlannerOptions
 from fireworld.policy.kernel import KernelPolicy, always
 from fireworld.policy.protocol import Decision
 from fireworld.simulation.state import copy_world, named_arrays
@@ -41,7 +41,7 @@ def moment_of(world, step):
 @pytest.mark.parametrize(("step", "horizon"), [(1, 1), (1, 25), (3, 12)])
 def test_a_rollout_is_what_the_world_would_do_with_that_luck(step, horizon):
     world = town_world(seed=3)
-    forecast = Forecast(moment_of(world, step), copy_world(world.state), horizon=horizon, rollouts=1)
+    forecast = Forecast(moment_of(world, step), copy_world(world.state), PlannerOptions(horizon, 1, 1))
     twin = town_world(seed=3, n_steps_max=step - 1 + horizon)
     play(twin, always(3), to=step - 1)
     twin.seed = FIRST_SEED + step
@@ -54,7 +54,7 @@ def test_the_value_is_the_mean_over_rollouts_of_other_luck():
     world = town_world(seed=3, n_fires=8)
     moment = moment_of(world, 2)
     room = copy_world(world.state)
-    mean = Forecast(moment, room, horizon=20, rollouts=2).value(ASSIGNMENT)
+    mean = Forecast(moment, room, PlannerOptions(20, 1, 2)).value(ASSIGNMENT)
     parts = []
     for rollout in range(2):
         twin = town_world(seed=3, n_fires=8, n_steps_max=21)
@@ -71,7 +71,7 @@ def test_rollouts_leave_the_world_alone():
     world = town_world(seed=3)
     moment = moment_of(world, 2)
     before = copy_world(world.state)
-    forecast = Forecast(moment, copy_world(world.state), horizon=20, rollouts=2)
+    forecast = Forecast(moment, copy_world(world.state), PlannerOptions(20, 1, 2))
     forecast.value(ASSIGNMENT)
     forecast.value((0, 0, 0))
     for (name, array), (_, held) in zip(named_arrays(world.state), named_arrays(before), strict=True):
@@ -81,8 +81,8 @@ def test_rollouts_leave_the_world_alone():
 def test_a_value_depends_neither_on_what_was_tried_before_nor_on_the_seed_of_the_run():
     world = town_world(seed=3)
     moment = moment_of(world, 1)
-    fresh = Forecast(moment, copy_world(world.state), horizon=20, rollouts=1)
-    used = Forecast(replace(moment, seed=12345), copy_world(world.state), horizon=20, rollouts=1)
+    fresh = Forecast(moment, copy_world(world.state), PlannerOptions(20, 1, 1))
+    used = Forecast(replace(moment, seed=12345), copy_world(world.state), PlannerOptions(20, 1, 1))
     used.value((0, 0, 0))
     used.value((1, 1, 1))
     assert used.value(ASSIGNMENT) == fresh.value(ASSIGNMENT) == used.value(ASSIGNMENT)

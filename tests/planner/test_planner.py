@@ -20,13 +20,13 @@ from fireworld.simulation.prepared_run import prepare_run
 from fireworld.testing import PolicyConformance
 from tests.simulation.town import town_world
 
-SHORT = PlannerOptions(horizon=6, interval=3)
+SHORT = {"horizon": 6, "interval": 3}
 
 
 @pytest.mark.slow
 class TestConformance(PolicyConformance):
     def make_policy(self):
-        return Planner(SHORT)
+        return Planner(**SHORT)
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def decisions_of(world, policy, *, n_steps):
 
 @pytest.mark.parametrize("interval", [1, 3, 4])
 def test_it_plans_once_a_period_and_keeps_to_the_plan(built, interval):
-    made = decisions_of(built.world(seed=3), Planner(PlannerOptions(horizon=5, interval=interval)), n_steps=12)
+    made = decisions_of(built.world(seed=3), Planner(horizon=5, interval=interval), n_steps=12)
     asked = [step for step, decisions in enumerate(made, start=1) if any(each.action >= 0 for each in decisions)]
     planned = [step for step, decisions in enumerate(made, start=1) if any(each.q_values for each in decisions)]
     assert planned == [
@@ -57,14 +57,14 @@ def test_it_plans_once_a_period_and_keeps_to_the_plan(built, interval):
 
 
 def test_its_q_values_say_why(built):
-    made = decisions_of(built.world(seed=3), Planner(PlannerOptions(horizon=10, interval=1)), n_steps=6)
+    made = decisions_of(built.world(seed=3), Planner(horizon=10, interval=1), n_steps=6)
     explained = [each for decisions in made for each in decisions if each.q_values is not None]
     assert len({each.q_values for each in explained}) > 1
     assert all(each.q_values[each.action] == max(each.q_values) for each in explained)
 
 
 def test_a_brigade_that_comes_back_in_between_follows_the_plan():
-    world, policy = town_world(seed=3, n_fires=12, n_brigades=2), Planner(PlannerOptions(horizon=5, interval=1000))
+    world, policy = town_world(seed=3, n_fires=12, n_brigades=2), Planner(horizon=5, interval=1000)
     begin(policy, world.city_arrays, n_brigades=2, seed=world.seed)
     world.state.brigades.refilling[0] = 1
     assert world.step(policy).decisions[0].action == -1
@@ -76,7 +76,7 @@ def test_a_brigade_that_comes_back_in_between_follows_the_plan():
 
 @pytest.mark.parametrize("n_brigades", [1, 8])
 def test_teams_of_any_size(n_brigades):
-    made = decisions_of(town_world(seed=3, n_fires=12, n_brigades=n_brigades), Planner(SHORT), n_steps=4)
+    made = decisions_of(town_world(seed=3, n_fires=12, n_brigades=n_brigades), Planner(**SHORT), n_steps=4)
     assert all(len(decisions) == n_brigades for decisions in made)
 
 
@@ -107,10 +107,10 @@ def test_it_does_better_than_every_fixed_action(built):
 
 
 def test_names():
-    assert find_policy("planner").policy.options == PlannerOptions()
+    assert find_policy("planner").policy.options == PlannerOptions(horizon=30, interval=4, rollouts=1)
     named = find_policy("planner:rollouts=2,horizon=50")
     assert named.name == "planner:rollouts=2,horizon=50"
-    assert named.policy.options == PlannerOptions(horizon=50, rollouts=2)
+    assert named.policy.options == PlannerOptions(horizon=50, interval=4, rollouts=2)
     names = ("planner", "planner:horizon=31", "planner:interval=5", "planner:rollouts=2")
     digests = {find_policy(name).digest for name in names}
     assert len(digests) == 4

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fireworld.draws import uniform
-from fireworld.planning.search import action_values, climb, with_action
+from fireworld.planning.planner import action_values, climb, with_action
 
 ASSIGNMENTS = list(product(range(4), repeat=3))
 UNIFORM = [(action,) * 3 for action in range(4)]

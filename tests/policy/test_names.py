@@ -15,7 +15,7 @@ from fireworld.policy.asking import ask, name_of
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.names import BUILT_IN, RULES, TEAM_ATTACHMENT, NamedPolicy, find_policy, policies
 from fireworld.policy.protocol import Decision
-from fireworld.policy.teams.shipped import team_names
+from fireworld.policy.teams import team_names
 from fireworld.policy.teams.team import load_team, parse_team
 from fireworld.records import ACTIONS
 

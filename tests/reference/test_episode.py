@@ -24,8 +24,7 @@ from fireworld.rewards import reward_of
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import build_scenario
 from fireworld.simulation.placement import Placement
-from fireworld.simulation.start import prepare_start
-from fireworld.simulation.world import World
+from fireworld.simulation.world import World, prepare_start
 from tests.kernels.small import assess
 from tests.reference import episode, outcome, random_draws, sites, team
 

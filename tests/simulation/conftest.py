@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from fireworld.city.record import city_record
+from fireworld.simulation.observer import city_record
+from fireworld.simulation.placement import Placement
 from tests.simulation.town import small_tanks, town
 
 
@@ -11,11 +12,5 @@ from tests.simulation.town import small_tanks, town
 def town_record():
     """The town as it is recorded, without people."""
     nobody = np.zeros(0, dtype=np.int32)
-    return city_record(
-        town(),
-        civilian_mm=np.zeros((0, 2), dtype=np.int32),
-        civilian_building=nobody,
-        civilian_hp=nobody,
-        n_brigades=3,
-        brigades=small_tanks().brigades,
-    )
+    start = Placement(nobody, nobody, np.zeros((0, 2), dtype=np.int32), np.zeros(3, dtype=np.int32))
+    return city_record(town(), start, small_tanks())

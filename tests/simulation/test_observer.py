@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from fireworld.kernels.brigades import REFILLING
-from fireworld.parameters import PAPER
+from fireworld.parameters import PAPER, Parameters
 from fireworld.policy.kernel import always
-from fireworld.records import ACTIVITIES, EVENT_KINDS, SNAPSHOT_EVERY_STEPS, STEP_TOPICS
-from fireworld.simulation.observer import Observer
+from fireworld.records import ACTIVITIES, DTYPES, EVENT_KINDS, SNAPSHOT_EVERY_STEPS, STEP_TOPICS
+from fireworld.simulation.observer import Observer, city_record
+from fireworld.simulation.placement import Placement
 from fireworld.simulation.world import Choices
 from tests.kernels.small import assess, burn, make_city, make_world, square
-from tests.simulation.town import begin, policy_named, town_world
+from tests.simulation.town import begin, policy_named, town, town_world
 
 NO_CHOICES = Choices(np.zeros((0, 8), dtype=np.int64), np.zeros(0, dtype=np.int64), ())
 FAR_APART = [square(200.0 * k, 0.0) for k in range(5)]
@@ -164,3 +165,29 @@ def test_snapshots_come_at_their_steps():
         if observer.record(world.step(policy)).snapshot is not None:
             with_snapshot.append(step)
     assert with_snapshot == [0, SNAPSHOT_EVERY_STEPS, 2 * SNAPSHOT_EVERY_STEPS]
+
+
+def test_the_record_has_every_field_in_its_type():
+    city, inside = town(), np.array([3, 5], dtype=np.int32)
+    record = city_record(city, Placement(inside, inside, city.footprints.centroid_mm[inside], inside), Parameters())
+    for item in fields(record):
+        held, wire = getattr(record, item.name), item.metadata["wire"]
+        if "per" in item.metadata:
+            assert held.dtype == np.dtype(DTYPES[wire]), item.name
+            assert held.ndim == 1, item.name
+        else:
+            assert isinstance(held, {"string": str, "double": float, "sfixed32": int}[wire]), item.name
+    assert record.civilian_x_m.tolist() == (city.footprints.centroid_mm[[3, 5], 0] / 1000).tolist()
+    assert record.civilian_hp.tolist() == [Parameters().health.initial_hp] * 2
+    assert record.brigade_tank_litres.tolist() == [7500] * 2
+    assert record.brigade_range_m.tolist() == [50.0] * 2
+    assert record.refuge_building.tolist() == np.flatnonzero(city.footprints.refuge).tolist()
+    assert len(record.hydrant_x_m) == len(city.streets.hydrant_node) > 0
+    assert (record.air_cell_m, record.air_nx, record.air_ny) == (5.0, *city.air.shape)
+    assert record.outline_ptr[-1] == len(record.outline_x_m) == len(record.outline_y_m)
+
+
+def test_the_record_of_a_city_without_civilians_or_brigades():
+    nobody = np.empty(0, np.int32)
+    record = city_record(town(), Placement(nobody, nobody, np.empty((0, 2), np.int32), nobody), Parameters())
+    assert len(record.civilian_x_m) == len(record.civilian_hp) == len(record.brigade_range_m) == 0

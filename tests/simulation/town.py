@@ -16,8 +16,7 @@ from fireworld.policy.kernel import KernelPolicy, always, at_random, each_anothe
 from fireworld.rewards import Reward
 from fireworld.simulation.city_arrays import city_arrays
 from fireworld.simulation.placement import Placement
-from fireworld.simulation.start import prepare_start
-from fireworld.simulation.world import World
+from fireworld.simulation.world import World, prepare_start
 
 POLICIES = ("fixed", "each-another", "random", "table", "table-of-270", "ranking-of-named", "ranking-of-all")
 

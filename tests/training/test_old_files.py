@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fireworld.policy.teams import team_names, team_path
 from fireworld.policy.teams.ranking_team import RankingTeam
-from fireworld.policy.teams.shipped import team_names, team_path
 from fireworld.policy.teams.table_team import TableTeam
 from fireworld.policy.teams.team import load_team
 from fireworld.training.training import Training

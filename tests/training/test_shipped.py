@@ -12,7 +12,7 @@ from fireworld_recorder.reader import open_log
 from benchmarks.shipped import COMMANDS
 from fireworld.errors import PolicyError
 from fireworld.policy.names import find_policy
-from fireworld.policy.teams.shipped import team_names, team_path
+from fireworld.policy.teams import team_names, team_path
 from fireworld.policy.teams.table_team import TableTeam
 from fireworld.policy.teams.team import load_team
 from fireworld.training.curriculum import load_curriculum
@@ -91,7 +91,7 @@ def test_help_and_hints_name_them(fireworld):
 
 
 def test_any_team_in_the_folder_is_found(tmp_path, monkeypatch):
-    monkeypatch.setattr("fireworld.policy.teams.shipped._FOLDER", tmp_path)
+    monkeypatch.setattr("fireworld.policy.teams._FOLDER", tmp_path)
     assert team_names() == []
     TableTeam(np.zeros((1, 270, 4)), np.zeros((1, 270, 4), dtype=np.int64)).save(tmp_path / "mine.npz")
     assert team_names() == ["mine"]

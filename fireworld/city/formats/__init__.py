@@ -19,15 +19,9 @@ FORMATS: Final = {".json": "fireworld.city.formats.json_plan"}
 
 
 def read_plan(content: bytes, *, file: Path, where: str) -> Plan:
-    """Return the plan of a city from the content of its file.
+    """Return the plan of a city from the content of its file, whose name says the format, and names the city.
 
-    Args:
-        content: of the file.
-        file: its name says the format, and names the city.
-        where: what errors call it.
-
-    Raises:
-        CityError: there is no such format, or the content makes no city.
+    Raises CityError, which begins with `where`, if there is no such format, or the content makes no city.
     """
     module = FORMATS.get(file.suffix.lower())
     if module is None:

@@ -33,16 +33,7 @@ GROUND_AREA_MAX_M2: Final = 10_000_000
 
 
 def parse_plan(text: bytes, *, where: str, name: str = "city") -> Plan:
-    """Read the contents of a city file.
-
-    Args:
-        text: JSON.
-        where: what errors call the file.
-        name: name of a city without one of its own.
-
-    Raises:
-        CityError: it makes no city.
-    """
+    """Read the JSON of a city file, which may say another name; CityError, beginning with `where`, if it makes none."""
     document = Fields(where, "", _parse_json(text, where))
     document.allow_only(*READ_KEYS, *IGNORED_KEYS)
     items = document.array("buildings")

@@ -12,7 +12,6 @@ from typing import IO, Any, Final
 import numpy as np
 
 from fireworld.errors import TrainingError, expected
-from fireworld.files import check_output, written_beside
 from fireworld.records import Array
 
 SUFFIX: Final = ".npz"
@@ -21,25 +20,8 @@ SIZE_MAX_BYTES: Final = 300_000_000
 """Above the tables of a thousand brigades, which are the most that a scenario can have."""
 
 
-def write_arrays(path: Path, header: Mapping[str, Any], arrays: Mapping[str, Array], *, force: bool = False) -> None:
-    """Write arrays and a header of plain values, beside and renamed; equal content gives equal bytes.
-
-    Args:
-        path: the file to make.
-        header: its `format` says what kind of file it is.
-        arrays: by name.
-        force: replace an existing file.
-
-    Raises:
-        OutputError: the file exists, or cannot be written.
-    """
-    check_output(path, force=force)
-    with written_beside(path) as partial:
-        pack_arrays(partial, header, arrays)
-
-
 def pack_arrays(place: Path | IO[bytes], header: Mapping[str, Any], arrays: Mapping[str, Array]) -> None:
-    """Write the content of such a file to a path or a binary stream; arguments as for `write_arrays`."""
+    """Write arrays and a header of plain values, whose `format` says what they are; equal content gives equal bytes."""
     text = np.frombuffer(json.dumps(header, sort_keys=True).encode(), dtype=np.uint8)
     with zipfile.ZipFile(place, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, array in {"header": text, **arrays}.items():
@@ -48,11 +30,7 @@ def pack_arrays(place: Path | IO[bytes], header: Mapping[str, Any], arrays: Mapp
 
 
 def read_bytes(path: Path) -> bytes:
-    """Read a file that is meant to be a team file.
-
-    Raises:
-        TrainingError: it cannot be read, or is too large.
-    """
+    """Read a file that is meant to be a team file; TrainingError if it cannot be read, or is too large."""
     try:
         if path.stat().st_size > SIZE_MAX_BYTES:
             wanted = f"a team file of at most {SIZE_MAX_BYTES} bytes"
@@ -64,15 +42,7 @@ def read_bytes(path: Path) -> bytes:
 
 
 def parse_arrays(content: bytes, *, source: str) -> tuple[dict[str, Any], dict[str, Array]]:
-    """Return the header and the arrays of a file.
-
-    Args:
-        content: of the file.
-        source: what errors call it.
-
-    Raises:
-        TrainingError: it is not such a file.
-    """
+    """Return the header and the arrays of such a file; TrainingError, which names the source, if it is none."""
     arrays = {}
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:

@@ -16,13 +16,12 @@ from fireworld.policy.teams.npz import check_arrays, check_finite
 from fireworld.policy.teams.ranking_words import (
     HINT,
     N_TARGET_WEIGHTS,
+    STRENGTHS,
     WEIGHTS,
     Preference,
     RankingDifference,
     Weight,
     WeightChange,
-    preferences,
-    sentences,
     targets_in_words,
 )
 from fireworld.policy.teams.team import Team, no_states
@@ -97,18 +96,27 @@ class RankingTeam(Team):
 
     def preferences(self, *, row: int) -> list[Preference]:
         """Return what the brigades that follow a row prefer, the largest weight first; weights of 0 are left out."""
-        return preferences(zip(self.counted, self.weights[row].tolist(), strict=False))
+        chosen = sorted(zip(self.counted, self.weights[row].tolist(), strict=False), key=lambda pair: -abs(pair[1]))
+        largest = abs(chosen[0][1])
+        found = []
+        for weight, value in chosen:
+            if value != 0.0:
+                strength = next((word for word, share in STRENGTHS if abs(value) >= share * largest), "")
+                found.append(Preference(weight, value, strength))
+        return found
 
     def sentences(self, *, row: int) -> Iterator[str]:
         """Yield what the brigades that follow a row do, a sentence for each strength."""
-        return sentences(self.preferences(row=row))
+        found = self.preferences(row=row)
+        if not found:
+            yield "all weights are 0: every target is worth the same, and the first one is taken"
+        for strength, _ in STRENGTHS:
+            words = [preference.words for preference in found if preference.strength == strength]
+            if words:
+                yield f"{strength}: {', '.join(words)}"
 
     def difference(self, other: Self) -> RankingDifference:
-        """Compare the weights of another team with these.
-
-        Raises:
-            TrainingError: they have another number of rows.
-        """
+        """Compare the weights of another team with these; TrainingError if it has another number of rows."""
         if len(self.weights) != len(other.weights):
             wanted = f"as many rows as in A, {len(self.weights)}"
             raise TrainingError(expected("B", "weights", wanted, f"{len(other.weights)} of them"))

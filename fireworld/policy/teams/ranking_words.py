@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Final, NamedTuple
@@ -65,28 +65,6 @@ class Preference:
     def as_dict(self) -> dict[str, Any]:
         """Return the preference as plain values."""
         return {"weight": self.weight.name, "strength": self.strength, "words": self.words}
-
-
-def preferences(row: Iterable[tuple[Weight, float]]) -> list[Preference]:
-    """Return what weights and their values come to, the largest first; values of 0 are left out."""
-    chosen = sorted(row, key=lambda pair: -abs(pair[1]))
-    largest = abs(chosen[0][1])
-    found = []
-    for weight, value in chosen:
-        if value != 0.0:
-            strength = next((word for word, share in STRENGTHS if abs(value) >= share * largest), "")
-            found.append(Preference(weight, value, strength))
-    return found
-
-
-def sentences(found: Sequence[Preference]) -> Iterator[str]:
-    """Yield what a brigade with these preferences does, a sentence for each strength."""
-    if not found:
-        yield "all weights are 0: every target is worth the same, and the first one is taken"
-    for strength, _ in STRENGTHS:
-        words = [preference.words for preference in found if preference.strength == strength]
-        if words:
-            yield f"{strength}: {', '.join(words)}"
 
 
 def targets_in_words(*, own_targets: bool) -> str:

@@ -13,7 +13,7 @@ from fireworld.errors import TrainingError, expected
 from fireworld.kernels.arrays import Array
 from fireworld.policy.kernel import KernelPolicy, from_tables
 from fireworld.policy.teams.npz import check_arrays, check_finite
-from fireworld.policy.teams.table_words import Choice, TableDifference, TableSummary, describe_choices, first_state
+from fireworld.policy.teams.table_words import Choice, TableDifference, describe_choices, first_state
 from fireworld.policy.teams.team import Team
 from fireworld.policy.words import N_STATES, N_STATES_ALONE, find_states
 from fireworld.records import ACTIONS
@@ -103,13 +103,13 @@ class TableTeam(Team):
             visits=tuple(self.visits[table, row].tolist()),
         )
 
-    def summaries(self) -> list[TableSummary]:
-        """Return what each table does overall."""
+    def summaries(self) -> list[tuple[int, list[int]]]:
+        """Return how many states each table visited, and in how many of these it prefers each action."""
         found = []
         for values, visits in zip(self.tables, self.visits, strict=True):
             visited = visits.any(axis=1)
             counts = np.bincount(values[visited].argmax(axis=1), minlength=len(ACTIONS))
-            found.append(TableSummary(int(visited.sum()), tuple(counts.tolist())))
+            found.append((int(visited.sum()), counts.tolist()))
         return found
 
     def agreement(self) -> tuple[int, int]:
@@ -119,11 +119,7 @@ class TableTeam(Team):
         return int((actions == actions[0]).all(axis=0).sum()), int(everywhere.sum())
 
     def difference(self, other: Self) -> TableDifference:
-        """Compare the tables of another team with these, state by state.
-
-        Raises:
-            TrainingError: they have other states, or another number of tables.
-        """
+        """Compare the tables of another team with these; TrainingError if they have another shape."""
         n_tables, n_states, _ = self.tables.shape
         if self.tables.shape != other.tables.shape:
             got = f"{other.tables.shape[0]} of {other.tables.shape[1]} states"
@@ -148,8 +144,9 @@ class TableTeam(Team):
         yield f"{self.summary}, {'with' if n_states == N_STATES else 'without'} what the others do"
         yield from (*self.origin, f"digest {self.digest}", "")
         summaries = self.summaries()
-        rows = [["states visited", *(str(one.n_visited) for one in summaries)]]
-        rows += [[action, *(one.share(k) for one in summaries)] for k, action in enumerate(ACTIONS)]
+        rows = [["states visited", *(str(n_visited) for n_visited, _ in summaries)]]
+        for k, action in enumerate(ACTIONS):
+            rows.append([action, *(f"{100 * n_by[k] / n:.0f} %" if n else "-" for n, n_by in summaries)])
         yield TextTable(["", *(f"brigade {number}" for number in range(n_tables))], rows)
         if n_tables > 1:
             same, common = self.agreement()
@@ -166,7 +163,7 @@ class TableTeam(Team):
             "n_tables": self.tables.shape[0],
             "n_states": self.tables.shape[1],
             "provenance": self.short_provenance,
-            "tables": [{"n_visited": one.n_visited, "n_by_action": one.n_by_action} for one in self.summaries()],
+            "tables": [{"n_visited": n, "n_by_action": n_by} for n, n_by in self.summaries()],
             "states": [choice.as_dict() for state in found for choice in self._choices(state)],
         }
 

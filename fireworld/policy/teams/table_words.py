@@ -62,19 +62,6 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class TableSummary:
-    """What one table does overall."""
-
-    n_visited: int
-    n_by_action: tuple[int, ...]
-    """Visited states in which the table prefers each action."""
-
-    def share(self, action: int) -> str:
-        """Return the share of the visited states in which it prefers an action, as text."""
-        return f"{100 * self.n_by_action[action] / self.n_visited:.0f} %" if self.n_visited else "-"
-
-
-@dataclass(frozen=True)
 class TableDifference(TeamDifference):
     """In which states two teams differ."""
 
@@ -150,14 +137,7 @@ def first_state(row: int, n_states: int) -> int:
 
 
 def describe_choices(text: str, chosen: Sequence[Sequence[Choice]], *, n_states: int, limit: int) -> Iterator[Block]:
-    """Yield what tables do in states and why; of several states only in those visited in training.
-
-    Args:
-        text: what was asked for.
-        chosen: the choices of all tables, state by state.
-        n_states: of a table, 4320 or 270.
-        limit: states at most.
-    """
+    """Yield what tables do in the states that a text asks for, and why; of several only in those seen in training."""
     listed = chosen
     if len(chosen) > 1:
         listed = [choices for choices in chosen if any(one.visited for one in choices)]

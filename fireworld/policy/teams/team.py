@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any, ClassVar, Final, Self
 
 from fireworld.errors import PolicyError, TrainingError, expected
+from fireworld.files import check_output, written_beside
 from fireworld.kernels.arrays import Array
 from fireworld.policy.kernel import KernelPolicy
-from fireworld.policy.teams.npz import SUFFIX, pack_arrays, parse_arrays, read_bytes, write_arrays
-from fireworld.policy.teams.shipped import team_names, team_path
+from fireworld.policy.teams import team_names, team_path
+from fireworld.policy.teams.npz import SUFFIX, pack_arrays, parse_arrays, read_bytes
 from fireworld.shown import SHOWN_MAX, Block, Shown
 
 FORMAT: Final = "fireworld-team/2"
@@ -169,11 +170,7 @@ class TeamDifference(Shown):
 
     @property
     def same_actions(self) -> bool:
-        """Whether they do the same, where the kind has actions beside values.
-
-        Raises:
-            TrainingError: it does not.
-        """
+        """Whether they do the same; TrainingError where the kind has no actions beside values."""
         raise TrainingError(expected("--actions-only", "", "two teams with tables of actions", self.what))
 
     @abstractmethod
@@ -182,16 +179,7 @@ class TeamDifference(Shown):
 
 
 def compare_teams(a: Team, b: Team, *, names: tuple[str, str] = ("A", "B")) -> TeamDifference:
-    """Compare team B with team A.
-
-    Args:
-        a: the first.
-        b: the second, of the same kind.
-        names: what errors call them.
-
-    Raises:
-        TrainingError: they cannot be compared.
-    """
+    """Compare team B with team A, which errors call by these names; TrainingError if they cannot be compared."""
     if a.kind != b.kind:
         raise TrainingError(expected(names[1], "", f"{a.what}, as in {names[0]}", b.what))
     return a.difference(b)
@@ -223,30 +211,20 @@ def load_team(name_or_path: str | Path) -> Team:
 
 
 def parse_team(content: bytes, *, source: str) -> Team:
-    """Read the content of a team file of any kind.
-
-    Args:
-        content: of the file.
-        source: what errors call it.
-
-    Raises:
-        TrainingError: it is not a team file, of another format, or makes no sense.
-    """
+    """Read the content of a team file of any kind; TrainingError, which names the source, if it makes no sense."""
     return _parse(content, source=source)[0]
 
 
 def read_team(path: Path) -> tuple[Team, dict[str, Array]]:
-    """Read a team file, and the arrays that it holds besides the team's, as a checkpoint does.
-
-    Raises:
-        TrainingError: as for `parse_team`, or the file cannot be read.
-    """
+    """Read a team file, and the arrays that it holds besides the team's, as a checkpoint does; errors as there."""
     return _parse(read_bytes(path), source=str(path))
 
 
 def write_team(team: Team, path: Path, *, force: bool = False, extra: Mapping[str, Array] | None = None) -> None:
     """Write a team file as `Team.save` does, with `extra` arrays by name, as a checkpoint has."""
-    write_arrays(path, _header(team), {**team.arrays(), **(extra or {})}, force=force)
+    check_output(path, force=force)
+    with written_beside(path) as partial:
+        pack_arrays(partial, _header(team), {**team.arrays(), **(extra or {})})
 
 
 def kinds() -> Mapping[str, type[Team]]:
