@@ -90,7 +90,7 @@ def _compare(log):
 
 
 def _info(log):
-    describe(channels_of(log))
+    describe(channels_of(log.found))
     for options in ([], ["--json"], ["--schema"]):
         done = CliRunner().invoke(command, [str(log.path), *options], standalone_mode=False)
         if done.exception is not None:
