@@ -108,7 +108,7 @@ def course_of(log: TrainingLog) -> Course:
         scenarios=tuple(names[: scenario.max(initial=-1) + 1]),
         scenario=scenario if (scenario >= 0).all() else scenario[:0],
         marks=tuple(marks),
-        tables=_table_picture(log),
+        tables=table_picture(log),
     )
 
 
@@ -120,8 +120,8 @@ def mark_of(log: TrainingLog, number: int, episode: Episode, report: Report, nam
     return Mark(number, report.text, episode.converged, command)
 
 
-def _table_picture(log: TrainingLog) -> TablePicture | None:
-    """Return the tables over a training; None where it has none yet."""
+def table_picture(log: TrainingLog) -> TablePicture | None:
+    """Return the tables over a training, read in one pass; None where it has none yet."""
     found = list(_tables(log))
     if not found:
         return None

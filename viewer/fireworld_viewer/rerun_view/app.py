@@ -48,6 +48,24 @@ def save(
     write_file(path, _rrd(recordings, focus, outcome))
 
 
+def save_training(
+    write: Callable[[rerun.RecordingStream], None], path: Path, *, identity: str, title: str, force: bool = False
+) -> None:
+    """Write the curves of trainings as a Rerun file: `write` sends them to a stream.
+
+    `identity` names what is shown, for Rerun merges what has one name. Errors: OutputError, or ViewError if Rerun is
+    missing.
+    """
+    check_output(path, force=force)
+    rerun = _import_rerun()
+    stream = new_stream(f"{APPLICATION_ID}-{title}", recording_id=identity[:32])
+    memory = stream.memory_recording()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", rerun.error_utils.RerunWarning)
+        write(stream)
+    write_file(path, memory.drain_as_bytes())
+
+
 def show(write: Callable[[Path], None]) -> None:
     """Open the Rerun file that `write` makes in Rerun's own window, and return when it is closed.
 
