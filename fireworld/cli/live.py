@@ -68,7 +68,7 @@ def watched_trainings(screen: Screen | None, trainings: Sequence[Training]) -> I
         return
     from fireworld_viewer.rerun_view.live import TrainingView
 
-    from fireworld.recording.pages.training_view import layout_of, point_of
+    from fireworld.training.log.pages.view import layout_of, point_of
 
     for training in trainings:
         training.trainer.watched = True

@@ -68,7 +68,7 @@ def command(
     if trainings:
         if any(option is not None for option in (step, steps, first, last, every, fps)):
             raise click.UsageError("A training is drawn whole: no steps, ranges or frames.")
-        from fireworld.recording.pages.training_page import render_training
+        from fireworld.training.log.pages.page import render_training
 
         render_training(trainings, output, force=force)
         click.echo(f"{output}: {sum(map(len, trainings)):,} {trainings[0].header.unit}s, {_size(output)}")

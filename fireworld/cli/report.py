@@ -34,7 +34,7 @@ def command(*, logs: tuple[Path, ...], output: Path, force: bool) -> None:
     check_output(output, endings=ENDINGS, force=force)
     trainings = open_trainings(logs, doing="reporting")
     if trainings:
-        from fireworld.recording.pages.training_page import report_training
+        from fireworld.training.log.pages.page import report_training
 
         report_training(trainings, output, force=force)
         click.echo(f"wrote {output}; open it in a browser")

@@ -78,7 +78,7 @@ def command(
         if focus or first is not None or last is not None or every != 1 or air:
             raise click.UsageError("--focus, --from, --to, --every and --air go with runs, not with trainings.")
         announce_compilation()
-        from fireworld.recording.pages.training_view import view_trainings
+        from fireworld.training.log.pages.view import view_trainings
 
         view_trainings(trainings, save=output, force=force, web=web, port=port, announce=_announce)
         _say_written(output)

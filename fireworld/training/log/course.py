@@ -66,6 +66,7 @@ class Course:
         titles: of the plots by their names.
         plots: by plot, then by curve: (k,) values, nan where there is none.
         scenarios: names of those that have begun, in their order.
+        stages: the stage of each.
         scenario: (k,) which of them each part is of; empty of a search.
         marks: ends of scenarios, or nothing.
         tables: the tables over the training; None where there are none.
@@ -76,6 +77,7 @@ class Course:
     titles: Mapping[str, str]
     plots: Mapping[str, Mapping[str, Array]]
     scenarios: tuple[str, ...]
+    stages: tuple[str, ...]
     scenario: Array
     marks: tuple[Mark, ...]
     tables: TablePicture | None
@@ -106,6 +108,7 @@ def course_of(log: TrainingLog) -> Course:
         titles={**trainer.plots, **trainer.own_plots()},
         plots=plots,
         scenarios=tuple(names[: scenario.max(initial=-1) + 1]),
+        stages=tuple(log.curriculum.stages[k].name for k in log.plan.stage[: scenario.max(initial=-1) + 1]),
         scenario=scenario if (scenario >= 0).all() else scenario[:0],
         marks=tuple(marks),
         tables=table_picture(log),
@@ -138,7 +141,7 @@ def table_picture(log: TrainingLog) -> TablePicture | None:
         values, visits = tables.arrays
         rows = states // (N_STATES // tables.n_states)
         seen = values[:, rows].any(axis=2) | visits[:, rows].any(axis=2)  # (tables, states)
-        n = tables.n_tables
+        n = tables.n_tables if tables.n_tables > 1 else n_tables  # one table serves all brigades
         action[:, :n, moment] = np.where(seen, values[:, rows].argmax(axis=2), -1).T
         value[:, :n, moment] = np.where(seen, values[:, rows].max(axis=2), np.nan).T
     return TablePicture(

@@ -24,8 +24,6 @@ _ACROSS: Final = 2
 _WIDTH_INCHES: Final = 12.0
 _PANEL_INCHES: Final = 2.0
 _BAND: Final = "#efece5"
-_NAMES_SHOWN_MAX: Final = 16
-"""Scenarios at most whose bands have their names."""
 
 
 @dataclass(frozen=True)
@@ -45,13 +43,23 @@ class CoursePanel:
     logarithmic: bool = False
 
 
-def draw_course(panels: Sequence[CoursePanel], bands: Sequence[tuple[int, int, str]], *, unit: str) -> Figure:
-    """Draw the panels two abreast; `bands` are first and last part and name of each scenario of the first training."""
+def draw_course(
+    panels: Sequence[CoursePanel],
+    bands: Sequence[tuple[int, int]],
+    labels: Sequence[tuple[int, int, str]],
+    *,
+    unit: str,
+) -> Figure:
+    """Draw the panels two abreast.
+
+    `bands` are first and last part of each scenario of the first training, of which every second is shaded; `labels`
+    are first and last part of what is named above the panels.
+    """
     n_rows = -(-len(panels) // _ACROSS)
     figure = new_figure(_WIDTH_INCHES, n_rows * _PANEL_INCHES + 0.4, dpi=110, paper="white", layout="constrained")
     grid = figure.subplots(n_rows, _ACROSS, sharex=True, squeeze=False).ravel()
     for axes, panel in zip(grid, panels, strict=False):
-        _draw_bands(axes, bands)
+        _draw_bands(axes, bands, labels)
         several = len(panel.curves) > 1
         for k, (name, curves) in enumerate(panel.curves.items()):
             for j, (curve, values) in enumerate(curves.items()):
@@ -75,22 +83,21 @@ def draw_course(panels: Sequence[CoursePanel], bands: Sequence[tuple[int, int, s
 _COLORS: Final = ((31, 111, 235), (194, 87, 26), (120, 120, 120), (30, 143, 69), (138, 111, 176))
 
 
-def _draw_bands(axes: Axes, bands: Sequence[tuple[int, int, str]]) -> None:
-    """Shade every second scenario, and name them where there is room."""
-    for k, (first, last, name) in enumerate(bands):
-        if k % 2 == 0:
-            axes.axvspan(first - 0.5, last + 0.5, color=_BAND, linewidth=0, zorder=0)
-        if len(bands) <= _NAMES_SHOWN_MAX:
-            axes.text(
-                (first + last) / 2, 1.0, name, fontsize=6.5, color="#777777", ha="center", va="bottom",
-                transform=axes.get_xaxis_transform(), rotation=0 if len(bands) <= 6 else 30,
-            )  # fmt: skip
+def _draw_bands(axes: Axes, bands: Sequence[tuple[int, int]], labels: Sequence[tuple[int, int, str]]) -> None:
+    """Shade every second band, and write the labels above."""
+    for first, last in bands[::2]:
+        axes.axvspan(first - 0.5, last + 0.5, color=_BAND, linewidth=0, zorder=0)
+    for first, last, name in labels:
+        axes.text(
+            (first + last) / 2, 1.0, name, fontsize=6.5, color="#777777", ha="center", va="bottom",
+            transform=axes.get_xaxis_transform(), clip_on=False,
+        )  # fmt: skip
 
 
 def _dress(axes: Axes, panel: CoursePanel) -> None:
     if panel.logarithmic:
         axes.set_yscale("symlog", linthresh=10.0)
-    axes.set_title(panel.title, fontsize=9.5, loc="left", color=INK, pad=10)
+    axes.set_title(panel.title, fontsize=9.5, loc="left", color=INK, pad=12)
     handles, _ = axes.get_legend_handles_labels()
     if handles:
         axes.legend(fontsize=7.5, frameon=False, labelcolor=INK, loc="best")

@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Iterator, Sequence
 from html import escape
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from fireworld_viewer.pictures.curves import LearningPanel, draw_learning_curves
@@ -17,18 +17,24 @@ from fireworld_viewer.pictures.training import CoursePanel, draw_course, draw_ta
 from fireworld.errors import one_line
 from fireworld.files import check_output, write_file
 from fireworld.html_page import compared_row, html_figure, html_page, html_table, text_cell
+from fireworld.picture import Picture
 from fireworld.policy.words import N_STATES, short_state
-from fireworld.recording.pages.run_page import ENDINGS
-from fireworld.recording.pages.training_view import TABLES_HELP, names_of, open_trainings
 from fireworld.records import Array
 from fireworld.training.log.course import Course, course_of
 from fireworld.training.log.difference import AnyTraining
+from fireworld.training.log.pages.view import TABLES_HELP, names_of, open_trainings
 from fireworld.training.log.reader import TrainingLog
 from fireworld.training.log.records import Episode
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+ENDINGS: Final = (".html", ".htm")
 RETURN: Final = "return"
 LOGARITHMIC: Final = frozenset({"return", "td_error"})
 WINDOW: Final = 20
+NAMED_MAX: Final = 12
+"""Scenarios at most that there is room to name in a panel."""
 
 
 def render_training(logs: AnyTraining | Sequence[AnyTraining], output: Path | str, *, force: bool = False) -> None:
@@ -48,8 +54,7 @@ def render_training(logs: AnyTraining | Sequence[AnyTraining], output: Path | st
     opened = open_trainings(logs)
     courses = [course_of(log) for log in opened]
     with plain_style():
-        save_figure(draw_course(_panels(courses, names_of(opened)), _bands(courses[0]), unit=courses[0].unit),
-                    Path(output), force=force)  # fmt: skip
+        save_figure(_whole(courses, names_of(opened)), Path(output), force=force)
 
 
 def report_training(logs: AnyTraining | Sequence[AnyTraining], output: Path | str, *, force: bool = False) -> None:
@@ -62,11 +67,12 @@ def report_training(logs: AnyTraining | Sequence[AnyTraining], output: Path | st
     write_file(Path(output), training_page(opened).encode())
 
 
-def course_png(log: TrainingLog) -> bytes:
-    """Return the curves of a training as a PNG file."""
-    course = course_of(log)
+def course_picture(log: TrainingLog) -> Picture:
+    """Return the curves of a training; ViewError if matplotlib is not installed."""
+    course, header = course_of(log), log.header
+    title = f"{header.method} in {header.curriculum}, seed {header.seed}: {len(log):,} {header.unit}s"
     with plain_style():
-        return png_bytes(draw_course(_panels([course], [course.name]), _bands(course), unit=course.unit))
+        return Picture(title, png_bytes(_whole([course], [course.name])))
 
 
 def training_page(logs: Sequence[TrainingLog]) -> str:
@@ -82,7 +88,7 @@ def training_page(logs: Sequence[TrainingLog]) -> str:
             _facts(logs, names),
             *_convergence(courses, names),
             "<h2>The whole training</h2>",
-            html_figure(png_bytes(draw_course(_panels(courses, names), _bands(courses[0]), unit=courses[0].unit)),
+            html_figure(png_bytes(_whole(courses, names)),
                         "Bands are scenarios; diamonds stand where a policy had settled. Returns and errors on a "
                         "logarithmic scale."),
             *(part for course, name in zip(courses, names, strict=True) for part in _tables(course, name)),
@@ -127,14 +133,27 @@ def _panels(courses: Sequence[Course], names: Sequence[str]) -> list[CoursePanel
     return found
 
 
-def _bands(course: Course) -> list[tuple[int, int, str]]:
-    """Return first and last part and name of every scenario."""
-    found = []
-    for number, name in enumerate(course.scenarios):
-        places = np.flatnonzero(course.scenario == number)
-        if len(places):
-            found.append((int(places[0]), int(places[-1]), name))
-    return found
+def _bands(course: Course) -> list[tuple[int, int]]:
+    """Return first and last part of every scenario."""
+    places = [np.flatnonzero(course.scenario == number) for number in range(len(course.scenarios))]
+    return [(int(one[0]), int(one[-1])) for one in places if len(one)]
+
+
+def _labels(course: Course) -> list[tuple[int, int, str]]:
+    """Return first and last part and name of what there is room to name: scenarios, or else their stages."""
+    bands = _bands(course)
+    if len(bands) <= NAMED_MAX:
+        return [(*band, name) for band, name in zip(bands, course.scenarios, strict=False)]
+    found: dict[str, list[int]] = {}
+    for (first, last), stage in zip(bands, course.stages, strict=False):
+        found.setdefault(stage, []).extend((first, last))
+    return [(places[0], places[-1], stage) for stage, places in found.items()]
+
+
+def _whole(courses: Sequence[Course], names: Sequence[str]) -> Figure:
+    """Draw all curves."""
+    first = courses[0]
+    return draw_course(_panels(courses, names), _bands(first), _labels(first), unit=first.unit)
 
 
 def _convergence(courses: Sequence[Course], names: Sequence[str]) -> Iterator[str]:
@@ -153,7 +172,7 @@ def _convergence(courses: Sequence[Course], names: Sequence[str]) -> Iterator[st
         settled = float((first.scenario == number).sum() - 1) if ends else float("nan")
         panels.append(LearningPanel(title=name, curves=curves, marked_episode=settled))
     yield "<h2>Convergence</h2>"
-    figure = draw_learning_curves(panels, label="return of the episode", mark="settled")
+    figure = draw_learning_curves(panels, label="return of the episode", mark="policy settled")
     caption = "The return of every episode, by scenario; the dotted line: the policy has settled."
     yield html_figure(png_bytes(figure), caption)
 
