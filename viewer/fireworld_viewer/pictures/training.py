@@ -64,7 +64,7 @@ def draw_course(
         for k, (name, curves) in enumerate(panel.curves.items()):
             for j, (curve, values) in enumerate(curves.items()):
                 color = PAIR_COLORS[k] if several else hexadecimal(_COLORS[j % len(_COLORS)])
-                label = ", ".join(filter(None, (name if several else "", curve)))
+                label = curve if not several else name if j == 0 and axes is grid[0] else ""
                 width = 1.2 if len(curves) == 1 or j == 1 else 0.7
                 axes.plot(np.arange(len(values)), values, color=color, linewidth=width, alpha=0.9, label=label or None)
                 if j == 0 and name in panel.marks:
