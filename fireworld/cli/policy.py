@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
+from fireworld.cli.compiling import announce_compilation
+from fireworld.cli.progress import bar
 from fireworld.cli.tables import print_blocks, print_table
+
+if TYPE_CHECKING:
+    from fireworld.policy.teams.team import Team
 
 HISTORIES_MAX = 12
 """States at most whose histories are shown at a time."""
