@@ -46,6 +46,14 @@ class Moment:
         """The greedy action."""
         return ACTIONS[int(np.argmax(self.q_values))]
 
+    @property
+    def cells(self) -> list[str]:
+        """The values in words, the greedy one marked."""
+        return [
+            f"{'*' if name == self.action else ''}{value:.5g}"
+            for name, value in zip(ACTIONS, self.q_values, strict=True)
+        ]
+
 
 @dataclass(frozen=True)
 class Move:
@@ -105,32 +113,31 @@ class StateHistory(Shown):
         yield f"{self.n_updates:,} updates, the first in {first.scenario}, episode {first.episode}, step {first.step}"
         yield ""
         changed = list(self._changes())
-        heads = ["after", "table", *ACTIONS, "prefers"]
-        rows = [
-            [one.scenario, str(one.table), *(f"{value:.4g}" for value in one.q_values), one.action] for one in changed
-        ]
-        yield TextTable(heads, rows[-limit:], n_left=2)
+        rows = [[one.scenario, str(one.table), *one.cells] for one in changed]
+        heads = ["after", "table", *(action.removeprefix("nearest-") for action in ACTIONS)]
+        yield TextTable(heads, rows[-limit:])
         if len(rows) > limit:
             yield f"{len(rows) - limit} changes before these; --limit shows more, --json all"
+        yield "* what the table prefers"
         yield ""
         yield "the steps that moved it most"
         yield TextTable(
-            ["scenario", "episode", "step", "brigade", "action", "how", "before", "after", "TD error"],
+            ["scenario", "episode", "step", "brig", "before", "after", "action"],
             [
                 [
                     one.scenario,
                     str(one.episode),
                     str(one.step),
                     str(one.brigade),
-                    one.action,
-                    one.choice,
                     f"{one.value_before:.5g}",
                     f"{one.value_after:.5g}",
-                    f"{one.td_error:.5g}",
+                    f"{one.action}{' ?' if one.choice == 'explored' else ''}",
                 ]
                 for one in self.moves
             ],
         )
+        yield "? explored"
+        yield ""
         top = self.moves[0]
         where = f"--scenario {top.scenario} --episode {top.episode}"
         yield f"fireworld replay {self.log} {where} -o episode.mcap   opens the first of these"
