@@ -23,12 +23,12 @@ def open_trainings(paths: Sequence[Path], *, doing: str) -> list[TrainingLog]:
     """
     from fireworld_recorder.kind import noun_of
 
-    from fireworld.errors import LogError, expected
-    from fireworld.training.log.reader import open_training
-
     are = [noun_of(path) == "training" for path in paths]
     if not any(are):
         return []
+    from fireworld.errors import LogError, expected
+    from fireworld.training.log.reader import open_training
+
     if len(paths) > 2:
         raise click.UsageError(f"Expected one or two recordings, got {len(paths)}.")
     if not all(are):
