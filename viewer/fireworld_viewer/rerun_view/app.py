@@ -87,9 +87,9 @@ def serve(write: Callable[[Path], None], *, port: int = WEB_PORT, announce: Call
     except OSError:
         raise ViewError(expected("view", "--port", "a free port", port, "try another one")) from None
     data_port = free_port()
-    announce(f"http://{LOCALHOST}:{port}?url=rerun%2Bhttp%3A%2F%2F{LOCALHOST}%3A{data_port}%2Fproxy")
+    address = f"http://{LOCALHOST}:{port}?url=rerun%2Bhttp%3A%2F%2F{LOCALHOST}%3A{data_port}%2Fproxy"
     ports = ["--web-viewer-port", str(port), "--port", str(data_port)]
-    _run_viewer(write, ["--serve-web", *ports])
+    _run_viewer(write, ["--serve-web", *ports], announce=lambda: announce(address))
 
 
 def check_display(option: str, others: str) -> None:
@@ -178,11 +178,14 @@ def _identity(recordings: Sequence[Recording]) -> str:
     return digest.hexdigest()[:32]
 
 
-def _run_viewer(write: Callable[[Path], None], options: list[str]) -> None:
+def _run_viewer(
+    write: Callable[[Path], None], options: list[str], *, announce: Callable[[], object] = lambda: None
+) -> None:
     """Run Rerun's viewer on a file until it ends or this process is stopped; it never outlives this process."""
     with tempfile.TemporaryDirectory(prefix="fireworld-") as folder:
         path = Path(folder) / "view.rrd"
         write(path)
+        announce()
         command = [str(viewer_executable()), "--bind", LOCALHOST, *options, str(path)]
         before = signal.signal(signal.SIGTERM, signal.default_int_handler)
         with (Path(folder) / "errors").open("w+", encoding="utf-8", errors="replace") as errors:
