@@ -39,6 +39,7 @@ class TrainingLayout:
     plots: Mapping[str, str]  # titles of the plots that are always seen, by name
     tabs: Mapping[str, LayoutTab] = field(default_factory=dict)  # below them, by title
     log: str = ""  # title of the log; empty for none
+    grows: bool = True  # the view follows what comes
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ class CurveWriter:
         if curve not in drawn:
             rgb = colors.single(colors.BRIGADE_RGB[len(drawn) % len(colors.BRIGADE_RGB)])
             drawn.append(curve)
-            style: Any = rerun.SeriesLines(names=[curve], colors=rgb, widths=[1.5])
+            style: Any = rerun.SeriesLines(names=[curve or plot.replace("_", " ")], colors=rgb, widths=[1.5])
             if points:
                 style = rerun.SeriesPoints(names=[curve], colors=rgb, markers="Diamond", marker_sizes=[4.0])
             self._stream.log(f"{plot}/{curve}", style, static=True)
@@ -146,7 +147,9 @@ def _blueprint(layout: TrainingLayout) -> Any:
         root = rrb.Horizontal(root, log, column_shares=[3, 1])
     return rrb.Blueprint(
         root,
-        rrb.TimePanel(state="collapsed", timeline=layout.timeline, play_state="following"),
+        rrb.TimePanel(
+            state="collapsed", timeline=layout.timeline, play_state="following" if layout.grows else "paused"
+        ),
         rrb.BlueprintPanel(state="expanded"),
         rrb.SelectionPanel(state="collapsed"),
     )
