@@ -39,7 +39,7 @@ class TrainingLayout:
     plots: Mapping[str, str]  # titles of the plots that are always seen, by name
     tabs: Mapping[str, LayoutTab] = field(default_factory=dict)  # below them, by title
     log: str = ""  # title of the log; empty for none
-    grows: bool = True  # the view follows what comes
+    n_parts: int = 0  # how many there are, all of which are then in sight; 0: more and more, and the view follows
 
 
 @dataclass(frozen=True)
@@ -125,9 +125,17 @@ def _blueprint(layout: TrainingLayout) -> Any:
     """Lay out the plots in a grid, the tabs below them, the log beside."""
     import rerun.blueprint as rrb
 
+    axis = None
+    if layout.n_parts:
+        bounds = rrb.TimeRangeBoundary.absolute(seq=0), rrb.TimeRangeBoundary.absolute(seq=layout.n_parts)
+        axis = rrb.TimeAxis(view_range=rrb.TimeRange(*bounds))
+
     def grid(plots: Mapping[str, str], n_columns: int) -> Any:
         legend = rrb.PlotLegend(rrb.Corner2D.LeftTop)
-        views = [rrb.TimeSeriesView(name=title, origin=f"/{name}", plot_legend=legend) for name, title in plots.items()]
+        views = [
+            rrb.TimeSeriesView(name=title, origin=f"/{name}", plot_legend=legend, axis_x=axis)
+            for name, title in plots.items()
+        ]
         return rrb.Grid(*views, grid_columns=n_columns)
 
     root = grid(layout.plots, 2 if len(layout.plots) <= _FEW else 3)
@@ -148,7 +156,7 @@ def _blueprint(layout: TrainingLayout) -> Any:
     return rrb.Blueprint(
         root,
         rrb.TimePanel(
-            state="collapsed", timeline=layout.timeline, play_state="following" if layout.grows else "paused"
+            state="collapsed", timeline=layout.timeline, play_state="paused" if layout.n_parts else "following"
         ),
         rrb.BlueprintPanel(state="expanded"),
         rrb.SelectionPanel(state="collapsed"),
