@@ -23,6 +23,7 @@ from fireworld.cli.progress import BAR, COUNT, DESCRIPTION, ELAPSED, bars
     help="Folder to make.",
 )
 @click.option("--quick", is_flag=True, help="Few repetitions and seeds: to see how it looks, not to claim anything.")
+@click.option("--record-trainings", is_flag=True, help="Keep the logs of all trainings in DIR/trainings.")
 @click.option("--resume", is_flag=True, help="Continue what an interrupted call left in DIR.")
 @click.option("--force", is_flag=True, help="Replace an earlier reproduction in DIR.")
 def command(
@@ -32,6 +33,7 @@ def command(
     jobs: int | None,
     out: Path,
     quick: bool,
+    record_trainings: bool,
     resume: bool,
     force: bool,
 ) -> None:
@@ -59,6 +61,7 @@ def command(
             repetitions=repetitions,
             seeds=seeds,
             quick=quick,
+            record_trainings=record_trainings,
             resume=resume,
             force=force,
             executor=jobs,

@@ -26,7 +26,7 @@ from fireworld.training.training import check_same
 FORMAT: Final = "fireworld-reproduction/1"
 REPORT: Final = "report.html"
 SETTINGS: Final = "kept/settings.json"  # what the work in a folder was begun with
-SUBFOLDERS: Final = ("kept", "teams", "recordings", "figures")
+SUBFOLDERS: Final = ("kept", "teams", "recordings", "figures", "trainings")
 _HINT: Final = "delete it and it is made anew"
 
 Content = TypeVar("Content")
@@ -45,6 +45,11 @@ class ReproductionFolder:
     """The folder of a reproduction."""
 
     path: Path
+
+    @property
+    def trainings(self) -> Path:
+        """The folder of the training logs."""
+        return self.path / "trainings"
 
     def make(self, *, force: bool) -> None:
         """Make the folder; delete what an earlier reproduction left in it (`force`), or raise OutputError."""
@@ -167,6 +172,7 @@ class ReproductionFolder:
         scattered = [found for name in ("training", "tests") for found in path.glob(f"kept/{name}-*.json*")]
         scattered += [found for team in TEAMS for found in path.glob(f"teams/{team}-*.npz*")]
         scattered += [found for team in TEAMS for found in path.glob(f"recordings/*-{team}.mcap*")]
+        scattered += [found for team in TEAMS for found in path.glob(f"trainings/{team}-*.mcap*")]
         return [*scattered, *path.glob("figures/*.png"), *(path / name for name in (*CSV_FILES, REPORT))]
 
     def _read(self, path: Path, kind: type[Content]) -> Content | None:

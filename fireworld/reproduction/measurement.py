@@ -56,6 +56,7 @@ class Measurement:
     stop: Event = field(default_factory=Event)  # set it, and a part under way raises Interrupted
     on_progress: OnProgress = lambda *_: None  # called after every scenario of a training and every test of a policy
     cities: CityCache = field(default_factory=CityCache)
+    record_trainings: bool = False  # their logs are kept in the folder, too
 
     @cached_property
     def tests(self) -> Mapping[str, BuiltScenario]:
@@ -90,6 +91,7 @@ class Measurement:
             "method": self.method.as_dict(),
             "tests": {name: built.scenario.digest for name, built in self.tests.items()},
             "fireworld": __version__,
+            **({"record_trainings": True} if self.record_trainings else {}),
         }
 
     def run(self, executor: AnyExecutor) -> tuple[Study, Repetition]:
@@ -142,6 +144,7 @@ class Measurement:
                 stop=self.stop,
                 on_scenario=self.training_parts.done,
                 with_graduates=number == 1,  # they are recorded
+                record=self.folder.trainings if self.record_trainings else None,
             )
             self.folder.write_repetition(number, trained)
         else:
@@ -160,7 +163,8 @@ class Measurement:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Send what decides the outcome; another process builds tests and cities once."""
-        return _received, (self.folder, self.curriculum, self.method, self.n_repetitions, self.seeds)
+        decides = self.folder, self.curriculum, self.method, self.n_repetitions, self.seeds
+        return _received, (decides, self.record_trainings)
 
     def _test(self, name: str, teams: Sequence[str], policies: Callable[[], dict[str, KernelPolicy]]) -> Tested:
         """Run every policy in every test under all seeds, unless the outcomes are kept under this name."""
@@ -182,5 +186,7 @@ class Measurement:
 
 
 @lru_cache(maxsize=1)
-def _received(*values: Any) -> Measurement:
-    return Measurement(*values)
+def _received(
+    decides: tuple[ReproductionFolder, Curriculum, Sarsa, int, Sequence[int]], record_trainings: bool
+) -> Measurement:
+    return Measurement(*decides, record_trainings=record_trainings)

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from fireworld_recorder.reader import open_log
 
+import fireworld as fw
 from fireworld.errors import FireworldError, OutputError, TrainingError
 from fireworld.policy.teams.team import load_team
 from fireworld.reproduction import folder as reproduction_folder
@@ -89,6 +90,24 @@ def trained(monkeypatch):
 
     monkeypatch.setattr("fireworld.reproduction.measurement.train_repetition", train_and_note)
     return numbers
+
+
+def test_recorded_trainings_are_whole_and_give_the_same_curves(curriculum, tmp_path):
+    chosen = load_curriculum(curriculum)
+    plain, recorded = train(chosen)[0], train(chosen, record=tmp_path)[0]
+    names = sorted(path.name for path in tmp_path.glob("*.mcap*"))
+    assert names == sorted(f"{team}-1.mcap" for team in (TOGETHER, TOGETHER_WITHOUT_FLAGS))
+    for one, other in zip(plain.curves, recorded.curves, strict=True):
+        assert (one.team, one.scenario, one.scenario_number) == (other.team, other.scenario, other.scenario_number)
+        assert (one.converged, one.score, one.score_max) == (other.converged, other.score, other.score_max)
+        assert one.total_reward.tolist() == other.total_reward.tolist()
+        assert one.n_changed.tolist() == other.n_changed.tolist()
+    for team, whole in ((TOGETHER, chosen), (TOGETHER_WITHOUT_FLAGS, without_flags(chosen))):
+        assert recorded.teams[team].digest == plain.teams[team].digest
+        log = tmp_path / f"{team}-1.mcap"
+        fw.train(whole, method=METHOD, record=tmp_path / "alone.mcap", force=True)
+        assert log.read_bytes() == (tmp_path / "alone.mcap").read_bytes(), "as if it had been trained by itself"
+        assert fw.open_training(log).team().digest == plain.teams[team].digest
 
 
 def test_a_repetition_equals_trainings_from_end_to_end(curriculum):
