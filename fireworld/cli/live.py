@@ -13,10 +13,9 @@ import click
 
 if TYPE_CHECKING:
     from fireworld_viewer.rerun_view.live import PlayRun, Screen
-    from fireworld_viewer.rerun_view.training_curves import TrainingLayout, TrainingPoint
 
     from fireworld.records import CityRecord, RunHeader, StepRecord
-    from fireworld.training.method import Play, Report, Trainer
+    from fireworld.training.method import Play, Report
     from fireworld.training.training import Callback, Training
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -69,56 +68,23 @@ def watched_trainings(screen: Screen | None, trainings: Sequence[Training]) -> I
         return
     from fireworld_viewer.rerun_view.live import TrainingView
 
+    from fireworld.training.log.pages.view import layout_of, point_of
+
+    for training in trainings:
+        training.trainer.watched = True
     lock = Lock()
     with closing(
-        TrainingView(screen, _layout([one.trainer for one in trainings]), warn=partial(click.echo, err=True))
+        TrainingView(screen, layout_of([one.trainer for one in trainings]), warn=partial(click.echo, err=True))
     ) as watched:
 
         def show(training: Training, report: Report) -> None:
             with lock:
+                number, team = training.n_reports, f"seed {training.seed}"
+                point = point_of(training.trainer, report, number=number, team=team)
                 play = training.trainer.play(report) if training is trainings[0] else None
-                watched.add(_point(training, report), play=play and _play_run(play))
+                watched.add(point, play=play and _play_run(play))
 
         yield show
-
-
-def _layout(trainers: Sequence[Trainer[Any, Any]]) -> TrainingLayout:
-    """Return what is drawn: plots of all teams, and a tab for each that has plots of its own."""
-    from fireworld_viewer.rerun_view.training_curves import LayoutTab, TrainingLayout
-
-    first = trainers[0]
-    return TrainingLayout(
-        title=f"training-{first.method.name}",
-        timeline=first.unit,
-        plots=first.plots,
-        tabs={f"Seed {one.seed}": LayoutTab(one.own_plots(), _page(one)) for one in trainers if one.own_plots()},
-        log="Milestones",
-    )
-
-
-def _point(training: Training, report: Report) -> TrainingPoint:
-    """Return a report as it is drawn."""
-    from fireworld_viewer.rerun_view.training_curves import TrainingPoint
-
-    trainer, team = training.trainer, f"seed {training.seed}"
-    values = {
-        plot: {", ".join(filter(None, (team, name))): value for name, value in curves.items()}
-        if plot in trainer.plots
-        else curves
-        for plot, curves in trainer.points(report).items()
-    }
-    page = trainer.page()
-    return TrainingPoint(
-        number=training.n_reports,
-        values=values,
-        note=f"{team}: {report.text}" if report.milestone else "",
-        pages={_page(trainer): page} if page else {},
-    )
-
-
-def _page(trainer: Trainer[Any, Any]) -> str:
-    """Return the name of the page about a team."""
-    return f"page/{trainer.seed}"
 
 
 def _play_run(play: Play) -> PlayRun:

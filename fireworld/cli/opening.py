@@ -11,6 +11,35 @@ import click
 if TYPE_CHECKING:
     from fireworld_recorder.reader import Log
 
+    from fireworld.training.log.reader import TrainingLog
+
+
+def open_trainings(paths: Sequence[Path], *, doing: str) -> list[TrainingLog]:
+    """Open training logs as `open_one_or_two` does runs; empty if these are none.
+
+    Raises:
+        UsageError: there are more than two.
+        LogError: one is a training and the other is not.
+    """
+    from fireworld_recorder.kind import noun_of
+
+    are = [noun_of(path) == "training" for path in paths]
+    if not any(are):
+        return []
+    from fireworld.errors import LogError, expected
+    from fireworld.training.log.reader import open_training
+
+    if len(paths) > 2:
+        raise click.UsageError(f"Expected one or two recordings, got {len(paths)}.")
+    if not all(are):
+        other = paths[are.index(False)]
+        raise LogError(expected(str(other), "", "the log of a training, as the other one", "no training"))
+    logs = [open_training(path, partial=True) for path in paths]
+    for log in logs:
+        if log.damage is not None:
+            click.echo(f"{log.path}: {log.damage}; {doing} {len(log)} committed {log.header.unit}s", err=True)
+    return logs
+
 
 def open_one_or_two(paths: Sequence[Path], *, doing: str) -> list[Log]:
     """Open logs as far as they are good; where that is not to the end, print so and what is done with the rest.

@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
+from fireworld.cli.compiling import announce_compilation
+from fireworld.cli.progress import bar
 from fireworld.cli.tables import print_blocks, print_table
 
+if TYPE_CHECKING:
+    from fireworld.policy.teams.team import Team
+
+HISTORIES_MAX = 12
+"""States at most whose histories are shown at a time."""
 SHOWN_OPTION = click.option(
     "--limit",
     default=20,
@@ -45,9 +54,15 @@ def list_policies(*, as_json: bool) -> None:
 @command.command()
 @click.argument("team", metavar="TEAM")
 @click.argument("states", metavar="[STATE]...", nargs=-1)
+@click.option(
+    "--log",
+    metavar="F.mcap",
+    type=click.Path(path_type=Path),
+    help="The training log that the team came of: show how the values of the STATEs came about.",
+)
 @SHOWN_OPTION
 @click.option("--json", "as_json", is_flag=True, help="Write JSON.")
-def show(*, team: str, states: tuple[str, ...], limit: int, as_json: bool) -> None:
+def show(*, team: str, states: tuple[str, ...], log: Path | None, limit: int, as_json: bool) -> None:
     """Show what a team does: how much it has seen, what it prefers, and in each STATE what it does and why.
 
     A STATE is its number in recordings, 0 to 4319, or some of its features; then all states that have them are meant,
@@ -60,12 +75,18 @@ def show(*, team: str, states: tuple[str, ...], limit: int, as_json: bool) -> No
     fireworld policy show team.npz 1193
     fireworld policy show team.npz free_edges=3,volume=high,distance_from_civilian=low
     fireworld policy show paper-cooperative
+    fireworld policy show team.npz 1193 --log team.mcap
+
+    With --log, the training log: the values at the end of every scenario, and the steps that moved them most.
 
     Exit code: 0 shown, 2 no such team or state.
     """
     from fireworld.policy.teams.team import load_team
 
     loaded = load_team(team)
+    if log is not None:
+        _show_history(loaded, states, log, limit=limit, as_json=as_json)
+        return
     if as_json:
         click.echo(json.dumps(loaded.as_dict(states=states, limit=limit), indent=2))
         return
@@ -101,3 +122,25 @@ def diff(context: click.Context, *, first: str, second: str, actions_only: bool,
     else:
         print_blocks(difference.describe(limit=limit))
     context.exit(0 if same else 1)
+
+
+def _show_history(team: Team, states: tuple[str, ...], path: Path, *, limit: int, as_json: bool) -> None:
+    """Show how the values of states came about in a training."""
+    if not states:
+        raise click.UsageError("--log needs a STATE.")
+    announce_compilation()
+    from fireworld.policy.words import find_states
+    from fireworld.training.log.history import state_history
+    from fireworld.training.log.reader import open_training
+
+    log = open_training(path, partial=True)
+    found = list(dict.fromkeys(state for text in states for state in find_states(text)))
+    if len(found) > HISTORIES_MAX:
+        raise click.UsageError(f"--log: expected at most {HISTORIES_MAX} states, got {len(found)}: name more features.")
+    with bar("reading", len(found) * len(log), quiet=as_json) as advance:
+        histories = [state_history(log, state, team=team, on_part=advance) for state in found]
+    if as_json:
+        click.echo(json.dumps([one.to_dict() for one in histories], indent=2))
+        return
+    for one in histories:
+        print_blocks([*one.describe(limit=limit), ""])

@@ -8,7 +8,7 @@ from typing import Final
 
 import click
 
-from fireworld.cli.opening import open_one_or_two
+from fireworld.cli.opening import open_one_or_two, open_trainings
 from fireworld.cli.progress import bars
 
 _LAST: Final = "last"
@@ -49,6 +49,7 @@ def command(
     \b
     fireworld render run.mcap -o still.png --step 120
     fireworld render run.mcap -o strip.png --steps 0,60,120,last
+    fireworld render training.mcap -o curves.png
     fireworld render run.mcap -o film.gif --every 2 --fps 15
     fireworld render alone.mcap together.mcap -o film.mp4 --from 10 --to 90
 
@@ -63,6 +64,15 @@ def command(
     from fireworld.recording.pages.pictures import ENDINGS
 
     check_output(output, endings=ENDINGS, force=force)
+    trainings = open_trainings(logs, doing="drawing")
+    if trainings:
+        if any(option is not None for option in (step, steps, first, last, every, fps)):
+            raise click.UsageError("A training is drawn whole: no steps, ranges or frames.")
+        from fireworld.training.log.pages.page import render_training
+
+        render_training(trainings, output, force=force)
+        click.echo(f"{output}: {sum(map(len, trainings)):,} {trainings[0].header.unit}s, {_size(output)}")
+        return
     if output.suffix.lower() in FILMS:
         if step is not None or steps is not None:
             raise click.UsageError(f"--step and --steps go with pictures, not with films ({output.suffix}).")

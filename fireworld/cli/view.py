@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from fireworld.cli.compiling import announce_compilation
-from fireworld.cli.opening import open_one_or_two
+from fireworld.cli.opening import open_one_or_two, open_trainings
 
 
 def _building_ids(context: click.Context, parameter: click.Parameter, value: str | None) -> tuple[int, ...]:
@@ -54,6 +54,9 @@ def command(
     Shows the city and its fire, what the brigades do and why, curves, the outcome; of two recordings also where they
     first differ and which buildings then do. A recording that was cut off or damaged is shown as far as it is good.
 
+    Of a training log, or two, it shows curves over the episodes, where scenarios end with the command that opens the
+    episode, and the tables as a picture: the greedy action of each brigade in the states that matter.
+
     \b
     fireworld view out.mcap                        a window
     fireworld view golden.mcap out.mcap            two runs, one time cursor
@@ -70,6 +73,16 @@ def command(
         raise click.UsageError("--port goes with --web.")
     if force and output is None:
         raise click.UsageError("--force goes with --save.")
+    trainings = open_trainings(logs, doing="showing")
+    if trainings:
+        if focus or first is not None or last is not None or every != 1 or air:
+            raise click.UsageError("--focus, --from, --to, --every and --air go with runs, not with trainings.")
+        announce_compilation()
+        from fireworld.training.log.pages.view import view_trainings
+
+        view_trainings(trainings, save=output, force=force, web=web, port=port, announce=_announce)
+        _say_written(output)
+        return
     if air:
         announce_compilation()
     from fireworld.recording.pages.view import view
@@ -80,12 +93,20 @@ def command(
         force=force,
         web=web,
         port=port,
-        announce=lambda address: click.echo(f"Open {address} in a browser; Ctrl-C ends it."),
+        announce=_announce,
         focus=focus,
         first_step=first,
         last_step=last,
         every=every,
         air=air,
     )
+    _say_written(output)
+
+
+def _announce(address: str) -> None:
+    click.echo(f"Open {address} in a browser; Ctrl-C ends it.")
+
+
+def _say_written(output: Path | None) -> None:
     if output is not None:
         click.echo(f"wrote {output}; open it with `rerun {output}`")

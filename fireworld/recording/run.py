@@ -18,7 +18,7 @@ from fireworld.records import Array, CityRecord, RunHeader, StepRecord, StoredRu
 if TYPE_CHECKING:
     import pandas
 
-    from fireworld.recording.pages.pictures import Picture
+    from fireworld.picture import Picture
 
 
 def open_log(path: str | os.PathLike[str], *, partial: bool = False) -> Run:

@@ -156,6 +156,7 @@ class Trainer(ABC, Generic[AMethod, AReport]):
             `value`; none: trainings of this method cannot be recorded.
         whole: the one of them that holds the whole team, after some parts at least.
         recording: somebody will ask for `records` after each report.
+        watched: somebody will ask for `points` after each report: what only they need is worked out.
     """
 
     report_type: ClassVar[type[Report]]
@@ -165,6 +166,7 @@ class Trainer(ABC, Generic[AMethod, AReport]):
     topics: ClassVar[tuple[type[Any], ...]] = ()
     whole: ClassVar[type[Any] | None] = None
     recording: bool = False
+    watched: bool = False
 
     def __init__(self, curriculum: Curriculum, method: AMethod, *, seed: int) -> None:
         if not curriculum.n_scenarios:

@@ -29,6 +29,16 @@ def tables_digest(tables: Array) -> bytes:
     return content.digest()
 
 
+def agreement(tables: Array, visits: Array) -> tuple[int, int]:
+    """Return in how many states all tables, (tables, states, 4), prefer the same action, and of how many visited ones.
+
+    Only states that all of them have visited count.
+    """
+    everywhere = visits.any(axis=2).all(axis=0)
+    actions = tables[:, everywhere].argmax(axis=2)
+    return int((actions == actions[0]).all(axis=0).sum()), int(everywhere.sum())
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class TableTeam(Team):
     """Tables that brigades follow, one each (or one for all), and where they come from."""
@@ -114,9 +124,7 @@ class TableTeam(Team):
 
     def agreement(self) -> tuple[int, int]:
         """Return in how many states all tables prefer the same action, and of how many: those that all visited."""
-        everywhere = self.visits.any(axis=2).all(axis=0)
-        actions = self.tables.argmax(axis=2)[:, everywhere]
-        return int((actions == actions[0]).all(axis=0).sum()), int(everywhere.sum())
+        return agreement(self.tables, self.visits)
 
     def difference(self, other: Self) -> TableDifference:
         """Compare the tables of another team with these; TrainingError if they have another shape."""

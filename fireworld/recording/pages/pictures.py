@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -13,34 +12,12 @@ from fireworld_viewer.pictures.maps import draw_record, draw_steps
 from fireworld_viewer.story.steps import LAST, read_steps_between
 
 from fireworld.errors import ViewError
-from fireworld.files import check_output, write_file
+from fireworld.files import check_output
+from fireworld.picture import Picture
 from fireworld.recording.inputs import AnyRecording, open_to_show
 from fireworld.records import Recording, StepRecord
 
 ENDINGS: Final = (*STILLS, *FILMS)  # of files that can be rendered
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A picture: notebooks show it, `save` writes it."""
-
-    title: str
-    png: bytes
-
-    def save(self, path: str | Path) -> Path:
-        """Write it as a PNG file, replacing what is there.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
-        write_file(Path(path), self.png)
-        return Path(path)
-
-    def _repr_png_(self) -> bytes:
-        return self.png
-
-    def __repr__(self) -> str:
-        return f"<Picture {self.title}: {len(self.png)} bytes of PNG; save(path) writes it>"
 
 
 def map_of(run: Recording, record: StepRecord) -> Picture:

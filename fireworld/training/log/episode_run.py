@@ -322,6 +322,8 @@ class FullEpisodes:
         if not isinstance(trainer, SarsaTrainer) or trainer.start is None:
             return
         episode: Episode = trainer.records()[0]
+        if episode.episode % self.every:
+            return
         name = episode_file(trainer.scenario(episode.scenario).name, episode.episode)
         run = episode_run(trainer, episode, *trainer.start)
         _write_run(run, self.folder / name, episode, force=self.force, source="training")

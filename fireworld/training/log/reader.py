@@ -21,6 +21,7 @@ from fireworld.errors import FireworldError, LogError, OutputError, expected, on
 from fireworld.policy.teams.team import Team
 from fireworld.records import Array
 from fireworld.scenario import Scenario, parse_scenario
+from fireworld.shown import SHOWN_MAX, Block, Shown
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import Curriculum, CurriculumStage
 from fireworld.training.log.records import TRAINING, Episode, PartCommit, Plan, TrainingHeader
@@ -31,6 +32,8 @@ from fireworld.training.methods.sarsa import SarsaTrainer
 
 if TYPE_CHECKING:
     import pandas
+
+    from fireworld.picture import Picture
 
 Part = Mapping[type[Any], Any]
 """The records of a part by type."""
@@ -54,7 +57,7 @@ def open_training(path: str | os.PathLike[str], *, partial: bool = False) -> Tra
     return log
 
 
-class TrainingLog:
+class TrainingLog(Shown):
     """A recorded training. Made by `fireworld.open_training`.
 
     It holds no more in memory than one part at a time, and a line of each.
@@ -198,6 +201,31 @@ class TrainingLog:
 
         return pd.DataFrame(table_arrays(self, table or tables_of(self)[0]))
 
+    def show(self) -> Picture:
+        """Return a picture of the training, its curves over the episodes, which notebooks show.
+
+        Raises:
+            ViewError: matplotlib is not installed.
+        """
+        from fireworld.training.log.pages.page import course_picture
+
+        return course_picture(self)
+
+    def view(self, *, save: str | os.PathLike[str] | None = None, force: bool = False) -> None:
+        """Open the training in Rerun, or save it for Rerun.
+
+        Args:
+            save: an .rrd file to write instead of opening a window.
+            force: replace an existing file.
+
+        Raises:
+            ViewError: Rerun is not installed, or there is no display.
+            OutputError: the file cannot be written.
+        """
+        from fireworld.training.log.pages.view import view_trainings
+
+        view_trainings(self, save=None if save is None else path_of("save", save), force=force)
+
     @property
     def scenarios(self) -> list[Scenario]:
         """What is learned in, in the order of the plan."""
@@ -243,6 +271,12 @@ class TrainingLog:
             return learned(trainer, part[Episode], self.scenarios[part[Episode].scenario])
         except LogError as error:
             raise LogError(f"{self.path}: part {number}: {error}") from None
+
+    def describe(self, *, limit: int = SHOWN_MAX) -> Iterator[Block]:
+        """Yield what there is to see of the training: its header, then a table of its scenarios or generations."""
+        from fireworld.training.log.summary import describe_training
+
+        return describe_training(self, limit=limit)
 
     def __repr__(self) -> str:
         header = self.header

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar, Final, Literal, get_args
 
 import msgspec
@@ -16,7 +16,7 @@ from fireworld.executors import Workers
 from fireworld.kernels.arrays import Array, Learner, PolicyArrays, Trace
 from fireworld.kernels.learning import learn_again
 from fireworld.policy.kernel import from_tables
-from fireworld.policy.teams.table_team import COMMIT_MAX, TableTeam, tables_digest
+from fireworld.policy.teams.table_team import COMMIT_MAX, TableTeam, agreement, tables_digest
 from fireworld.policy.teams.team import Team
 from fireworld.policy.words import N_FLAG_VALUES, N_STATES, N_STATES_ALONE
 from fireworld.records import ACTIONS
@@ -35,6 +35,8 @@ REPORTED: Final = (
     "converged",
 )  # fmt: skip
 """What a report shares with the record of an episode."""
+TD_QUANTILES: Final = (10, 50, 90)
+"""Of the sizes of an episode's TD errors, in percent: those that are drawn."""
 TABLES_EVERY: Final = 50
 """Episodes after which a training log holds the tables whole."""
 RULES: Final[tuple[str, ...]] = get_args(Rule)
@@ -147,6 +149,9 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         "score": "Score, as a share of the best",
         "epsilon": "Epsilon",
         "n_changed": "States in which the greedy action changed",
+        "td_error": "Size of the TD errors, quantiles",
+        "n_visited": "States visited, summed over the tables",
+        "agreement": "Share of common states in which the tables agree",
         "n_burnt_out": "Burnt out",
         "n_steps": "Steps",
     }
@@ -171,6 +176,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         """Every so many episodes of a scenario `start` is kept; 0: never."""
         self.start: tuple[Array, Array] | None = None
         """Tables and visits before the last episode, if it is one of these."""
+        self._updates: Array | None = None
         self.graduate: TableTeam | None = None
         """The team at the end of the last scenario finished here, before one of its tables was drawn for all."""
 
@@ -229,13 +235,13 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         progress = self.progress
         if episode is None or not 0 <= episode.scenario < len(self._plan):
             raise LogError("a part holds no episode of a scenario of the plan")
+        follows = (episode.scenario, episode.episode) == (progress.scenario_number, progress.episode)
+        self._updates = self.learn_from(episode) if follows else None
         if tables is not None:
             progress.scenario_number, progress.episode = episode.scenario, episode.episode
             progress.tables, progress.visits = tables.arrays
-        elif (episode.scenario, episode.episode) != (progress.scenario_number, progress.episode):
+        elif not follows:
             raise LogError(f"expected episode {progress.episode} of scenario {progress.scenario_number}")
-        else:
-            self.learn_from(episode)
         if progress.tables.shape != self.shape(episode.scenario):
             raise LogError(f"expected tables of shape {self.shape(episode.scenario)}, got {progress.tables.shape}")
         return self._end_episode(episode)
@@ -261,7 +267,20 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         """Return what is drawn of the last episode."""
         values = report.as_dict()
         values |= {"return": values["total_reward"], "score": values["score"] / values["score_max"]}
-        return {name: {"": values[name]} for name in self.plots}
+        found = {name: {"": values[name]} for name in self.plots if name in values}
+        if self._updates is None:
+            return found
+        errors = np.abs(self._updates[1])
+        errors = errors[~np.isnan(errors)]
+        team = self.graduate if report.milestone and self.graduate is not None else self.progress
+        found["n_visited"] = {"": float(team.visits.any(axis=2).sum())}
+        if len(errors):
+            levels = np.quantile(errors, [share / 100 for share in TD_QUANTILES])
+            found["td_error"] = {f"{share} %": float(one) for share, one in zip(TD_QUANTILES, levels, strict=True)}
+        if len(team.tables) > 1:
+            same, common = agreement(team.tables, team.visits)
+            found["agreement"] = {"": same / common} if common else {}
+        return found
 
     def play(self, report: EpisodeReport) -> Play | None:
         """Return the last scenario of a stage, played greedily by the team that has just finished it."""
@@ -310,10 +329,11 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         epsilon = _power(method.epsilon_decay, episode)
         seed = hash_key(self.seed, EPISODE, number, 0 if method.fixed_noise else episode) >> 1
         world = built.world(seed=seed)
-        trace = fresh_trace(built.n_brigades, world.n_steps_max if self.recording else 0)
+        traced = self.recording or self.watched
+        trace = fresh_trace(built.n_brigades, world.n_steps_max if traced else 0)
         policy, learner = self._learning(built.n_brigades, epsilon, trace=trace)
         before = progress.tables.argmax(axis=2)
-        keeps = self.full_every > 0 and episode % self.full_every == 0
+        keeps = self.watched or (self.full_every > 0 and episode % self.full_every == 0)
         self.start = (progress.tables, progress.visits.copy()) if keeps else None
         n_steps = world.run(policy, learner)
         progress.tables = policy.tables
@@ -345,7 +365,17 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         )
         whole = self.recording and (ended or (episode + 1) % TABLES_EVERY == 0)
         self._records = [record, *([Tables.of(progress.tables, progress.visits)] if whole else [])]
+        if self.watched and self.start is not None:
+            self._updates = self._learn_again(record, *self.start)
         return self._end_episode(record)
+
+    def _learn_again(self, record: Episode, tables: Array, visits: Array) -> Array:
+        """Return the updates of an episode that was learned from these tables; the team stays as it is."""
+        progress = self.progress
+        self.progress = replace(progress, tables=tables, visits=visits.copy())
+        updates = self.learn_from(record)
+        self.progress = progress
+        return updates
 
     def _end_episode(self, record: Episode) -> EpisodeReport:
         """Continue with the next episode; return the report of this one."""

@@ -215,8 +215,9 @@ class LearningPanel:
 
 def draw_learning_curves(panels: Sequence[LearningPanel], *, label: str, mark: str) -> Figure:
     """Draw the panels in rows of four; the label is that of the numbers, the mark that of the dotted lines."""
-    figure = new_figure(12.0, 5.6, dpi=110, paper="white", layout="constrained")
-    grid = figure.subplots(-(-len(panels) // _PANELS_ACROSS), _PANELS_ACROSS, sharex=True, squeeze=False).ravel()
+    n_rows = -(-len(panels) // _PANELS_ACROSS)
+    figure = new_figure(12.0, 2.8 + 1.4 * n_rows, dpi=110, paper="white", layout="constrained")
+    grid = figure.subplots(n_rows, _PANELS_ACROSS, sharex=True, squeeze=False).ravel()
     for axes, panel in zip(grid, panels, strict=False):
         for (team, repetitions), color in zip(panel.curves.items(), PAIR_COLORS, strict=False):
             for curve in repetitions:
@@ -226,6 +227,8 @@ def draw_learning_curves(panels: Sequence[LearningPanel], *, label: str, mark: s
         axes.set_title(panel.title, fontsize=10, loc="left")
         open_frame(axes)
         axes.tick_params(labelsize=8)
+    for axes in grid[len(panels) :]:
+        axes.set_visible(False)
     grid[0].legend(fontsize=8, frameon=False)
     figure.supxlabel("episode", fontsize=10)
     figure.supylabel(label, fontsize=10)

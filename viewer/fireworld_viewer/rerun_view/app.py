@@ -48,6 +48,24 @@ def save(
     write_file(path, _rrd(recordings, focus, outcome))
 
 
+def save_training(
+    write: Callable[[rerun.RecordingStream], None], path: Path, *, identity: str, title: str, force: bool = False
+) -> None:
+    """Write the curves of trainings as a Rerun file: `write` sends them to a stream.
+
+    `identity` names what is shown, for Rerun merges what has one name. Errors: OutputError, or ViewError if Rerun is
+    missing.
+    """
+    check_output(path, force=force)
+    rerun = _import_rerun()
+    stream = new_stream(f"{APPLICATION_ID}-{title}", recording_id=identity[:32])
+    memory = stream.memory_recording()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", rerun.error_utils.RerunWarning)
+        write(stream)
+    write_file(path, memory.drain_as_bytes())
+
+
 def show(write: Callable[[Path], None]) -> None:
     """Open the Rerun file that `write` makes in Rerun's own window, and return when it is closed.
 
@@ -69,9 +87,9 @@ def serve(write: Callable[[Path], None], *, port: int = WEB_PORT, announce: Call
     except OSError:
         raise ViewError(expected("view", "--port", "a free port", port, "try another one")) from None
     data_port = free_port()
-    announce(f"http://{LOCALHOST}:{port}?url=rerun%2Bhttp%3A%2F%2F{LOCALHOST}%3A{data_port}%2Fproxy")
+    address = f"http://{LOCALHOST}:{port}?url=rerun%2Bhttp%3A%2F%2F{LOCALHOST}%3A{data_port}%2Fproxy"
     ports = ["--web-viewer-port", str(port), "--port", str(data_port)]
-    _run_viewer(write, ["--serve-web", *ports])
+    _run_viewer(write, ["--serve-web", *ports], announce=lambda: announce(address))
 
 
 def check_display(option: str, others: str) -> None:
@@ -160,11 +178,14 @@ def _identity(recordings: Sequence[Recording]) -> str:
     return digest.hexdigest()[:32]
 
 
-def _run_viewer(write: Callable[[Path], None], options: list[str]) -> None:
+def _run_viewer(
+    write: Callable[[Path], None], options: list[str], *, announce: Callable[[], object] = lambda: None
+) -> None:
     """Run Rerun's viewer on a file until it ends or this process is stopped; it never outlives this process."""
     with tempfile.TemporaryDirectory(prefix="fireworld-") as folder:
         path = Path(folder) / "view.rrd"
         write(path)
+        announce()
         command = [str(viewer_executable()), "--bind", LOCALHOST, *options, str(path)]
         before = signal.signal(signal.SIGTERM, signal.default_int_handler)
         with (Path(folder) / "errors").open("w+", encoding="utf-8", errors="replace") as errors:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fireworld_viewer import colors
 
@@ -13,7 +16,8 @@ if TYPE_CHECKING:
     import rerun
 
 LOG_PATH: Final = "log"
-_COLUMNS: Final = 2
+_FEW: Final = 6
+"""Plots that stand in two columns; more stand in three."""
 _COLUMNS_OF_TAB: Final = 3
 
 
@@ -23,6 +27,7 @@ class LayoutTab:
 
     plots: Mapping[str, str]  # titles by name
     page: str  # its name
+    picture: str = ""  # the name of a picture beside it; empty for none
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,7 @@ class TrainingPoint:
 
     number: int  # its place
     values: Mapping[str, Mapping[str, float]]  # by the name of the plot, then by that of the curve in it
+    marks: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # points in a plot, by name, then by kind
     note: str = ""  # a line for the log; empty for none
     pages: Mapping[str, str] = field(default_factory=dict)  # text of pages from here on, in Markdown, by their names
 
@@ -60,20 +66,12 @@ class CurveWriter:
         if not self._drawn:
             self._stream.send_blueprint(_blueprint(self._layout))
             self._stream.send_recording_name(self._layout.title)
-        curves: dict[tuple[str, str], list[tuple[int, float]]] = defaultdict(list)
-        for point in points:
-            for plot, named in point.values.items():
-                for curve, value in named.items():
-                    curves[plot, curve].append((point.number, value))
-        for (plot, curve), row in curves.items():
-            drawn = self._drawn[plot]
-            if curve not in drawn:
-                rgb = colors.BRIGADE_RGB[len(drawn) % len(colors.BRIGADE_RGB)]
-                drawn.append(curve)
-                style = rerun.SeriesLines(names=[curve], colors=colors.single(rgb), widths=[1.5])
-                self._stream.log(f"{plot}/{curve}", style, static=True)
-            numbers, values = zip(*row, strict=True)
-            self._send(f"{plot}/{curve}", numbers, rerun.Scalars.columns(scalars=values))
+        for plot, named in _rows((point.number, point.values) for point in points).items():
+            for curve, row in named.items():
+                self._send_curve(plot, curve, row, points=False)
+        for plot, named in _rows((point.number, point.marks) for point in points).items():
+            for curve, row in named.items():
+                self._send_curve(plot, curve, row, points=True)
         for point in points:
             if point.note:
                 self._send(LOG_PATH, [point.number], rerun.TextLog.columns(text=[point.note]))
@@ -81,11 +79,45 @@ class CurveWriter:
                 page = rerun.TextDocument.columns(text=[text], media_type=[rerun.MediaType.MARKDOWN])
                 self._send(name, [point.number], page)
 
+    def _send_curve(self, plot: str, curve: str, row: Sequence[tuple[int, float]], *, points: bool) -> None:
+        """Send values of a curve, as a line or as points, with its look before its first ones."""
+        import rerun
+
+        drawn = self._drawn[plot]
+        if curve not in drawn:
+            rgb = colors.single(colors.BRIGADE_RGB[len(drawn) % len(colors.BRIGADE_RGB)])
+            drawn.append(curve)
+            style: Any = rerun.SeriesLines(names=[curve], colors=rgb, widths=[1.5])
+            if points:
+                style = rerun.SeriesPoints(names=[curve], colors=rgb, markers="Diamond", marker_sizes=[4.0])
+            self._stream.log(f"{plot}/{curve}", style, static=True)
+        numbers, values = zip(*row, strict=True)
+        self._send(f"{plot}/{curve}", numbers, rerun.Scalars.columns(scalars=values))
+
+    def write_picture(self, name: str, pixels: NDArray[np.uint8], page: str, text: str) -> None:
+        """Write a picture, (rows, columns, 3), that stays the same, and a page about it in Markdown."""
+        import rerun
+
+        self._stream.log(name, rerun.Image(pixels), static=True)
+        self._stream.log(page, rerun.TextDocument(text, media_type=rerun.MediaType.MARKDOWN), static=True)
+
     def _send(self, path: str, numbers: Sequence[int], columns: Any) -> None:
         import rerun
 
         times = rerun.TimeColumn(self._layout.timeline, sequence=numbers)
         self._stream.send_columns(path, indexes=[times], columns=columns)
+
+
+def _rows(
+    points: Iterable[tuple[int, Mapping[str, Mapping[str, float]]]],
+) -> dict[str, dict[str, list[tuple[int, float]]]]:
+    """Return numbers and values by plot and curve."""
+    rows: dict[str, dict[str, list[tuple[int, float]]]] = {}
+    for number, plots in points:
+        for plot, curves in plots.items():
+            for curve, value in curves.items():
+                rows.setdefault(plot, {}).setdefault(curve, []).append((number, value))
+    return rows
 
 
 def _blueprint(layout: TrainingLayout) -> Any:
@@ -97,13 +129,17 @@ def _blueprint(layout: TrainingLayout) -> Any:
         views = [rrb.TimeSeriesView(name=title, origin=f"/{name}", plot_legend=legend) for name, title in plots.items()]
         return rrb.Grid(*views, grid_columns=n_columns)
 
-    root = grid(layout.plots, _COLUMNS)
+    root = grid(layout.plots, 2 if len(layout.plots) <= _FEW else 3)
     if layout.tabs:
         tabs = []
         for title, tab in layout.tabs.items():
             page = rrb.TextDocumentView(name=title, origin=f"/{tab.page}")
-            tabs.append(rrb.Horizontal(grid(tab.plots, _COLUMNS_OF_TAB), page, column_shares=[3, 1], name=title))
-        root = rrb.Vertical(root, tabs[0] if len(tabs) == 1 else rrb.Tabs(*tabs))
+            shown = [grid(tab.plots, _COLUMNS_OF_TAB)] if tab.plots else []
+            if tab.picture:
+                shown.append(rrb.Spatial2DView(name=title, origin=f"/{tab.picture}"))
+            shares = [3] * len(shown) + [1 if tab.plots else 2]
+            tabs.append(rrb.Horizontal(*shown, page, column_shares=shares, name=title))
+        root = rrb.Vertical(root, tabs[0] if len(tabs) == 1 else rrb.Tabs(*tabs), row_shares=[2, 1])
     if layout.log:
         columns = rrb.TextLogColumns(timeline_columns=[layout.timeline], text_log_columns=["body"])
         log = rrb.TextLogView(name=layout.log, origin=f"/{LOG_PATH}", columns=columns)

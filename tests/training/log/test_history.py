@@ -1,0 +1,72 @@
+"""How the values of a state came about: worked out again from the episodes, one by one."""
+
+import numpy as np
+import pytest
+
+from fireworld.errors import LogError, TrainingError
+from fireworld.policy.teams.team import load_team
+from fireworld.training.log.history import state_history
+from fireworld.training.log.reader import open_training
+
+
+def busiest(log):
+    """Return the state that was learned in most."""
+    visits = log.trainer_before(len(log)).progress.visits
+    return int(visits.sum(axis=(0, 2)).argmax())
+
+
+def test_the_moves_are_those_of_the_tables(log):
+    state = busiest(log)
+    found = state_history(log, state, n_moves=10_000)
+    assert found.n_updates == len(found.moves) > 5
+    sizes = [abs(move.value_after - move.value_before) for move in found.moves]
+    assert sizes == sorted(sizes, reverse=True)
+    by_episode = {}
+    for move in found.moves:
+        by_episode.setdefault((move.scenario, move.episode), []).append(move)
+    for (scenario, episode), moves in by_episode.items():
+        learned = log.episode(scenario, episode)
+        width = 4320 // learned.tables.shape[1]
+        row = state // width
+        moved = (learned.tables[:, row] != learned.tables_after[:, row]).sum()
+        assert moved <= len(moves)
+        for move in moves:
+            assert learned.state[move.brigade, move.step - 1] // width == row
+    first = found.first
+    earliest = min(by_episode, key=lambda key: log.position(*key))
+    assert (first.scenario, first.episode) == earliest
+
+
+def test_the_moments_are_the_ends_of_scenarios(log):
+    state = busiest(log)
+    found = state_history(log, state)
+    assert [one.scenario for one in found.moments if one.table == 0] == [one.name for one in log.scenarios]
+    for moment in found.moments:
+        tables = log.episode_at(moment.part).tables_after
+        values = tables[moment.table, state // (4320 // tables.shape[1])]
+        np.testing.assert_array_equal(values, moment.q_values)
+
+
+def test_what_is_shown(log_path, fireworld):
+    log = open_training(log_path)
+    state = busiest(log)
+    team = log_path.with_suffix(".npz")
+    shown = fireworld("policy", "show", team, state, "--log", log_path)
+    assert shown.code == 0
+    assert shown.out.startswith(f"state {state}: ")
+    assert "fireworld replay 0.mcap --scenario " in shown.out
+    assert max(map(len, shown.out.splitlines()[3:-2])) <= 80
+    unseen = next(s for s in range(4320) if not log.trainer_before(len(log)).progress.visits[:, s].any())
+    assert "never visited in" in fireworld("policy", "show", team, unseen, "--log", log_path).out
+
+
+def test_what_does_not_fit(log, make_log, log_path, fireworld):
+    other = load_team(make_log(alpha=0.6).with_suffix(".npz"))
+    with pytest.raises(TrainingError, match=r"team: expected the one of .*, digest "):
+        state_history(log, 3, team=other)
+    with pytest.raises(LogError, match="state: expected a number from 0 to 4319, got 4320"):
+        state_history(log, 4320)
+    with pytest.raises(LogError, match="expected one that learns values of states, got 'search'"):
+        state_history(open_training(make_log("search")), 3)
+    done = fireworld("policy", "show", log_path.with_suffix(".npz"), "--log", log_path)
+    assert (done.code, "--log needs a STATE" in done.err) == (2, True)

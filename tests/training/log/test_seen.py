@@ -1,0 +1,115 @@
+"""Trainings in Rerun, as pictures and as pages."""
+
+import re
+
+import numpy as np
+import pytest
+
+from fireworld.errors import LogError, OutputError
+from fireworld.policy.teams.table_team import agreement
+from fireworld.training.log.course import course_of
+from fireworld.training.log.pages.page import render_training, report_training
+from fireworld.training.log.pages.view import states_page, view_trainings
+from fireworld.training.log.reader import open_training
+from fireworld.training.train import prepare_trainings
+from fireworld.training.training import train_all
+from tests.training.log.conftest import SHORT
+
+pytest.importorskip("matplotlib")
+
+
+def test_the_curves_are_those_of_the_log(log):
+    course = course_of(log)
+    returns = [line.total_reward for line in log.lines]
+    assert course.plots["return"][""].tolist() == returns
+    assert course.plots["epsilon"][""].tolist() == [line.epsilon for line in log.lines]
+    for number in (0, 7, len(log) - 1):
+        errors = np.abs(log.episode_at(number).td_error)
+        errors = errors[~np.isnan(errors)]
+        levels = [course.plots["td_error"][f"{share} %"][number] for share in (10, 50, 90)]
+        assert levels == pytest.approx(np.quantile(errors, [0.1, 0.5, 0.9]))
+        assert course.plots["n_visited"][""][number] == log.lines[number].n_visited
+    last = log.trainer_before(len(log)).progress
+    same, common = agreement(last.tables, last.visits)
+    assert course.plots["agreement"][""][-1] == (same / common if common else pytest.approx(np.nan, nan_ok=True))
+    assert [mark.part for mark in course.marks] == [k for k, line in enumerate(log.lines) if line.ended]
+
+
+def test_what_is_seen_live_is_what_is_seen_of_the_log(curriculum, log):
+    seen = []
+
+    def note(training, report):
+        seen.append(training.trainer.points(report))
+
+    (training,) = prepare_trainings(curriculum, set=SHORT)
+    training.trainer.watched = True
+    train_all([training], callbacks=[note])
+    assert training.team.digest == log.team().digest
+    assert seen == [trainer.points(report) for trainer, report in log.reports()]
+
+
+def test_the_picture_of_the_tables(log):
+    picture = course_of(log).tables
+    last = log.trainer_before(len(log)).progress
+    for row, state in enumerate(picture.states.tolist()):
+        for table in range(3):
+            seen = last.visits[table, state].any() or last.tables[table, state].any()
+            assert picture.action[row, table, -1] == (last.tables[table, state].argmax() if seen else -1)
+    assert list(picture.visits) == sorted(picture.visits, reverse=True)
+    page = states_page(picture)
+    assert page.count("\n| ") == len(picture.states) + 1
+
+
+def test_pages_and_pictures(log_path, make_log, tmp_path, fireworld):
+    other = make_log(alpha=0.6)
+    done = fireworld("report", log_path, "-o", tmp_path / "a.html")
+    assert done.code == 0
+    report_training([log_path, other], tmp_path / "two.html")
+    report_training(log_path, tmp_path / "again.html")
+    page = (tmp_path / "a.html").read_text()
+    assert page == (tmp_path / "again.html").read_text()
+    assert "Convergence" in page
+    assert "fireworld replay 0.mcap --scenario together-2 --episode" in page
+    assert not re.search(r"(src|href)=\"http", page)
+    assert "Bold: where they differ" in (tmp_path / "two.html").read_text()
+    for ending in (".png", ".svg"):
+        assert fireworld("render", log_path, other, "-o", tmp_path / f"a{ending}").code == 0
+    report_training(make_log("search"), tmp_path / "search.html")
+    assert "Tables of" not in (tmp_path / "search.html").read_text()
+
+
+def test_what_cannot_be_shown(log_path, make_log, tmp_path, fireworld):
+    with pytest.raises(LogError, match=r"method: expected paper, as in .*, got 'search'"):
+        render_training([log_path, make_log("search")], tmp_path / "a.png")
+    with pytest.raises(OutputError, match=r"expected a file ending in \.png"):
+        render_training(log_path, tmp_path / "a.gif")
+    assert fireworld("run", "quick", "--steps", 2, "--record", tmp_path / "run.mcap").code == 0
+    for command in ("view", "report", "render"):
+        output = ["--save", tmp_path / "x.rrd"] if command == "view" else ["-o", tmp_path / "x.html"]
+        if command == "render":
+            output = ["-o", tmp_path / "x.png"]
+        done = fireworld(command, log_path, tmp_path / "run.mcap", *output)
+        assert (done.code, "expected the log of a training, as the other one" in done.err) == (2, True)
+    assert fireworld("render", log_path, "-o", tmp_path / "b.png", "--step", 3).code == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["run.mcap"]
+
+
+def test_a_log_under_way_is_shown_as_far_as_it_is_good(log_path, tmp_path, fireworld):
+    data = log_path.read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(data[: len(data) // 2])
+    done = fireworld("report", tmp_path / "cut.mcap", "-o", tmp_path / "cut.html")
+    assert done.code == 0
+    assert "partial: the file ends" in done.err
+    assert "the page ends there" in (tmp_path / "cut.html").read_text()
+
+
+def test_in_rerun(log_path, make_log, tmp_path):
+    pytest.importorskip("rerun")
+    view_trainings(log_path, save=tmp_path / "a.rrd")
+    view_trainings([log_path, make_log(alpha=0.6)], save=tmp_path / "ab.rrd")
+    view_trainings(make_log("search"), save=tmp_path / "s.rrd")
+    assert all(path.stat().st_size > 10_000 for path in tmp_path.iterdir())
+    log = open_training(log_path)
+    log.view(save=tmp_path / "b.rrd")
+    assert log.show().png.startswith(b"\x89PNG")
+    assert "episodes" in log._repr_html_()
