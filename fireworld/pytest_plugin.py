@@ -1,4 +1,4 @@
-"""The pytest plugin: a fixture `recording` that runs a policy and compares the run with its golden recording.
+"""The pytest plugin: a fixture `recording` that runs a policy, or trains a team, and compares with a golden recording.
 
 pytest imports this module at every start, wherever fireworld is installed: it imports nothing else before a test asks.
 """
@@ -7,19 +7,19 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
 if TYPE_CHECKING:
-    from fireworld.policy.names import NamedPolicy
     from fireworld.policy.protocol import Policy
     from fireworld.recording.golden.check import GoldenResult
-    from fireworld.recording.golden.spec import GoldenSpec
     from fireworld.recording.run import Run
     from fireworld.simulation.built import CityCache
+    from fireworld.training.log.reader import TrainingLog
+    from fireworld.training.log.verify import TrainedAgain
 
 UPDATE: Final = "--fireworld-update"
 FOLDER_INI: Final = "fireworld_recordings"
@@ -60,16 +60,16 @@ def _fireworld_cities() -> CityCache:
 def recording(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, _fireworld_cities: CityCache
 ) -> Recorder:
-    """Run a policy in a scenario and compare every step with the golden recording of this test.
+    """Run a policy in a scenario, or train a team, and compare every step with the golden recording of this test.
 
-    recording(scenario="test-1", policy="mine:Policy", seed=3) fails at the first difference. `--fireworld-update`
-    stores the golden, the first time and whenever the run has changed.
+    recording(scenario="test-1", policy="mine:Policy", seed=3), or recording.training("quick", set={"alpha": 0.5}),
+    fails at the first difference. `--fireworld-update` stores the golden, the first time and whenever it has changed.
     """
     return Recorder(request, tmp_path_factory, _fireworld_cities)
 
 
 class Recorder:
-    """The fixture `recording`: call it to run and compare."""
+    """The fixture `recording`: call it to run and compare; `training` trains and compares."""
 
     def __init__(self, request: pytest.FixtureRequest, factory: pytest.TempPathFactory, cities: CityCache) -> None:
         self._node = request.node
@@ -111,11 +111,10 @@ class Recorder:
         """
         from fireworld.errors import FireworldError
         from fireworld.policy.names import find_policy
-        from fireworld.recording.golden.spec import make_spec
+        from fireworld.recording.golden.spec import make_spec, prepare_golden
+        from fireworld.recording.record import run_prepared
 
         path = self._path(name)
-        if not (self._update or path.exists()):
-            raise _failure(f"{_shown(path)}: there is no such recording; run with {UPDATE} to store it")
         try:
             named = None if isinstance(policy, str | Path) else find_policy(policy)
             spec = make_spec(
@@ -128,44 +127,86 @@ class Recorder:
                 tolerances=tolerances,
                 ignore=ignore,
             )
-            return self._run(path, spec, named)
+            fresh = run_prepared(prepare_golden(spec, path.parent, policy=named, cities=self._cities))
+            self._compare(path, fresh)
+        except FireworldError as error:
+            raise _failure(str(error)) from None
+        return fresh
+
+    def training(
+        self,
+        curriculum: str | Path,
+        *,
+        method: str = "paper",
+        seed: int = 1,
+        set: Mapping[str, Any] | None = None,
+        stages: str | Sequence[str] | None = None,
+        name: str = "",
+    ) -> TrainingLog:
+        """Train a team, and compare every step that it learns from with the golden training of this test.
+
+        The test fails, with the first difference and no traceback, if the trainings differ, if there is no golden, or
+        if it cannot be trained.
+
+        Args:
+            curriculum: the name of a curriculum or a scenario, or a YAML file of either.
+            method: a name as for `fireworld train --method`.
+            seed: of all random draws of the training.
+            set: hyperparameters of the method by name, as in {"alpha": 0.1}.
+            stages: the curriculum's stages to train in, by name; None: all.
+            name: of this recording, where a test has several.
+
+        Returns:
+            The golden, which the training is the same as: `.team()` is its team, `.lines[-1].score` a score.
+        """
+        from fireworld.errors import FireworldError
+        from fireworld.recording.golden.training import make_training_spec, prepare_training
+        from fireworld.training.log.reader import open_training
+
+        path = self._path(name)
+        try:
+            spec = make_training_spec(
+                path.parent, curriculum=curriculum, method=method, seed=seed, stages=stages, settings=set
+            )
+            self._compare(path, prepare_training(spec, path.parent, cities=self._cities))
+            return open_training(path)
         except FireworldError as error:
             raise _failure(str(error)) from None
 
     def _path(self, name: str) -> Path:
-        """Return where the golden is; each is compared with once."""
+        """Return where the golden is; fail where it is missing, or another of this test has been compared with it."""
         path: Path = self._folder / f"{golden_name(self._node, name)}.mcap"
         if path in self._paths:
             raise _failure("recording: a second one in a test needs a name of its own: recording(..., name=...)")
         self._paths.add(path)
+        if not (self._update or path.exists()):
+            raise _failure(f"{_shown(path)}: there is no such recording; run with {UPDATE} to store it")
         return path
 
-    def _run(self, path: Path, spec: GoldenSpec, named: NamedPolicy | None) -> Run:
-        """Run a spec; compare with the golden, or store it."""
+    def _compare(self, path: Path, fresh: Run | TrainedAgain) -> None:
+        """Compare a run, or a training, with the golden, or store it."""
         from fireworld.recording.golden.check import compare_golden
-        from fireworld.recording.golden.spec import prepare_golden
         from fireworld.recording.golden.update import store_if_changed
-        from fireworld.recording.record import run_prepared
 
-        fresh = run_prepared(prepare_golden(spec, path.parent, policy=named, cities=self._cities))
         if not self._update:
-            result = compare_golden(path, fresh, spec)
+            result = compare_golden(path, fresh)
             if result.result != "same":
                 raise _failure(self._complaint(result))
-        elif store_if_changed(path, fresh, spec):
+        elif store_if_changed(path, fresh):
             self._node.user_properties.append((STORED, _shown(path)))
-        return fresh
 
     def _complaint(self, result: GoldenResult) -> str:
         """Return what differs, and record the new run where it can be looked at."""
         from fireworld.recording.golden.store import store_recording
 
-        lines = [f"{_shown(result.path)}: the run is not the same any more", result.sentence]
+        lines = [f"{_shown(result.path)}: the {result.kind} is not the same any more", result.sentence]
         if result.fresh is not None and result.differs:
             lines += [f"  {line}" for line in result.changes]
             new = self._factory.mktemp("fireworld") / result.path.name
             store_recording(new, result.fresh)
-            lines.append(f"the new run: {new}; compare it with the golden by `fireworld diff` or `fireworld view`")
+            lines.append(
+                f"the new {result.kind}: {new}; compare it with the golden by `fireworld diff` or `fireworld view`"
+            )
         return "\n".join([*lines, f"if that is meant, run with {UPDATE}"])
 
 

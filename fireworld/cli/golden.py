@@ -1,4 +1,4 @@
-"""`fireworld golden`: recordings to compare new runs with, checked, recorded anew and added to."""
+"""`fireworld golden`: recordings to compare new runs and trainings with, checked, recorded anew and added to."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import click
 
 from fireworld.cli import USER_ERROR
 from fireworld.cli.compiling import announce_compilation
-from fireworld.cli.options import seed_option, settings_option, steps_option
+from fireworld.cli.options import seed_option, steps_option
 from fireworld.cli.progress import bar
 from fireworld.cli.tables import print_table
 
@@ -30,32 +30,34 @@ _folder_option = click.option(
 
 @click.group()
 def command() -> None:
-    """Keep recordings of runs, and check whether the same runs still give the same.
+    """Keep recordings of runs and trainings, and check whether the same still gives the same.
 
     \b
-    fireworld golden add test-1 --policy mine:Policy --steps 30   store one, and its text
-    fireworld golden check                                        run all again and compare
+    fireworld golden add test-1 --policy mine:Policy --steps 30   store a run, and its text
+    fireworld golden add quick --train --set n_episodes_max=20    store a training
+    fireworld golden check                                        do all again and compare
     fireworld golden update --reason "Brigades refill earlier."   accept what changed
 
-    A golden is two files: NAME.mcap, the recording, which holds what to run, and NAME.txt, what happened in it, to be
-    read in reviews. Both belong under version control.
+    A golden is two files: NAME.mcap, the recording, which holds what to run or to train, and NAME.txt, what happened
+    in it, to be read in reviews. Both belong under version control.
     """
 
 
-@command.command(short_help="Run all again and compare.")
+@command.command(short_help="Run or train all again and compare.")
 @click.argument("folder", metavar="[DIR]", type=_DIRECTORY, default=FOLDER)
 @click.option("--json", "as_json", is_flag=True, help="Write JSON.")
 @click.option("--junit", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML for a CI server.")
-@click.option("--keep", metavar="KEEP", type=_DIRECTORY, help="Record the new runs that differ in folder KEEP.")
+@click.option("--keep", metavar="KEEP", type=_DIRECTORY, help="Record what differs now in folder KEEP.")
 @click.option("--force", is_flag=True, help="Replace existing files of --junit and --keep.")
 @click.pass_context
 def check(
     context: click.Context, *, folder: Path, as_json: bool, junit: Path | None, keep: Path | None, force: bool
 ) -> None:
-    """Run every golden in DIR (recordings/golden if left out) again and compare.
+    """Run every golden in DIR (recordings/golden if left out) again, or train again, and compare.
 
-    Scenario, policy and code are taken as they are now: a scenario file and a policy's module from the current folder
-    or where they were when the golden was added. For each golden that differs, the first difference is named.
+    Scenario, curriculum, policy and code are taken as they are now: files and a policy's module from the current folder
+    or where they were when the golden was added. For each golden that differs, the first difference is named: of a
+    training the episode, the step, the brigade and the state.
 
     Exit code: 0 all the same, 1 one is different, 2 one cannot be run or compared, or there is none.
     """
@@ -104,18 +106,30 @@ def update(*, names: tuple[str, ...], reason: str, folder: Path) -> None:
     click.echo(f"{n_changed} changed, {len(updates) - n_changed} the same")
 
 
-@command.command(short_help="Run a scenario and keep the recording.")
+@command.command(short_help="Run a scenario, or train, and keep the recording.")
 @click.argument("scenario")
-@click.option("--policy", required=True, help="As for `fireworld run`: a name, TEAM.npz, or MODULE:CLASS.")
+@click.option("--policy", help="As for `fireworld run`: a name, TEAM.npz, or MODULE:CLASS.")
+@click.option("--train", is_flag=True, help="Train a team, as `fireworld train` does, instead of running a policy.")
+@click.option("--method", metavar="NAME", help="With --train: how to learn.  [default: paper]")
+@click.option("--stages", metavar="NAME,...", help="With --train: train in these stages of the curriculum only.")
 @seed_option
 @steps_option
-@settings_option
-@click.option("--name", help="Name of the golden.  [default: made of scenario, policy and seed]")
+@click.option(
+    "--set",
+    "settings",
+    metavar="KEY=VALUE",
+    multiple=True,
+    help="Set a key of the scenario, with --train a hyperparameter of the method; repeatable.",
+)
+@click.option("--name", help="Name of the golden.  [default: made of the rest]")
 @_folder_option
 def add(
     *,
     scenario: str,
-    policy: str,
+    policy: str | None,
+    train: bool,
+    method: str | None,
+    stages: str | None,
     seed: int,
     steps: int | None,
     settings: tuple[str, ...],
@@ -124,37 +138,47 @@ def add(
 ) -> None:
     """Run SCENARIO (a shipped name or a YAML file) and store it as a golden in DIR (recordings/golden if left out).
 
+    With --train a team is trained: SCENARIO may be a curriculum, too.
+
     \b
     fireworld golden add quick --policy chief
     fireworld golden add test-1 --policy my_policy:SpreadOut --seed 3 --steps 30 --dir tests/golden
     fireworld golden add quick --policy easiest --set brigades.n=4 --name quick-four
+    fireworld golden add my-curriculum.yaml --train --stages alone --set alpha=0.1
 
     Exit code: 0 done, 2 could not be done.
     """
+    _check_options(policy=policy, train=train, steps=steps, method=method, stages=stages)
     announce_compilation()
     from fireworld.recording.golden.store import text_path
-    from fireworld.recording.golden.update import add_golden
+    from fireworld.recording.golden.update import add_golden, add_training
     from fireworld.scenario import split_settings
 
-    path = add_golden(
-        scenario,
-        policy=policy,
-        seed=seed,
-        steps=steps,
-        settings=split_settings(settings),
-        name=name,
-        folder=folder,
-    )
+    if policy is not None:
+        values = split_settings(settings)
+        path = add_golden(scenario, policy=policy, seed=seed, steps=steps, settings=values, name=name, folder=folder)
+    else:
+        values = split_settings(settings, example="alpha=0.1")
+        path = add_training(
+            scenario, method=method or "paper", seed=seed, stages=stages, settings=values, name=name, folder=folder
+        )
     click.echo(f"{path}: recorded; what happened in it is in {text_path(path)}")
+
+
+def _check_options(*, policy: str | None, train: bool, **others: object) -> None:
+    """Check that a golden is of a run or of a training, and has no options of the other."""
+    if policy is None and not train:
+        raise click.UsageError("Missing option '--policy' or '--train'.")
+    if policy is not None and train:
+        raise click.UsageError("--policy and --train exclude each other.")
+    for option in ("steps",) if train else ("method", "stages"):
+        if others[option] is not None:
+            raise click.UsageError(f"--{option} is for a {'run' if train else 'training'}.")
 
 
 def _show(results: Sequence[GoldenResult], *, keep: Path | None) -> None:
     """Print results as a table; below it, for each that is not the same, what differs."""
-    rows = []
-    for result in results:
-        header, steps = result.header, result.difference.totals[0].n_steps if result.difference else "-"
-        what = (header.scenario, header.policy, str(header.seed)) if header is not None else ("-", "-", "-")
-        rows.append((result.name, *what, str(steps), result.result))
+    rows = [(result.name, *result.cells, result.result) for result in results]
     print_table(("golden", "scenario", "policy", "seed", "steps", "result"), rows, left=(0, 1, 2, 5), whole=(0,))
     for result in results:
         if result.result == "same":
@@ -163,7 +187,7 @@ def _show(results: Sequence[GoldenResult], *, keep: Path | None) -> None:
         for line in result.changes:
             click.echo(f"  {line}")
         if keep is not None and result.result == "different":
-            click.echo(f"  the new run: {keep / result.path.name}")
+            click.echo(f"  the new {result.kind}: {keep / result.path.name}")
     bad = [result for result in results if result.result == "different"]
     if bad:
         place = "" if bad[0].path.parent == FOLDER else f" --dir {bad[0].path.parent}"

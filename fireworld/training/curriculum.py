@@ -68,9 +68,14 @@ class Curriculum:
         return hashlib.sha256(json.dumps(content).encode()).hexdigest()
 
     @property
+    def scenarios(self) -> list[Scenario]:
+        """Of all stages, in their order."""
+        return [scenario for stage in self.stages for scenario in stage.scenarios]
+
+    @property
     def n_scenarios(self) -> int:
         """Scenarios of all stages."""
-        return sum(len(stage.scenarios) for stage in self.stages)
+        return len(self.scenarios)
 
     def only(self, names: Sequence[str]) -> Curriculum:
         """Return the curriculum with these of its stages, in its own order.

@@ -1,4 +1,4 @@
-"""Golden recordings, run again and compared."""
+"""Golden recordings, run or trained again and compared."""
 
 from __future__ import annotations
 
@@ -6,26 +6,29 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Any, Final, Literal
 from xml.etree.ElementTree import Element, SubElement
 
-from fireworld_recorder.diff import compare
-from fireworld_recorder.reader import open_log
+from fireworld_recorder.diff import RunComparison, compare
+from fireworld_recorder.reader import Log, open_log
 from fireworld_recorder.totals import plain
 
 from fireworld.errors import FireworldError, OutputError, expected
 from fireworld.files import check_output
 from fireworld.junit import clean, report
 from fireworld.recording.difference_text import change_lines
-from fireworld.recording.golden.spec import GoldenSpec, prepare_golden, spec_of
+from fireworld.recording.golden.spec import prepare_golden, spec_of
 from fireworld.recording.golden.store import SUFFIX, is_text_of, make_folder, store_recording, text_path
+from fireworld.recording.golden.training import prepare_training, training_changes, training_spec_of
+from fireworld.recording.inputs import is_training
 from fireworld.recording.record import run_prepared
 from fireworld.recording.run import Run
 from fireworld.records import RunHeader
 from fireworld.simulation.built import CityCache
-
-if TYPE_CHECKING:
-    from fireworld_recorder.diff import RunComparison
+from fireworld.training.log.difference import TrainingDifference, compare_trainings
+from fireworld.training.log.reader import TrainingLog, open_training
+from fireworld.training.log.records import TrainingHeader
+from fireworld.training.log.verify import TrainedAgain
 
 FOLDER: Final = Path("recordings/golden")
 """Where goldens are, seen from the current folder, unless another place is named."""
@@ -34,14 +37,14 @@ Result = Literal["same", "different", "cannot"]
 
 @dataclass(frozen=True, kw_only=True)
 class GoldenResult:
-    """The result of running a golden again."""
+    """The result of running a golden again, or of training it again."""
 
     path: Path
-    header: RunHeader | None = None
+    header: RunHeader | TrainingHeader | None = None
     """Of the golden; None if it cannot be read."""
-    fresh: Run | None = None
-    """The new run; None if there was none."""
-    difference: RunComparison | None = None
+    fresh: Run | TrainedAgain | None = None
+    """The new run or training; None if there was none."""
+    difference: RunComparison | TrainingDifference | None = None
     error: str = ""
     """Why it could not be run or compared."""
     text_is_foreign: bool = False
@@ -53,8 +56,13 @@ class GoldenResult:
         return self.path.stem
 
     @property
+    def kind(self) -> str:
+        """What it is a golden of: a run or a training."""
+        return "training" if isinstance(self.header, TrainingHeader) else "run"
+
+    @property
     def differs(self) -> bool:
-        """Whether there is a new run, and it is not the recorded one."""
+        """Whether there is a new run or training, and it is not the recorded one."""
         return self.difference is not None and not self.difference.same
 
     @property
@@ -78,21 +86,37 @@ class GoldenResult:
     @property
     def changes(self) -> list[str]:
         """What else is different, line by line."""
+        if isinstance(self.difference, TrainingDifference):
+            return [*training_changes(self.difference)]
         return change_lines(self.difference) if self.difference is not None else []
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the result as plain values; of a difference, a is the golden and b the new run."""
+    @property
+    def cells(self) -> tuple[str, str, str, str]:
+        """What was run by what policy, or trained in by what method, seed and length; "-" if the golden is not read."""
         header, difference = self.header, self.difference
+        if isinstance(header, TrainingHeader):
+            length = f"{difference.n_parts} {header.unit}s" if isinstance(difference, TrainingDifference) else "-"
+            return header.curriculum, header.method, str(header.seed), length
+        if header is None:
+            return "-", "-", "-", "-"
+        length = str(difference.totals[0].n_steps) if isinstance(difference, RunComparison) else "-"
+        return header.scenario, header.policy, str(header.seed), length
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as plain values; of a difference, a is the golden and b the new run or training."""
+        header, difference = self.header, self.difference
+        common = {"name": self.name, "result": self.result, "seed": header and header.seed, "sentence": self.sentence}
+        if isinstance(header, TrainingHeader):
+            found = difference.to_dict() if isinstance(difference, TrainingDifference) else {"first": None}
+            return {**common, "curriculum": header.curriculum, "method": header.method, **found}
+        run = difference if isinstance(difference, RunComparison) else None
         return {
-            "name": self.name,
-            "result": self.result,
+            **common,
             "scenario": header and header.scenario,
             "policy": header and header.policy,
-            "seed": header and header.seed,
-            "sentence": self.sentence,
-            "first": difference and plain(difference.first),
-            "header": plain(difference.header) if difference else {},
-            "totals": difference and plain(difference.totals),
+            "first": run and plain(run.first),
+            "header": plain(run.header) if run else {},
+            "totals": run and plain(run.totals),
         }
 
     def __repr__(self) -> str:
@@ -122,14 +146,14 @@ def find_goldens(folder: Path = FOLDER, names: Collection[str] = ()) -> list[Pat
 def check_goldens(
     folder: Path = FOLDER, names: Collection[str] = (), *, keep: Path | None = None, force: bool = False
 ) -> Iterator[GoldenResult]:
-    """Run goldens again, one at each step of the iteration, and compare.
+    """Run goldens again, or train them again, one at each step of the iteration, and compare.
 
-    Scenarios, policies and code are taken as they are now.
+    Scenarios, curricula, policies and code are taken as they are now.
 
     Args:
         folder: of the goldens.
-        names: of those to run; all if there are none.
-        keep: folder in which the new runs that differ are recorded.
+        names: of those to check; all if there are none.
+        keep: folder in which the new runs and trainings that differ are recorded.
         force: replace recordings in `keep`.
 
     Raises:
@@ -155,32 +179,49 @@ def _check_all(paths: Sequence[Path], keep: Path | None) -> Iterator[GoldenResul
 
 
 def check_golden(path: Path, *, cities: CityCache | None = None) -> GoldenResult:
-    """Run a golden's spec again and compare; if that is not possible the result has the error."""
-    header: RunHeader | None = None
+    """Do a golden's spec again and compare; if that is not possible the result has the error."""
+    header: RunHeader | TrainingHeader | None = None
+    fresh: Run | TrainedAgain
     try:
-        header = open_log(path).header
-        spec = spec_of(header)
-        fresh = run_prepared(prepare_golden(spec, path.parent, recorded=header, cities=cities))
-        return compare_golden(path, fresh, spec)
+        if is_training(path):
+            golden = open_training(path)
+            header = golden.header
+            fresh = prepare_training(training_spec_of(header), path.parent, recorded=golden, cities=cities)
+        else:
+            header = open_log(path).header
+            fresh = run_prepared(prepare_golden(spec_of(header), path.parent, recorded=header, cities=cities))
+        return compare_golden(path, fresh)
     except FireworldError as error:
         return GoldenResult(path=path, header=header, error=str(error))
 
 
-def compare_golden(path: Path, fresh: Run, spec: GoldenSpec) -> GoldenResult:
-    """Compare a golden with a new run of its spec.
+def compare_golden(path: Path, fresh: Run | TrainedAgain) -> GoldenResult:
+    """Compare a golden with a new run of its spec; or train for it, and compare.
 
     Raises:
-        LogError: the golden cannot be read, or the spec names fields that do not exist.
+        LogError: the golden cannot be read; the spec names fields that do not exist; or the trainings cannot be
+            compared.
     """
-    log, beside = open_log(path), text_path(path)
-    text = beside.read_text(encoding="utf-8", errors="replace") if beside.is_file() else ""
+    golden: Log | TrainingLog
+    difference: RunComparison | TrainingDifference
+    if isinstance(fresh, TrainedAgain):
+        golden = open_training(path)
+        difference = compare_trainings(golden, fresh, names=("golden", "now"))
+    else:
+        golden, spec = open_log(path), spec_of(fresh.header)
+        difference = compare(golden, fresh, tolerances=spec.tolerances, ignore=spec.ignore)
     return GoldenResult(
         path=path,
-        header=log.header,
+        header=golden.header,
         fresh=fresh,
-        difference=compare(log, fresh, tolerances=spec.tolerances, ignore=spec.ignore),
-        text_is_foreign=not is_text_of(text, log),
+        difference=difference,
+        text_is_foreign=not is_text_of(_text_beside(path), golden),
     )
+
+
+def _text_beside(path: Path) -> str:
+    beside = text_path(path)
+    return beside.read_text(encoding="utf-8", errors="replace") if beside.is_file() else ""
 
 
 def goldens_junit(results: Sequence[GoldenResult]) -> bytes:

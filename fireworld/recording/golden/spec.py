@@ -72,13 +72,12 @@ def make_spec(
     shipped = str(scenario) in scenario_names()
     if not shipped:
         load_scenario(scenario)  # the error names the path as given, not as seen from the folder
-    texts = {key: value if isinstance(value, str) else json.dumps(value) for key, value in (settings or {}).items()}
     return GoldenSpec(
-        scenario=str(scenario) if shipped else _path_from(folder, Path(scenario)),
-        policy=with_file(policy, lambda path: _path_from(folder, Path(path))),
+        scenario=str(scenario) if shipped else path_from(folder, Path(scenario)),
+        policy=with_file(policy, lambda path: path_from(folder, Path(path))),
         seed=seed,
         steps=steps,
-        settings=texts,
+        settings=setting_texts(settings),
         tolerances=dict(tolerances or {}),
         ignore=tuple(ignore),
     )
@@ -121,9 +120,9 @@ def prepare_golden(
     """
     if not spec.scenario:
         return _prepare_recorded(spec, recorded)
-    path = spec.scenario if spec.scenario in scenario_names() else _path_to(folder, spec.scenario)
+    path = spec.scenario if spec.scenario in scenario_names() else path_to(folder, spec.scenario)
     scenario = load_scenario(path).with_settings(spec.settings)
-    named = policy or find_policy(with_file(spec.policy, lambda way: str(_path_to(folder, way))))
+    named = policy or find_policy(with_file(spec.policy, lambda way: str(path_to(folder, way))))
     if not named.attachments:  # a recording names a file of code as its spec does, not by where it is on this machine
         named = replace(named, name=spec.policy)
     built = (cities or CityCache()).build(scenario)
@@ -145,11 +144,21 @@ def _prepare_recorded(spec: GoldenSpec, recorded: RunHeader | None) -> PreparedR
     return PreparedRun(header=header, city=built.city_record(), start=world, policy=named.policy)
 
 
-def _path_from(folder: Path, path: Path) -> str:
+def hash_line(digest: str) -> str:
+    """Return the last line of a golden's text, by which it is known whose text it is."""
+    return f"hash {digest}"
+
+
+def setting_texts(settings: Mapping[str, Any] | None) -> dict[str, str]:
+    """Return settings as `--set` takes them."""
+    return {key: value if isinstance(value, str) else json.dumps(value) for key, value in (settings or {}).items()}
+
+
+def path_from(folder: Path, path: Path) -> str:
     """Return the path of a file relative to a folder, the same on every machine."""
     return Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
 
 
-def _path_to(folder: Path, relative: str) -> Path:
+def path_to(folder: Path, relative: str) -> Path:
     """Return the path of a file that is given relative to a folder."""
     return Path(os.path.normpath(folder / relative))

@@ -13,11 +13,15 @@ from fireworld_recorder.writer import LogWriter
 from fireworld.errors import OutputError
 from fireworld.files import write_file
 from fireworld.parameters import PRESETS
-from fireworld.recording.golden.spec import GoldenSpec, spec_of
+from fireworld.recording.golden.spec import GoldenSpec, hash_line, spec_of
+from fireworld.recording.golden.training import store_training, training_text
+from fireworld.recording.inputs import is_training
 from fireworld.recording.replay import recorded_scenario
 from fireworld.records import EVENT_KINDS, Array, Steps
 from fireworld.scenario import Scenario
 from fireworld.scenario.document import DIRECTIONS
+from fireworld.training.log.reader import TrainingLog, open_training
+from fireworld.training.log.verify import TrainedAgain
 
 SUFFIX: Final = ".mcap"
 TEXT_SUFFIX: Final = ".txt"
@@ -37,14 +41,17 @@ def text_path(path: Path) -> Path:
     return path.with_suffix(TEXT_SUFFIX)
 
 
-def store_golden(path: Path, fresh: Steps) -> None:
+def store_golden(path: Path, fresh: Steps | TrainedAgain) -> None:
     """Write a golden and its text, replacing what is there; each is written beside and renamed (OutputError)."""
     store_recording(path, fresh)
     store_text(path)
 
 
-def store_recording(path: Path, fresh: Steps) -> None:
-    """Write a recording, replacing what is there (OutputError)."""
+def store_recording(path: Path, fresh: Steps | TrainedAgain) -> None:
+    """Write a recording, replacing what is there; a training is trained for it (OutputError)."""
+    if isinstance(fresh, TrainedAgain):
+        store_training(path, fresh)
+        return
     with LogWriter(path, fresh.header, fresh.city, force=True) as writer:
         for record in fresh:
             writer.write(record)
@@ -57,10 +64,11 @@ def store_text(path: Path) -> bool:
         LogError: the golden cannot be read.
         OutputError: the text cannot be written.
     """
-    text, beside = golden_text(open_log(path)).encode(), text_path(path)
-    if beside.is_file() and beside.read_bytes() == text:
+    text = training_text(open_training(path)) if is_training(path) else golden_text(open_log(path))
+    beside, content = text_path(path), text.encode()
+    if beside.is_file() and beside.read_bytes() == content:
         return False
-    write_file(beside, text)
+    write_file(beside, content)
     return True
 
 
@@ -74,17 +82,13 @@ def make_folder(folder: Path) -> None:
 
 def golden_text(log: Log) -> str:
     """Return a recording as text: what was run, how it ended, every event, all decisions, and the final hash."""
-    blocks = (_facts(log, spec_of(log.header)), _events(log), _decisions(log), [_hash(log)])
+    blocks = (_facts(log, spec_of(log.header)), _events(log), _decisions(log), [hash_line(log.digest)])
     return "\n\n".join("\n".join(block) for block in blocks) + "\n"
 
 
-def is_text_of(text: str, log: Log) -> bool:
+def is_text_of(text: str, log: Log | TrainingLog) -> bool:
     """Return whether a text describes this recording, in whatever words."""
-    return _hash(log) in text.splitlines()
-
-
-def _hash(log: Log) -> str:
-    return f"hash {log.digest}"
+    return hash_line(log.digest) in text.splitlines()
 
 
 def _facts(log: Log, spec: GoldenSpec) -> list[str]:

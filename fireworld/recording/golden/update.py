@@ -16,8 +16,12 @@ from fireworld.interrupt import gentle_interrupt
 from fireworld.recording.golden.check import FOLDER, GoldenResult, check_goldens, compare_golden
 from fireworld.recording.golden.spec import GoldenSpec, make_spec, prepare_golden, spec_of
 from fireworld.recording.golden.store import SUFFIX, make_folder, store_golden, store_text
+from fireworld.recording.golden.training import TrainingSpec, make_training_spec, prepare_training, training_spec_of
+from fireworld.recording.inputs import is_training
 from fireworld.recording.record import run_prepared
 from fireworld.recording.run import Run
+from fireworld.training.log.reader import open_training
+from fireworld.training.log.verify import TrainedAgain
 
 REASONS: Final = "REASONS.md"
 REASONS_TITLE: Final = "# Why golden recordings changed\n\nWritten by `fireworld golden update`; the newest last.\n"
@@ -62,19 +66,48 @@ def add_golden(
         OutputError: there is such a golden already, the name is not possible, or it cannot be written.
         ScenarioError, CityError, PolicyError, TrainingError: it cannot be run.
     """
-    if name is None:
-        name = _default_name(scenario, policy, seed)
-    elif not re.fullmatch(r"[\w.+=-]+", name) or name.startswith((".", "-")):
-        raise OutputError(expected("name", "", "letters, digits and any of _ . + = -", name))
-    path = folder / f"{name}{SUFFIX}"
-    if path.exists():
-        hint = "`fireworld golden update` records it anew; or try another name"
-        raise OutputError(expected(str(path), "", "a name that is free", "an existing golden", hint))
+    path = _free_path(folder, name if name is not None else _default_name(scenario, policy, seed))
     spec = make_spec(folder, scenario=scenario, policy=policy, seed=seed, steps=steps, settings=settings)
     fresh = run_prepared(prepare_golden(spec, folder))
     make_folder(folder)
     with gentle_interrupt():
         store_golden(path, fresh)
+    return path
+
+
+def add_training(
+    curriculum: str | Path,
+    *,
+    method: str = "paper",
+    seed: int = 1,
+    stages: str | Sequence[str] | None = None,
+    settings: Mapping[str, Any] | None = None,
+    name: str | None = None,
+    folder: Path = FOLDER,
+) -> Path:
+    """Train a team, and store the training log and its text as a golden.
+
+    Args:
+        curriculum: the name of a shipped curriculum or scenario, or a YAML file of either.
+        method: a name as for `fireworld train --method`.
+        seed: of all random draws.
+        stages: the curriculum's stages to train in, by name: a list, or text as in "alone,together". None: all.
+        settings: hyperparameters of the method by name.
+        name: of the golden; None: made of curriculum, method and seed.
+        folder: where it goes.
+
+    Returns:
+        The path of the training log.
+
+    Raises:
+        OutputError: there is such a golden already, the name is not possible, or it cannot be written.
+        TrainingError, ScenarioError, CityError: it cannot be trained.
+    """
+    path = _free_path(folder, name if name is not None else _default_name(curriculum, f"{method}-training", seed))
+    spec = make_training_spec(folder, curriculum=curriculum, method=method, seed=seed, stages=stages, settings=settings)
+    again = prepare_training(spec, folder)
+    make_folder(folder)
+    store_golden(path, again)
     return path
 
 
@@ -117,8 +150,8 @@ def update_goldens(
         return [_update(result) for result in results]
 
 
-def store_if_changed(path: Path, fresh: Run, spec: GoldenSpec) -> bool:
-    """Store a golden, unless it is there already, was made by this spec and is the same as a new run of it.
+def store_if_changed(path: Path, fresh: Run | TrainedAgain) -> bool:
+    """Store a golden, unless it is there already, was made by the same spec and is the same.
 
     Returns:
         Whether the recording was stored; its text is written in any case if it is outdated.
@@ -126,11 +159,12 @@ def store_if_changed(path: Path, fresh: Run, spec: GoldenSpec) -> bool:
     Raises:
         OutputError: it cannot be written.
     """
+    wanted = training_spec_of(fresh.header) if isinstance(fresh, TrainedAgain) else spec_of(fresh.header)
     try:
-        difference = compare_golden(path, fresh, spec).difference if spec_of(open_log(path).header) == spec else None
+        same = _spec_in(path) == wanted and not compare_golden(path, fresh).differs
     except FireworldError:
-        difference = None
-    if difference is not None and difference.same:
+        same = False
+    if same:
         store_text(path)
         return False
     make_folder(path.parent)
@@ -138,11 +172,27 @@ def store_if_changed(path: Path, fresh: Run, spec: GoldenSpec) -> bool:
     return True
 
 
+def _spec_in(path: Path) -> GoldenSpec | TrainingSpec:
+    """Return the spec of a golden; LogError if it cannot be read."""
+    return training_spec_of(open_training(path).header) if is_training(path) else spec_of(open_log(path).header)
+
+
 def _update(result: GoldenResult) -> GoldenUpdate:
     if result.differs and result.fresh is not None:
         store_golden(result.path, result.fresh)
         return GoldenUpdate(result.name, "recording", result.sentence)
     return GoldenUpdate(result.name, "text" if store_text(result.path) else "nothing", "")
+
+
+def _free_path(folder: Path, name: str) -> Path:
+    """Return where a golden of that name goes; OutputError if it cannot have that name, or there is one."""
+    if not re.fullmatch(r"[\w.+=-]+", name) or name.startswith((".", "-")):
+        raise OutputError(expected("name", "", "letters, digits and any of _ . + = -", name))
+    path = folder / f"{name}{SUFFIX}"
+    if path.exists():
+        hint = "`fireworld golden update` records it anew; or try another name"
+        raise OutputError(expected(str(path), "", "a name that is free", "an existing golden", hint))
+    return path
 
 
 def _default_name(scenario: str | Path, policy: str, seed: int) -> str:

@@ -376,21 +376,25 @@ def _in_episode(a: TrainingLog, b: Trained, number: int, pair: tuple[Episode, Ep
     x, y = (_learned_by(side, before, record) for side, record in zip((a, b), pair, strict=True))
     entries = _entries(x.tables_after, y.tables_after)
     found = _first_in_steps(x, y)
-    if found is None:
-        for name in ("terminated", "total_reward", "score", "n_burnt_out", "n_civilians_alive", "n_changed"):
-            u, v = getattr(one, name), getattr(other, name)
-            if u != v:
-                found = {"phase": "end", "what": name.replace("_", " "), "a": f"{u}", "b": f"{v}"}
-                break
-        else:
-            name = next(
-                item.name for item in fields(one) if _differs(getattr(one, item.name), getattr(other, item.name))
-            )
-            u, v = getattr(one, name), getattr(other, name)
-            texts = [value.hex()[:12] if isinstance(value, bytes) else str(value) for value in (u, v)]
-            found = {"phase": "end", "what": name.replace("_", " "), "a": texts[0], "b": texts[1]}
+    found = found or _of_end(one, other)
     found = {"entries": entries[:ENTRIES_SHOWN], "n_entries": len(entries), **found}
     return _place(a, number, one, **found)
+
+
+def _of_end(one: Episode, other: Episode) -> dict[str, Any]:
+    """Return how two episodes differ whose steps are the same."""
+    names = [item.name for item in fields(one) if _differs(getattr(one, item.name), getattr(other, item.name))]
+    if "tables_digest" in names:
+        words = [episode.tables_digest.hex()[:12] for episode in (one, other)]
+        what = "values learned from the same steps, tables digest"
+        return {"phase": "learn", "what": what, "a": words[0], "b": words[1]}
+    name = names[0]
+    return {
+        "phase": "end",
+        "what": name.replace("_", " "),
+        "a": f"{getattr(one, name)}",
+        "b": f"{getattr(other, name)}",
+    }
 
 
 def _learned_by(side: Trained, before: Trainer[Any, Any], record: Episode) -> LearnedEpisode:

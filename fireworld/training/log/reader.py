@@ -229,7 +229,7 @@ class TrainingLog(Shown):
     @property
     def scenarios(self) -> list[Scenario]:
         """What is learned in, in the order of the plan."""
-        return [scenario for stage in self.curriculum.stages for scenario in stage.scenarios]
+        return self.curriculum.scenarios
 
     def position(self, scenario: str | int, episode: int) -> int:
         """Return the number of the part that an episode is.

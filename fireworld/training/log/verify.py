@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -14,30 +15,52 @@ from fireworld.scenario import Scenario
 from fireworld.training.log.difference import AnyTraining, TrainingDifference, compare_trainings
 from fireworld.training.log.reader import Part, TrainingLog, open_training
 from fireworld.training.log.records import TrainingHeader
-from fireworld.training.method import Method, Trainer
+from fireworld.training.method import Method, Report, Trainer
 
 
 class TrainedAgain:
-    """A recorded training, trained again: a `fireworld.training.log.difference.Trained`."""
+    """A training as this fireworld does it, anew each time that its parts are asked for: a `Trained`, to be compared.
 
-    def __init__(self, log: TrainingLog, workers: Workers) -> None:
-        self._log, self._workers = log, workers
-        self.header: TrainingHeader = log.header
-        self.method: Method = log.method
-        self.scenarios: list[Scenario] = log.scenarios
+    Attributes:
+        header: what identifies it.
+        method: how the team learns.
+        scenarios: what it learns in.
+
+    Args:
+        make: returns its trainer, before the first part.
+        header: what identifies it.
+        workers: who does the work, where it comes in many parts.
+        n_parts: train so far; None: to the end.
+    """
+
+    def __init__(
+        self,
+        make: Callable[[], Trainer[Any, Any]],
+        header: TrainingHeader,
+        workers: Workers,
+        *,
+        n_parts: int | None = None,
+    ) -> None:
+        self._make, self._workers, self._n_parts = make, workers, n_parts
+        trainer = make()
+        self.header = header
+        self.method: Method = trainer.method
+        self.scenarios: list[Scenario] = trainer.curriculum.scenarios
 
     def trainer(self) -> Trainer[Any, Any]:
         """Return a trainer of it, before the first part."""
-        return self._log.trainer()
+        return self._make()
+
+    def run(self, trainer: Trainer[Any, Any]) -> Iterator[Report]:
+        """Let a trainer of it train, as far as it goes; yield each report."""
+        trainer.recording = True
+        return islice(trainer.run(self._workers), self._n_parts)
 
     def parts(self) -> Iterator[Part]:
-        """Train, as far as the log goes, and yield each part."""
+        """Train, and yield each part."""
         trainer = self.trainer()
-        trainer.recording = True
-        for n_parts, _ in enumerate(trainer.run(self._workers), 1):
+        for _ in self.run(trainer):
             yield {type(record): record for record in trainer.records()}
-            if n_parts >= len(self._log) and not self._log.done:
-                return
 
 
 @dataclass(frozen=True, repr=False)
@@ -107,7 +130,8 @@ def verify_training(
         found = read_team(Path(team))[0].digest
         if found != digest:
             raise TrainingError(expected(str(team), "", f"the team of {opened.path}, digest {digest}", found))
-    again = TrainedAgain(opened, threads(jobs))
+    n_parts = None if opened.done else len(opened)
+    again = TrainedAgain(opened.trainer, opened.header, threads(jobs), n_parts=n_parts)
     difference = compare_trainings(opened, again, names=(str(opened.path), "again"), on_part=on_part)
     return TrainingVerification(
         name=str(opened.path),

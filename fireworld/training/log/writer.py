@@ -110,6 +110,7 @@ class TrainingWriter:
     Args:
         path: the log to make.
         trainer: what is recorded.
+        header: what identifies it; None: `header_of(trainer)`.
         force: replace an existing log.
         before: the parts of the interrupted training that is continued; they are copied first, and then the new file
             takes the place of the partial one.
@@ -119,9 +120,15 @@ class TrainingWriter:
     """
 
     def __init__(
-        self, path: Path, trainer: Trainer[Any, Any], *, force: bool = False, before: Iterable[RawStep] | None = None
+        self,
+        path: Path,
+        trainer: Trainer[Any, Any],
+        *,
+        header: TrainingHeader | None = None,
+        force: bool = False,
+        before: Iterable[RawStep] | None = None,
     ) -> None:
-        header = header_of(trainer)
+        header = header or header_of(trainer)
         self._trainer = trainer
         self._chain = PartChain(trainer)
         self._file = StepFile(

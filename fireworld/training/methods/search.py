@@ -158,7 +158,7 @@ class SearchTrainer(Trainer[Search, Generation]):
         """
         if not self._fires:
             n = self.method.n_steps_max
-            scenarios = [scenario for stage in self.curriculum.stages for scenario in stage.scenarios]
+            scenarios = self.curriculum.scenarios
             short = [one.with_values({"steps": n}) if one.steps > n else one for one in scenarios]
             self._fires = [self._cities.build(scenario) for scenario in short]
         with workers.make_pool(workers.n) as pool:
