@@ -226,12 +226,20 @@ def _cells(one: ScenarioDifference) -> list[str]:
         one.scenario,
         f"{n_a}/{n_b}" if n_a != n_b else str(n_a),
         str(one.n_equal),
-        "-" if math.isnan(r_a) else f"{r_a:.4g}/{r_b:.4g}",
+        "-" if math.isnan(r_a) else f"{_short(r_a)}/{_short(r_b)}",
         f"{s_a:.2f}/{s_b:.2f}",
         "-" if nothing else f"{one.agreement:.0%}",
         "-" if nothing else f"{one.value_difference:.2g}",
         "the end" if one.first is None else f"from {one.first}",
     ]
+
+
+def _short(value: float) -> str:
+    """Write a number in six characters or so."""
+    for scale, letter in ((1e6, "M"), (1e3, "k")):
+        if abs(value) >= 10 * scale or (letter == "M" and abs(value) >= scale):
+            return f"{value / scale:.3g}{letter}"
+    return f"{value:.4g}"
 
 
 def diff_trainings(
