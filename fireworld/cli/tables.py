@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from fireworld.shown import Block
 
+NARROW_FROM = 7
+"""Columns above which there is little space between them."""
+
 
 def print_table(
     head: Sequence[str],
@@ -46,4 +49,5 @@ def print_blocks(blocks: Iterable[Block]) -> None:
         if isinstance(block, str):
             click.echo(block)
         else:
-            print_table(block.heads, block.rows, left=range(block.n_left), whole=(0,))
+            narrow = len(block.heads) > NARROW_FROM
+            print_table(block.heads, block.rows, left=range(block.n_left), whole=(0,), narrow=narrow)
