@@ -78,6 +78,7 @@ def reproduce(
     seeds: int | None = None,
     quick: bool = False,
     curriculum: Path | str | None = None,
+    record_trainings: bool = False,
     resume: bool = False,
     force: bool = False,
     executor: AnyExecutor = None,
@@ -95,6 +96,8 @@ def reproduce(
         seeds: runs of each test; None: 20, or 5 if quick.
         quick: few repetitions and seeds: to see how it looks, not to claim anything.
         curriculum: name or file of a curriculum that ends with the scenarios of Table 1; None: the paper's.
+        record_trainings: keep the training log of every training in the folder's `trainings`, and read from it how the
+            team learned; the tables are the same.
         resume: continue what an interrupted call left in the folder.
         force: replace an earlier reproduction in the folder.
         executor: who trains and tests. None: as many threads as there are cores; a number of threads; "threads",
@@ -128,11 +131,22 @@ def reproduce(
     test_seeds = range(FIRST_SEED, FIRST_SEED + n_seeds)
     with gentle_interrupt(stop) as asked:
         try:
-            measurement = Measurement(place, trained_in, PAPER, n_repetitions, test_seeds, asked, on_progress)
+            measurement = Measurement(
+                place,
+                trained_in,
+                PAPER,
+                n_repetitions,
+                test_seeds,
+                record_trainings=bool(record_trainings),
+                stop=asked,
+                on_progress=on_progress,
+            )
             if resume:
                 place.check_settings(measurement.identity)
             else:
                 place.write_settings(measurement.identity)
+            if record_trainings:
+                place.make_trainings()
             return _carry_out(measurement, executor)
         except KeyboardInterrupt:
             kept = f"{place.n_trained(n_repetitions)} of {n_repetitions} trainings are kept in {place.path}"
