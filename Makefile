@@ -76,6 +76,8 @@ pictures: install  ## Draw the pictures of the docs again, from runs made again.
 	$(BIN)/fireworld render $(PICTURE)alone.mcap $(PICTURE)together.mcap -o docs/pictures/pair.png --step 60 --force
 	$(BIN)/fireworld render $(PICTURE)alone.mcap $(PICTURE)together.mcap -o docs/pictures/before-after.png --steps 0,last --force
 	$(BIN)/python -m tests.viewer.headless
+	$(BIN)/fireworld train paper --seed 1 -o $(PICTURE)training.npz --record $(PICTURE)training.mcap --force
+	$(BIN)/fireworld render $(PICTURE)training.mcap -o docs/pictures/training.png --force
 
 fuzz: install  ## Try odd and altered files on all readers for FUZZ_SECONDS (60), and as long with atheris where it installs.
 	$(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS)

@@ -39,6 +39,7 @@ class TrainingLayout:
     plots: Mapping[str, str]  # titles of the plots that are always seen, by name
     tabs: Mapping[str, LayoutTab] = field(default_factory=dict)  # below them, by title
     log: str = ""  # title of the log; empty for none
+    n_parts: int = 0  # how many there are, all of which are then in sight; 0: more and more, and the view follows
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ class CurveWriter:
         if curve not in drawn:
             rgb = colors.single(colors.BRIGADE_RGB[len(drawn) % len(colors.BRIGADE_RGB)])
             drawn.append(curve)
-            style: Any = rerun.SeriesLines(names=[curve], colors=rgb, widths=[1.5])
+            style: Any = rerun.SeriesLines(names=[curve or plot.replace("_", " ")], colors=rgb, widths=[1.5])
             if points:
                 style = rerun.SeriesPoints(names=[curve], colors=rgb, markers="Diamond", marker_sizes=[4.0])
             self._stream.log(f"{plot}/{curve}", style, static=True)
@@ -124,9 +125,17 @@ def _blueprint(layout: TrainingLayout) -> Any:
     """Lay out the plots in a grid, the tabs below them, the log beside."""
     import rerun.blueprint as rrb
 
+    axis = None
+    if layout.n_parts:
+        bounds = rrb.TimeRangeBoundary.absolute(seq=0), rrb.TimeRangeBoundary.absolute(seq=layout.n_parts)
+        axis = rrb.TimeAxis(view_range=rrb.TimeRange(*bounds))
+
     def grid(plots: Mapping[str, str], n_columns: int) -> Any:
         legend = rrb.PlotLegend(rrb.Corner2D.LeftTop)
-        views = [rrb.TimeSeriesView(name=title, origin=f"/{name}", plot_legend=legend) for name, title in plots.items()]
+        views = [
+            rrb.TimeSeriesView(name=title, origin=f"/{name}", plot_legend=legend, axis_x=axis)
+            for name, title in plots.items()
+        ]
         return rrb.Grid(*views, grid_columns=n_columns)
 
     root = grid(layout.plots, 2 if len(layout.plots) <= _FEW else 3)
@@ -146,7 +155,9 @@ def _blueprint(layout: TrainingLayout) -> Any:
         root = rrb.Horizontal(root, log, column_shares=[3, 1])
     return rrb.Blueprint(
         root,
-        rrb.TimePanel(state="collapsed", timeline=layout.timeline, play_state="following"),
+        rrb.TimePanel(
+            state="collapsed", timeline=layout.timeline, play_state="paused" if layout.n_parts else "following"
+        ),
         rrb.BlueprintPanel(state="expanded"),
         rrb.SelectionPanel(state="collapsed"),
     )

@@ -141,7 +141,7 @@ def _write(logs: Sequence[TrainingLog], stream: Any) -> None:
     for k, (name, picture) in enumerate(zip(names, pictures, strict=True)):
         if picture is not None:
             tabs[f"Tables of {name}"] = LayoutTab({}, f"states/{k}", f"tables/{k}")
-    writer = CurveWriter(stream, replace(layout, tabs=tabs))
+    writer = CurveWriter(stream, replace(layout, tabs=tabs, n_parts=max(map(len, logs))))
     for log, name in zip(logs, names, strict=True):
         writer.write(list(_points(log, name if len(logs) > 1 else "")))
     for k, picture in enumerate(pictures):
