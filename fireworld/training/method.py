@@ -167,6 +167,7 @@ class Trainer(ABC, Generic[AMethod, AReport]):
     topics: ClassVar[tuple[type[Any], ...]] = ()
     whole: ClassVar[type[Any] | None] = None
     recording: bool = False
+    detailed: bool = False
     watched: bool = False
 
     def __init__(self, curriculum: Curriculum, method: AMethod, *, seed: int) -> None:

@@ -125,6 +125,7 @@ def prepare_training(
 def store_training(path: Path, fresh: TrainedAgain) -> None:
     """Train, and write the training log, replacing what is there; an error or Ctrl-C leaves nothing (OutputError)."""
     trainer = fresh.trainer()
+    trainer.detailed = True
     writer = TrainingWriter(path, trainer, header=fresh.header, force=True)
     try:
         with writer:

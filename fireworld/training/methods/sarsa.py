@@ -26,7 +26,7 @@ from fireworld.scenario.document import with_kind
 from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.simulation.state import fresh_learner, fresh_trace
 from fireworld.training.curriculum import Curriculum
-from fireworld.training.log.records import Episode, Tables, trace_columns
+from fireworld.training.log.records import Episode, Tables, Updates, trace_columns
 from fireworld.training.method import Count, Limits, Method, NotNegative, Play, Report, Share, Trainer
 
 Rule = Literal["sarsa", "expected-sarsa", "q-learning"]
@@ -142,7 +142,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
 
     report_type: ClassVar[type[Report]] = EpisodeReport
     unit: ClassVar[str] = "episode"
-    topics: ClassVar[tuple[type[Any], ...]] = (Episode, Tables)
+    topics: ClassVar[tuple[type[Any], ...]] = (Episode, Tables, Updates)
     whole: ClassVar[type[Any] | None] = Tables
     plots: ClassVar[Mapping[str, str]] = {
         "return": "Return",
@@ -333,7 +333,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         trace = fresh_trace(built.n_brigades, world.n_steps_max if traced else 0)
         policy, learner = self._learning(built.n_brigades, epsilon, trace=trace)
         before = progress.tables.argmax(axis=2)
-        keeps = self.watched or (self.full_every > 0 and episode % self.full_every == 0)
+        keeps = self.watched or self.detailed or (self.full_every > 0 and episode % self.full_every == 0)
         self.start = (progress.tables, progress.visits.copy()) if keeps else None
         n_steps = world.run(policy, learner)
         progress.tables = policy.tables
@@ -365,8 +365,9 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         )
         whole = self.recording and (ended or (episode + 1) % TABLES_EVERY == 0)
         self._records = [record, *([Tables.of(progress.tables, progress.visits)] if whole else [])]
-        if self.watched and self.start is not None:
+        if (self.watched or self.detailed) and self.start is not None:
             self._updates = self._learn_again(record, *self.start)
+            self._records += [Updates(self._updates[2].ravel())] if self.detailed else []
         return self._end_episode(record)
 
     def _learn_again(self, record: Episode, tables: Array, visits: Array) -> Array:
