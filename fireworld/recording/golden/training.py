@@ -179,7 +179,7 @@ def training_changes(difference: TrainingDifference) -> Iterator[str]:
     _, *blocks = difference.describe()
     for block in blocks:
         if isinstance(block, str):
-            yield block
+            yield from block.split("\n")
         else:
             align = "<" * block.n_left + ">" * (len(block.heads) - block.n_left)
             yield from text_table(block.heads, block.rows, align).splitlines()
