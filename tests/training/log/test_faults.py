@@ -26,6 +26,7 @@ def use(path):
     return log
 
 
+@pytest.mark.slow
 def test_a_changed_byte_is_found_and_what_is_before_it_is_good(log_path, tmp_path):
     whole = log_path.read_bytes()
     places, n_good = random.Random(5), set()
@@ -45,6 +46,7 @@ def test_a_changed_byte_is_found_and_what_is_before_it_is_good(log_path, tmp_pat
     assert len(n_good) > 5
 
 
+@pytest.mark.slow
 def test_a_cut_log_is_good_up_to_the_last_part(log_path, tmp_path):
     whole, places = log_path.read_bytes(), random.Random(6)
     for n_bytes in [0, 1, 8, *(places.randrange(len(whole)) for _ in range(40)), len(whole) - 1]:

@@ -26,6 +26,7 @@ def cut(whole, folder, n_bytes):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "short"), [("paper", SHORT), ("search", SHORT_SEARCH)])
 def test_a_log_that_was_cut_anywhere_is_continued_to_the_same_bytes(curriculum, make_log, tmp_path, method, short):
     source = make_log(method)

@@ -60,6 +60,7 @@ def test_the_picture_of_the_tables(log):
     assert page.count("\n| ") == len(picture.states) + 1
 
 
+@pytest.mark.slow
 def test_pages_and_pictures(log_path, make_log, tmp_path, fireworld):
     other = make_log(alpha=0.6)
     done = fireworld("report", log_path, "-o", tmp_path / "a.html")
