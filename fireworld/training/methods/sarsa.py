@@ -171,6 +171,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         shape = self.shape(0)
         untrained = Progress(tables=np.zeros(shape), visits=np.zeros(shape, dtype=np.int64))
         self.progress = progress if progress is not None else untrained
+        self._last_built: tuple[int, BuiltScenario] | None = None
         self._records: list[Any] = []
         self.full_every = 0
         """Every so many episodes of a scenario `start` is kept; 0: never."""
@@ -191,7 +192,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         del workers
         while not self.done:
             number = self.progress.scenario_number
-            built = self.build(self._plan[number][1])
+            built = self._built(number)
             while self.progress.scenario_number == number:
                 yield self._run_episode(built)
 
@@ -256,7 +257,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         Raises:
             LogError: the columns of the episode are not those of an episode of its scenario.
         """
-        built = self.build(self._plan[episode.scenario][1])
+        built = self._built(episode.scenario)
         policy, learner = self._learning(built.n_brigades, episode.epsilon, trace=episode.trace(built.n_brigades))
         updates = np.empty((3, built.n_brigades, episode.n_steps + 1))
         learn_again(policy.table_of, episode.epsilon, learner, episode.n_steps, episode.terminated, updates)
@@ -308,6 +309,12 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         """Build a scenario as it is learned in: with the choices and the reward of the method."""
         varied = msgspec.structs.replace(scenario, choices=self.method.choices)
         return self._cities.build(with_kind(varied, self.method.reward))
+
+    def _built(self, number: int) -> BuiltScenario:
+        """Build a scenario of the curriculum, unless it is the one that was built last."""
+        if self._last_built is None or self._last_built[0] != number:
+            self._last_built = number, self.build(self._plan[number][1])
+        return self._last_built[1]
 
     def _learning(self, n_brigades: int, epsilon: float, *, trace: Trace) -> tuple[PolicyArrays, Learner]:
         """Return what a team follows in an episode and what it learns with; both share the tables, a copy."""
