@@ -46,7 +46,7 @@ def command(
     DIR gets report.html (open it in a browser), the tables and every run as CSV, the trained teams, a recording of
     one run of each row, and the figures. The same options give the same CSV, byte for byte. After Ctrl-C, or a kill,
     the same options with --resume continue: what was trained and tested by then is kept in DIR. With --record-trainings
-    every episode is on record, too: 15 MB a repetition.
+    every episode is on record, too: 13 MB a repetition.
 
     Exit code: 0 done, whatever was found; 2 could not be done; 130 interrupted.
     """
