@@ -211,27 +211,35 @@ class TrainingDifference(Shown):
         return f"<TrainingDifference {self.names[0]}, {self.names[1]}: {text}>"
 
 
-SPREAD_HEADS: Final = ("scenario", "episodes", "same", "return", "score", "steps", "greedy", "largest", "verdict")
+SPREAD_HEADS: Final = ("scenario", "episodes", "same", "return", "score", "greedy", "largest", "differ")
 SPREAD_NOTE: Final = (
-    f"A / B; return, score and steps: means of the last {LAST} episodes; greedy: states in which the final tables\n"
-    "prefer the same action, of those that both have visited; largest: difference of a value in them"
+    f"A/B; return, score: means of the last {LAST} episodes; greedy: states in which the\n"
+    "final tables prefer the same action, of those that both have visited; largest:\n"
+    "difference of a value in them; differ: the first episode that does"
 )
 
 
 def _cells(one: ScenarioDifference) -> list[str]:
-    (n_a, n_b), (r_a, r_b), (s_a, s_b), (t_a, t_b) = one.n_episodes, one.total_reward, one.score, one.n_steps
+    (n_a, n_b), (r_a, r_b), (s_a, s_b) = one.n_episodes, one.total_reward, one.score
     nothing = math.isnan(one.agreement)
     return [
         one.scenario,
-        f"{n_a} / {n_b}" if n_a != n_b else str(n_a),
+        f"{n_a}/{n_b}" if n_a != n_b else str(n_a),
         str(one.n_equal),
-        f"{r_a:,.0f} / {r_b:,.0f}",
-        f"{s_a:.2f} / {s_b:.2f}",
-        f"{t_a:.0f} / {t_b:.0f}",
+        "-" if math.isnan(r_a) else f"{_short(r_a)}/{_short(r_b)}",
+        f"{s_a:.2f}/{s_b:.2f}",
         "-" if nothing else f"{one.agreement:.0%}",
-        "-" if nothing else f"{one.value_difference:.3g}",
-        one.verdict,
+        "-" if nothing else f"{one.value_difference:.2g}",
+        "the end" if one.first is None else f"from {one.first}",
     ]
+
+
+def _short(value: float) -> str:
+    """Write a number in six characters or so."""
+    for scale, letter in ((1e6, "M"), (1e3, "k")):
+        if abs(value) >= 10 * scale or (letter == "M" and abs(value) >= scale):
+            return f"{value / scale:.3g}{letter}"
+    return f"{value:.4g}"
 
 
 def diff_trainings(

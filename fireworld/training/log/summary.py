@@ -81,7 +81,7 @@ def describe_training(log: TrainingLog, *, limit: int = SHOWN_MAX) -> Iterator[B
     rows = found["scenarios"]
     if rows:
         yield ""
-        heads = ["scenario", "episodes", "steps", "ends", "return", "score", "states visited"]
+        heads = ["scenario", "episodes", "steps", "ends", "return", "score", "states"]
         shown = rows if len(rows) <= limit else [*rows[: limit // 2], *rows[-(limit - limit // 2) :]]
         yield TextTable(heads, [_cells(row) for row in shown])
         if len(rows) > len(shown):
