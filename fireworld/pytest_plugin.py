@@ -201,7 +201,7 @@ class Recorder:
 
         lines = [f"{_shown(result.path)}: the {result.kind} is not the same any more", result.sentence]
         if result.fresh is not None and result.differs:
-            lines += [f"  {line}" for line in result.changes]
+            lines += [f"  {line}".rstrip() for line in result.changes]
             new = self._factory.mktemp("fireworld") / result.path.name
             store_recording(new, result.fresh)
             lines.append(

@@ -22,7 +22,7 @@ Array = NDArray[Any]
 Wire = Literal["double", "float", "sfixed32", "fixed64", "uint8", "bool", "string", "bytes"]
 Entity = Literal[
     "building", "brigade", "civilian", "site", "event", "link", "corner", "node", "street", "refuge", "hydrant",
-    "offset", "axis", "scenario", "step", "choice", "table", "entry", "candidate", "fire", "weight",
+    "offset", "axis", "scenario", "step", "choice", "table", "entry", "update", "candidate", "fire", "weight",
 ]  # fmt: skip
 """What an array can have an entry for. An offset is where the entries of a building begin in another array; the last
 one is where they end."""

@@ -185,7 +185,7 @@ def _show(results: Sequence[GoldenResult], *, keep: Path | None) -> None:
             continue
         click.echo(f"\n{result.name}: {result.sentence}")
         for line in result.changes:
-            click.echo(f"  {line}")
+            click.echo(f"  {line}".rstrip())
         if keep is not None and result.result == "different":
             click.echo(f"  the new {result.kind}: {keep / result.path.name}")
     bad = [result for result in results if result.result == "different"]

@@ -77,15 +77,16 @@ def show(*, team: str, states: tuple[str, ...], log: Path | None, limit: int, as
     fireworld policy show paper-cooperative
     fireworld policy show team.npz 1193 --log team.mcap
 
-    With --log, the training log: the values at the end of every scenario, and the steps that moved them most.
+    With --log, the training log that the team came of: when each brigade was first in the state, its values at the end
+    of every scenario, and the steps that moved them most.
 
-    Exit code: 0 shown, 2 no such team or state.
+    Exit code: 0 shown, 2 no such team or state, or a log of another team.
     """
     from fireworld.policy.teams.team import load_team
 
     loaded = load_team(team)
     if log is not None:
-        _show_history(loaded, states, log, limit=limit, as_json=as_json)
+        _show_history(loaded, team, states, log, limit=limit, as_json=as_json)
         return
     if as_json:
         click.echo(json.dumps(loaded.as_dict(states=states, limit=limit), indent=2))
@@ -124,21 +125,23 @@ def diff(context: click.Context, *, first: str, second: str, actions_only: bool,
     context.exit(0 if same else 1)
 
 
-def _show_history(team: Team, states: tuple[str, ...], path: Path, *, limit: int, as_json: bool) -> None:
+def _show_history(team: Team, name: str, states: tuple[str, ...], path: Path, *, limit: int, as_json: bool) -> None:
     """Show how the values of states came about in a training."""
     if not states:
         raise click.UsageError("--log needs a STATE.")
     announce_compilation()
     from fireworld.policy.words import find_states
-    from fireworld.training.log.history import state_history
+    from fireworld.training.log.history import state_histories
     from fireworld.training.log.reader import open_training
+    from fireworld.training.log.verify import check_team
 
-    log = open_training(path, partial=True)
     found = list(dict.fromkeys(state for text in states for state in find_states(text)))
     if len(found) > HISTORIES_MAX:
         raise click.UsageError(f"--log: expected at most {HISTORIES_MAX} states, got {len(found)}: name more features.")
-    with bar("reading", len(found) * len(log), quiet=as_json) as advance:
-        histories = [state_history(log, state, team=team, on_part=advance) for state in found]
+    log = open_training(path, partial=True)
+    check_team(log, team, source=name)
+    with bar("reading", len(log), quiet=as_json) as advance:
+        histories = state_histories(log, found, on_part=advance)
     if as_json:
         click.echo(json.dumps([one.to_dict() for one in histories], indent=2))
         return

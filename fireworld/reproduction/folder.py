@@ -21,23 +21,26 @@ from fireworld.policy.teams.team import load_team
 from fireworld.reproduction.csv_files import CSV_FILES
 from fireworld.reproduction.repetitions import Repetition
 from fireworld.reproduction.study import TEAMS, TOGETHER, LearningCurve, Tested
+from fireworld.reproduction.trainings import RepetitionLogs
 from fireworld.training.training import check_same
 
 FORMAT: Final = "fireworld-reproduction/1"
 REPORT: Final = "report.html"
 SETTINGS: Final = "kept/settings.json"  # what the work in a folder was begun with
-SUBFOLDERS: Final = ("kept", "teams", "recordings", "figures", "trainings")
+TRAININGS: Final = "trainings"
+SUBFOLDERS: Final = ("kept", "teams", "recordings", "figures")
 _HINT: Final = "delete it and it is made anew"
 
 Content = TypeVar("Content")
 
 
-class RepetitionText(Struct, frozen=True, forbid_unknown_fields=True):
+class RepetitionText(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """A Repetition as plain values; its teams are in files of their own."""
 
     teams: dict[str, str]  # digests by name
     graduates: dict[str, str]  # digests by scenario
-    lessons: list[LearningCurve]
+    lessons: list[LearningCurve] = []  # empty where the training logs have them
+    logs: dict[str, str] = {}  # digests of the training logs by team
 
 
 @dataclass(frozen=True)
@@ -45,11 +48,6 @@ class ReproductionFolder:
     """The folder of a reproduction."""
 
     path: Path
-
-    @property
-    def trainings(self) -> Path:
-        """The folder of the training logs."""
-        return self.path / "trainings"
 
     def make(self, *, force: bool) -> None:
         """Make the folder; delete what an earlier reproduction left in it (`force`), or raise OutputError."""
@@ -87,13 +85,17 @@ class ReproductionFolder:
         found = self._read(path, RepetitionText)
         if found is None:
             return None
+        logs, curves = found.logs, tuple(found.lessons)
+        if logs:
+            logs, curves = self.logs(number).read(logs, source=path)
         return Repetition(
             teams={name: _read_team(self._team(name, number), digest, path) for name, digest in found.teams.items()},
             graduates={
                 scenario: _read_team(self._graduate(scenario, number), digest, path)
                 for scenario, digest in found.graduates.items()
             },
-            curves=tuple(found.lessons),
+            curves=curves,
+            logs=logs,
         )
 
     def write_repetition(self, number: int, repetition: Repetition) -> None:
@@ -105,7 +107,19 @@ class ReproductionFolder:
         teams, graduates = (
             {name: team.digest for name, team in saved.items()} for saved in (repetition.teams, repetition.graduates)
         )
-        self._write(self._training(number), RepetitionText(teams, graduates, list(repetition.curves)))
+        lessons = [] if repetition.logs else [*repetition.curves]
+        self._write(self._training(number), RepetitionText(teams, graduates, lessons, dict(repetition.logs)))
+
+    def logs(self, number: int) -> RepetitionLogs:
+        """Return the training logs of a repetition, which may not be there."""
+        return RepetitionLogs(self.path / TRAININGS, number)
+
+    def make_trainings(self) -> None:
+        """Make the folder of the training logs, if it is not there (OutputError)."""
+        try:
+            (self.path / TRAININGS).mkdir(exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"{self.path / TRAININGS}: cannot be made: {error.strerror or error}") from None
 
     def n_trained(self, n_repetitions: int) -> int:
         """Return how many repetitions are trained."""
@@ -148,7 +162,8 @@ class ReproductionFolder:
     def check_settings(self, identity: Mapping[str, Any]) -> None:
         """Check that the work was begun with the same settings; TrainingError if not, or if their file is damaged."""
         path = self.path / SETTINGS
-        check_same(self._read(path, dict[str, Any]) or {}, {"format": FORMAT, **identity}, path)
+        found = self._read(path, dict[str, Any]) or {}
+        check_same({"record_trainings": False, **found}, {"format": FORMAT, **identity}, path)
 
     def _training(self, number: int) -> Path:
         return self.path / "kept" / f"training-{number}.json"
@@ -171,8 +186,8 @@ class ReproductionFolder:
         path = self.path
         scattered = [found for name in ("training", "tests") for found in path.glob(f"kept/{name}-*.json*")]
         scattered += [found for team in TEAMS for found in path.glob(f"teams/{team}-*.npz*")]
+        scattered += [found for team in TEAMS for found in path.glob(f"{TRAININGS}/{team}-*.mcap*")]
         scattered += [found for team in TEAMS for found in path.glob(f"recordings/*-{team}.mcap*")]
-        scattered += [found for team in TEAMS for found in path.glob(f"trainings/{team}-*.mcap*")]
         return [*scattered, *path.glob("figures/*.png"), *(path / name for name in (*CSV_FILES, REPORT))]
 
     def _read(self, path: Path, kind: type[Content]) -> Content | None:

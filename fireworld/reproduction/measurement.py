@@ -53,10 +53,10 @@ class Measurement:
     method: Sarsa
     n_repetitions: int
     seeds: Sequence[int]  # of the test runs
+    record_trainings: bool = False  # keep the training logs in the folder
     stop: Event = field(default_factory=Event)  # set it, and a part under way raises Interrupted
     on_progress: OnProgress = lambda *_: None  # called after every scenario of a training and every test of a policy
     cities: CityCache = field(default_factory=CityCache)
-    record_trainings: bool = False  # their logs are kept in the folder, too
 
     @cached_property
     def tests(self) -> Mapping[str, BuiltScenario]:
@@ -89,9 +89,9 @@ class Measurement:
             "seeds": [*self.seeds],
             "curriculum": {"name": self.curriculum.name, "digest": self.curriculum.digest},
             "method": self.method.as_dict(),
+            "record_trainings": self.record_trainings,
             "tests": {name: built.scenario.digest for name, built in self.tests.items()},
             "fireworld": __version__,
-            **({"record_trainings": True} if self.record_trainings else {}),
         }
 
     def run(self, executor: AnyExecutor) -> tuple[Study, Repetition]:
@@ -144,7 +144,7 @@ class Measurement:
                 stop=self.stop,
                 on_scenario=self.training_parts.done,
                 with_graduates=number == 1,  # they are recorded
-                record=self.folder.trainings if self.record_trainings else None,
+                logs=self.folder.logs(number) if self.record_trainings else None,
             )
             self.folder.write_repetition(number, trained)
         else:
@@ -163,8 +163,8 @@ class Measurement:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Send what decides the outcome; another process builds tests and cities once."""
-        decides = self.folder, self.curriculum, self.method, self.n_repetitions, self.seeds
-        return _received, (decides, self.record_trainings)
+        settings = (self.n_repetitions, self.seeds, self.record_trainings)
+        return _received, (self.folder, self.curriculum, self.method, *settings)
 
     def _test(self, name: str, teams: Sequence[str], policies: Callable[[], dict[str, KernelPolicy]]) -> Tested:
         """Run every policy in every test under all seeds, unless the outcomes are kept under this name."""
@@ -186,7 +186,5 @@ class Measurement:
 
 
 @lru_cache(maxsize=1)
-def _received(
-    decides: tuple[ReproductionFolder, Curriculum, Sarsa, int, Sequence[int]], record_trainings: bool
-) -> Measurement:
-    return Measurement(*decides, record_trainings=record_trainings)
+def _received(*values: Any) -> Measurement:
+    return Measurement(*values)

@@ -96,8 +96,8 @@ def reproduce(
         seeds: runs of each test; None: 20, or 5 if quick.
         quick: few repetitions and seeds: to see how it looks, not to claim anything.
         curriculum: name or file of a curriculum that ends with the scenarios of Table 1; None: the paper's.
-        record_trainings: keep the training logs, two for each training, in the subfolder trainings; the curves of how
-            teams learned are read from them.
+        record_trainings: keep the training log of every training in the folder's `trainings`, and read from it how the
+            team learned; the tables are the same.
         resume: continue what an interrupted call left in the folder.
         force: replace an earlier reproduction in the folder.
         executor: who trains and tests. None: as many threads as there are cores; a number of threads; "threads",
@@ -137,14 +137,16 @@ def reproduce(
                 PAPER,
                 n_repetitions,
                 test_seeds,
-                asked,
-                on_progress,
-                record_trainings=record_trainings,
+                record_trainings=bool(record_trainings),
+                stop=asked,
+                on_progress=on_progress,
             )
             if resume:
                 place.check_settings(measurement.identity)
             else:
                 place.write_settings(measurement.identity)
+            if record_trainings:
+                place.make_trainings()
             return _carry_out(measurement, executor)
         except KeyboardInterrupt:
             kept = f"{place.n_trained(n_repetitions)} of {n_repetitions} trainings are kept in {place.path}"

@@ -10,6 +10,8 @@ import numpy as np
 
 from fireworld.evaluation.runs import Outcomes
 from fireworld.kernels.arrays import Array
+from fireworld.training.log.records import Episode
+from fireworld.training.methods.sarsa import EpisodeReport
 
 ALONE: Final = "non-cooperative"
 TOGETHER: Final = "cooperative"
@@ -56,6 +58,32 @@ class LearningCurve:
     def n_episodes(self) -> int:
         """Episodes until the policy had settled, or until the method gave up."""
         return len(self.total_reward)
+
+
+def learning_curve(
+    episodes: Sequence[EpisodeReport | Episode], *, repetition: int, team: str, scenario: str, number: int
+) -> LearningCurve:
+    """Return how a team learned in a scenario.
+
+    Args:
+        episodes: all of the scenario, in their order.
+        repetition: number of the repetition.
+        team: as `LearningCurve.team`.
+        scenario: its name.
+        number: of the scenario, counted through the curriculum, from 0.
+    """
+    last = episodes[-1]
+    return LearningCurve(
+        repetition=repetition,
+        team=team,
+        scenario=scenario,
+        scenario_number=number,
+        converged=last.converged,
+        score=last.score,
+        score_max=last.score_max,
+        total_reward=np.array([episode.total_reward for episode in episodes]),
+        n_changed=np.array([episode.n_changed for episode in episodes], dtype=np.int64),
+    )
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -93,8 +94,14 @@ class Curriculum:
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything there is to learn in as plain values, scenarios as YAML."""
-        stages = [{**vars(stage), "scenarios": [one.to_yaml() for one in stage.scenarios]} for stage in self.stages]
+        texts = zip(self.stages, self._texts, strict=True)
+        stages = [{**vars(stage), "scenarios": [*scenarios]} for stage, scenarios in texts]
         return {"name": self.name, "digest": self.digest, "stages": stages}
+
+    @cached_property
+    def _texts(self) -> list[list[str]]:
+        """The scenarios of each stage as YAML, which takes a while."""
+        return [[scenario.to_yaml() for scenario in stage.scenarios] for stage in self.stages]
 
 
 def curriculum_names() -> list[str]:

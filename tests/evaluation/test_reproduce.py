@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 from fireworld_recorder.reader import open_log
 
-import fireworld as fw
 from fireworld.errors import FireworldError, OutputError, TrainingError
 from fireworld.policy.teams.team import load_team
 from fireworld.reproduction import folder as reproduction_folder
@@ -24,10 +23,13 @@ from fireworld.reproduction.csv_files import CSV_FILES
 from fireworld.reproduction.repetitions import random_tables, train_repetition, without_flags
 from fireworld.reproduction.reproduce import reproduce
 from fireworld.reproduction.study import ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS
+from fireworld.reproduction.trainings import RepetitionLogs
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import load_curriculum
+from fireworld.training.log.reader import open_training
 from fireworld.training.methods.sarsa import Sarsa, SarsaTrainer
+from fireworld.training.train import train as fw_train
 
 pytestmark = pytest.mark.slow
 
@@ -92,24 +94,6 @@ def trained(monkeypatch):
     return numbers
 
 
-def test_recorded_trainings_are_whole_and_give_the_same_curves(curriculum, tmp_path):
-    chosen = load_curriculum(curriculum)
-    plain, recorded = train(chosen)[0], train(chosen, record=tmp_path)[0]
-    names = sorted(path.name for path in tmp_path.glob("*.mcap*"))
-    assert names == sorted(f"{team}-1.mcap" for team in (TOGETHER, TOGETHER_WITHOUT_FLAGS))
-    for one, other in zip(plain.curves, recorded.curves, strict=True):
-        assert (one.team, one.scenario, one.scenario_number) == (other.team, other.scenario, other.scenario_number)
-        assert (one.converged, one.score, one.score_max) == (other.converged, other.score, other.score_max)
-        assert one.total_reward.tolist() == other.total_reward.tolist()
-        assert one.n_changed.tolist() == other.n_changed.tolist()
-    for team, whole in ((TOGETHER, chosen), (TOGETHER_WITHOUT_FLAGS, without_flags(chosen))):
-        assert recorded.teams[team].digest == plain.teams[team].digest
-        log = tmp_path / f"{team}-1.mcap"
-        fw.train(whole, method=METHOD, record=tmp_path / "alone.mcap", force=True)
-        assert log.read_bytes() == (tmp_path / "alone.mcap").read_bytes(), "as if it had been trained by itself"
-        assert fw.open_training(log).team().digest == plain.teams[team].digest
-
-
 def test_a_repetition_equals_trainings_from_end_to_end(curriculum):
     """Sharing stage alone changes no table."""
     chosen = load_curriculum(curriculum)
@@ -152,6 +136,26 @@ def test_graduates_are_the_team_after_each_scenario(tmp_path):
     assert found.graduates["b"].digest == found.teams[TOGETHER].digest
     assert (found.graduates["a"].tables[0] != found.graduates["a"].tables[1]).any()
     assert not train(chosen)[0].graduates
+
+
+def test_recorded_trainings_are_trainings_from_end_to_end(curriculum, tmp_path):
+    """Each log, also that whose stage alone was copied, is what `train --record` writes; curves are read from them."""
+    chosen = load_curriculum(curriculum)
+    plain, _ = train(chosen)
+    found, _ = train(chosen, logs=RepetitionLogs(tmp_path, 1))
+    assert {name: team.digest for name, team in found.teams.items()} == {
+        name: team.digest for name, team in plain.teams.items()
+    }
+    for name, whole in ((TOGETHER, chosen), (TOGETHER_WITHOUT_FLAGS, without_flags(chosen))):
+        fw_train(whole, method=METHOD, record=tmp_path / "whole.mcap", force=True)
+        path = tmp_path / f"{name}-1.mcap"
+        assert path.read_bytes() == (tmp_path / "whole.mcap").read_bytes(), name
+        assert found.logs[name] == open_training(path).digest
+        assert open_training(path).team().digest == found.teams[name].digest
+    assert not [*tmp_path.glob("*.partial")]
+    assert len(found.curves) == len(plain.curves)
+    for ours, theirs in zip(found.curves, plain.curves, strict=True):
+        np.testing.assert_equal(vars(ours), vars(theirs))
 
 
 def test_random_tables_differ_between_brigades_and_repetitions():
@@ -324,6 +328,46 @@ def test_ctrl_c_and_resume(small, fireworld, whole, trained, monkeypatch):
     again = fireworld(*FEW, "--resume")
     assert (again.code, again.out) == (0, resumed.out)
     assert trained == [2], "what is done can be judged and drawn once more"
+
+
+def test_with_recorded_trainings_it_is_the_same(small, fireworld, whole, trained, monkeypatch):
+    """Interrupted and resumed, too: of the finished repetition the curves are read from its logs."""
+    at_write(monkeypatch, "training-2.json", lambda: signal.raise_signal(signal.SIGINT))
+    assert fireworld(*FEW, "--record-trainings", "--jobs", 1).code == 130
+    logs = small / "found" / "trainings"
+    names = [f"{team}-{number}.mcap" for team in (TOGETHER, TOGETHER_WITHOUT_FLAGS) for number in (1, 2)]
+    assert sorted(path.name for path in logs.iterdir()) == sorted(names)
+    assert json.loads((small / "found" / "kept" / "training-1.json").read_text()).keys() == {
+        "teams", "graduates", "logs"
+    }  # fmt: skip
+    trained.clear()
+    resumed = fireworld(*FEW, "--record-trainings", "--resume")
+    assert resumed.code == 0, resumed.err
+    found = {str(path.relative_to(small / "found")): data for path, data in contents(small / "found").items()}
+    assert {name for name in found if found[name] != whole.get(name)} == {
+        *(f"trainings/{name}" for name in names),
+        *(f"kept/{name}.json" for name in ("settings", "training-1", "training-2")),
+    }
+    assert whole.keys() <= found.keys()
+    (small / "found" / "kept" / "training-2.json").unlink()
+    (logs / f"{names[1]}.partial").write_bytes((logs / names[1]).read_bytes()[:-5000])
+    assert fireworld(*FEW, "--record-trainings", "--resume").code == 0
+    assert trained == [2]
+    assert found == {str(path.relative_to(small / "found")): data for path, data in contents(small / "found").items()}
+    assert fireworld("verify", logs / names[0]).code == 0
+    assert "record_trainings: expected False, got True" in refusal(fireworld, small / "found")
+    (logs / names[0]).write_bytes((logs / names[1]).read_bytes())
+    refused = refusal(fireworld, small / "found", "--record-trainings", "--jobs", 1)
+    assert f"trainings/{names[0]}: expected the training " in refused
+    assert "delete found/kept/training-1.json and it is trained anew" in refused
+    (logs / names[0]).unlink()
+    assert names[0] in refusal(fireworld, small / "found", "--record-trainings", "--jobs", 1)
+    assert fireworld(*FEW, "--force", "--jobs", 1).code == 0
+    assert [*logs.iterdir()] == []
+
+
+def test_recording_is_asked_for_at_the_beginning(begun, fireworld):
+    assert "record_trainings: expected True, got False" in refusal(fireworld, begun, "--record-trainings")
 
 
 def test_a_kill_and_resume(small, fireworld, whole, monkeypatch):

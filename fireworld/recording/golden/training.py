@@ -125,6 +125,7 @@ def prepare_training(
 def store_training(path: Path, fresh: TrainedAgain) -> None:
     """Train, and write the training log, replacing what is there; an error or Ctrl-C leaves nothing (OutputError)."""
     trainer = fresh.trainer()
+    trainer.detailed = True
     writer = TrainingWriter(path, trainer, header=fresh.header, force=True)
     try:
         with writer:
@@ -178,7 +179,7 @@ def training_changes(difference: TrainingDifference) -> Iterator[str]:
     _, *blocks = difference.describe()
     for block in blocks:
         if isinstance(block, str):
-            yield block
+            yield from block.split("\n")
         else:
             align = "<" * block.n_left + ">" * (len(block.heads) - block.n_left)
             yield from text_table(block.heads, block.rows, align).splitlines()

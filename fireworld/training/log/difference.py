@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from itertools import zip_longest
 from typing import Any, Final, Protocol
 
@@ -19,7 +19,7 @@ from fireworld.records import ACTIONS, CHOICES, Array
 from fireworld.scenario import Scenario
 from fireworld.shown import SHOWN_MAX, Block, Shown, TextTable
 from fireworld.training.log.reader import LearnedEpisode, Part, TrainingLog, learned, open_training
-from fireworld.training.log.records import TERM_NAMES, TRAINING, Episode, Tables, TrainingHeader, Tried
+from fireworld.training.log.records import TERM_NAMES, TRAINING, Episode, Tables, TrainingHeader, Tried, Updates
 from fireworld.training.method import Method, Trainer
 from fireworld.training.methods.sarsa import Progress, SarsaTrainer
 
@@ -322,7 +322,7 @@ def _first_difference(a: TrainingLog, b: Trained, number: int, one: Part | None,
         words = ("is there", "is not") if other is None else ("is not", "is there")
         return _place(a, number, record, phase="end", what="", a_b=words)
     if Episode in one and Episode in other:
-        return _in_episode(a, b, number, (one[Episode], other[Episode]))
+        return _in_episode(a, b, number, (one, other))
     for kind, record in one.items():
         for item in sorted(fields(record), key=lambda item: "per" not in item.metadata):  # figures follow from columns
             x, y = getattr(record, item.name), getattr(other.get(kind, record), item.name)
@@ -373,15 +373,15 @@ def _in_generation(a: Trained, number: int, record: Any, name: str, x: Any, y: A
     return _place(a, number, record, phase=PHASE_OF.get(name, "end"), what=what, a_b=pair)
 
 
-def _in_episode(a: TrainingLog, b: Trained, number: int, pair: tuple[Episode, Episode]) -> FirstDifference:
+def _in_episode(a: TrainingLog, b: Trained, number: int, pair: tuple[Part, Part]) -> FirstDifference:
     """Name the first step, brigade and state in which two episodes differ that begin with the same tables."""
-    one, other = pair
+    one, other = (part[Episode] for part in pair)
     for name in ("scenario", "episode", "seed", "epsilon"):
         x, y = getattr(one, name), getattr(other, name)
         if x != y:
             return _place(a, number, one, phase="draw", what=name, a_b=(f"{x}", f"{y}"))
     before = a.trainer_before(number)  # and that of B: the parts before are the same
-    x, y = (_learned_by(side, before, record) for side, record in zip((a, b), pair, strict=True))
+    x, y = (_learned_by(side, before, part) for side, part in zip((a, b), pair, strict=True))
     entries = _entries(x.tables_after, y.tables_after)
     found = _first_in_steps(x, y)
     found = found or _of_end(one, other)
@@ -405,14 +405,18 @@ def _of_end(one: Episode, other: Episode) -> dict[str, Any]:
     }
 
 
-def _learned_by(side: Trained, before: Trainer[Any, Any], record: Episode) -> LearnedEpisode:
-    """Return an episode as a training learned it, from the tables that both had."""
+def _learned_by(side: Trained, before: Trainer[Any, Any], part: Part) -> LearnedEpisode:
+    """Return an episode as a training learned it, from the tables that both had; updates as recorded, if they are."""
+    record: Episode = part[Episode]
     trainer = side.trainer()
     if not isinstance(trainer, SarsaTrainer) or not isinstance(before, SarsaTrainer):
         raise LogError(expected("method", "", "one that learns in episodes", side.method.name))
     progress = before.progress
     trainer.progress = Progress(record.scenario, record.episode, 0, progress.tables.copy(), progress.visits.copy())
-    return learned(trainer, record, side.scenarios[record.scenario])
+    found = learned(trainer, record, side.scenarios[record.scenario])
+    if Updates not in part:
+        return found
+    return replace(found, value_after=part[Updates].shaped(len(found.state), record.n_steps))
 
 
 def _first_in_steps(x: LearnedEpisode, y: LearnedEpisode) -> dict[str, Any] | None:

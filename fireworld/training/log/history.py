@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 import numpy as np
 
-from fireworld.errors import LogError, TrainingError, expected
+from fireworld.errors import LogError, expected
 from fireworld.kernels.learning import EXPLORED, GREEDY
 from fireworld.policy.teams.table_words import first_state
-from fireworld.policy.teams.team import Team
 from fireworld.policy.words import N_STATES, describe_state
-from fireworld.records import ACTIONS, CHOICES
+from fireworld.records import ACTIONS, CHOICES, Array
 from fireworld.shown import SHOWN_MAX, Block, Shown, TextTable
 from fireworld.training.log.reader import LearnedEpisode, TrainingLog, learned
 from fireworld.training.log.records import Episode
@@ -69,6 +68,7 @@ class Move:
         value_before: of the action.
         value_after: what it became when the brigade chose the next time, or at the end.
         td_error: the error that moved it.
+        reward: of the team in that step, undiscounted.
     """
 
     scenario: str
@@ -80,6 +80,12 @@ class Move:
     value_before: float
     value_after: float
     td_error: float
+    reward: float
+
+    @property
+    def place(self) -> str:
+        """Where it was, as in "train-3, episode 41, step 17"."""
+        return f"{self.scenario}, episode {self.episode}, step {self.step}"
 
 
 @dataclass(frozen=True, repr=False)
@@ -89,8 +95,9 @@ class StateHistory(Shown):
     Attributes:
         log: the file of the training.
         state: 0..4319, of states that the tables take for one the first.
+        with_others: the tables see what the other brigades do.
         n_updates: how often its values were moved, by all brigades together.
-        first: the first of these; None: it was never visited.
+        firsts: the first of these of each brigade that was ever in it, in their order; the state's first is the first.
         moments: its values at the end of every scenario, in every table.
         moves: the updates that moved a value most, the largest first.
     """
@@ -99,18 +106,19 @@ class StateHistory(Shown):
     state: int
     with_others: bool
     n_updates: int
-    first: Move | None
+    firsts: tuple[Move, ...]
     moments: tuple[Moment, ...]
     moves: tuple[Move, ...]
 
     def describe(self, *, limit: int = SHOWN_MAX) -> Iterator[Block]:
         """Yield the state in words, its values at the ends of scenarios, and the steps that moved them most."""
         yield f"state {self.state}: {describe_state(self.state, with_others=self.with_others)}"
-        if self.first is None:
+        if not self.firsts:
             yield f"never visited in {self.log}"
             return
-        first = self.first
-        yield f"{self.n_updates:,} updates, the first in {first.scenario}, episode {first.episode}, step {first.step}"
+        yield f"{self.n_updates:,} updates"
+        for first in self.firsts:
+            yield f"brigade {first.brigade} was first in it in {first.place}"
         yield ""
         changed = list(self._changes())
         rows = [[one.scenario, str(one.table), *one.cells] for one in changed]
@@ -122,7 +130,7 @@ class StateHistory(Shown):
         yield ""
         yield "the steps that moved it most"
         yield TextTable(
-            ["scenario", "episode", "step", "brig", "before", "after", "action"],
+            ["scenario", "ep", "step", "brig", "before", "after", "reward", "action"],
             [
                 [
                     one.scenario,
@@ -131,12 +139,13 @@ class StateHistory(Shown):
                     str(one.brigade),
                     f"{one.value_before:.5g}",
                     f"{one.value_after:.5g}",
+                    f"{one.reward:.0f}",
                     f"{one.action}{' ?' if one.choice == 'explored' else ''}",
                 ]
                 for one in self.moves
             ],
         )
-        yield "? explored"
+        yield "? explored; reward: of the team in that step"
         yield ""
         top = self.moves[0]
         where = f"--scenario {top.scenario} --episode {top.episode}"
@@ -157,84 +166,96 @@ class StateHistory(Shown):
             "state": self.state,
             "words": describe_state(self.state, with_others=self.with_others),
             "n_updates": self.n_updates,
-            "first": None if self.first is None else asdict(self.first),
+            "firsts": [asdict(one) for one in self.firsts],
             "moments": [{**asdict(one), "action": one.action} for one in self.moments],
             "moves": [asdict(one) for one in self.moves],
         }
 
 
-def state_history(
+def state_history(log: TrainingLog, state: int, *, n_moves: int = MOVES_SHOWN) -> StateHistory:
+    """Return what a training made of a state; arguments and errors as for `state_histories`."""
+    return state_histories(log, [state], n_moves=n_moves)[0]
+
+
+def state_histories(
     log: TrainingLog,
-    state: int,
+    states: Sequence[int],
     *,
     n_moves: int = MOVES_SHOWN,
-    team: Team | None = None,
     on_part: Callable[[], object] = lambda: None,
-) -> StateHistory:
-    """Return what a training made of a state, in one pass over its log.
+) -> list[StateHistory]:
+    """Return what a training made of some states, in one pass over its log.
 
     Args:
         log: the training, as far as it is good.
-        state: 0..4319.
-        n_moves: updates to list at most.
-        team: what came of the training, if that is to be checked.
+        states: 0..4319 each.
+        n_moves: updates to list of each at most.
         on_part: called after each episode.
 
     Raises:
         LogError: the log changed since it was opened, or its method learns no values of states.
-        TrainingError: the team is not what came of this training.
     """
     trainer = log.trainer()
     if not isinstance(trainer, SarsaTrainer):
         raise LogError(expected(str(log.path), "method", "one that learns values of states", log.method.name))
-    if team is not None and team.digest != log.team().digest:
-        raise TrainingError(expected("team", "", f"the one of {log.path}, digest {log.team().digest}", team.digest))
-    if not 0 <= state < N_STATES:
-        raise LogError(expected("state", "", f"a number from 0 to {N_STATES - 1}", state))
-    names = [one.name for one in log.scenarios]
-    first: Move | None = None
-    moments: list[Moment] = []
-    largest: list[tuple[float, int, Move]] = []
-    n_updates, n_states = 0, N_STATES
+    for state in states:
+        if not 0 <= state < N_STATES:
+            raise LogError(expected("state", "", f"a number from 0 to {N_STATES - 1}", state))
+    found = [_Gathering(state, n_moves) for state in states]
+    n_states = N_STATES
     for number, part in enumerate(log.parts()):
         record: Episode = part[Episode]
         before = trainer.progress.tables, trainer.progress.visits.copy()
-        found = learned(trainer, record, log.scenarios[record.scenario])
-        n_states = found.tables.shape[1]
-        for move in _moves(found, state, names[record.scenario]):
-            first = first or move
-            n_updates += 1
-            heapq.heappush(largest, (abs(move.value_after - move.value_before), -n_updates, move))
-            if len(largest) > n_moves:
-                heapq.heappop(largest)
-        if record.ended:
-            row = state // (N_STATES // n_states)
-            visits = trainer.progress.visits
-            moments += [
-                Moment(
-                    number,
-                    names[record.scenario],
-                    table,
-                    tuple(values[row].tolist()),
-                    tuple(int(n) for n in visits[table, row]),
-                )
-                for table, values in enumerate(found.tables_after)
-            ]
+        episode = learned(trainer, record, log.scenarios[record.scenario])
+        n_states = episode.tables.shape[1]
+        for one in found:
+            one.add(number, episode, trainer.progress.visits)
         trainer.progress.tables, trainer.progress.visits = before
         log.follow(trainer, part, number)
         on_part()
-    return StateHistory(
-        log=log.path.name,
-        state=first_state(state // (N_STATES // n_states), n_states),
-        with_others=n_states == N_STATES,
-        n_updates=n_updates,
-        first=first,
-        moments=tuple(moments),
-        moves=tuple(move for _, _, move in sorted(largest, reverse=True)),
-    )
+    return [one.history(log.path.name, n_states) for one in found]
 
 
-def _moves(found: LearnedEpisode, state: int, scenario: str) -> Iterator[Move]:
+class _Gathering:
+    """Gathers the history of a state, episode by episode."""
+
+    def __init__(self, state: int, n_moves: int) -> None:
+        self._state, self._n_moves = state, n_moves
+        self._firsts: dict[int, Move] = {}
+        self._moments: list[Moment] = []
+        self._largest: list[tuple[float, int, Move]] = []
+        self._n_updates = 0
+
+    def add(self, number: int, episode: LearnedEpisode, visits: Array) -> None:
+        """Add the next episode; `visits` are those after it."""
+        name, width = episode.scenario.name, N_STATES // episode.tables.shape[1]
+        for move in sorted(_moves(episode, self._state), key=lambda move: (move.step, move.brigade)):
+            self._firsts.setdefault(move.brigade, move)
+            self._n_updates += 1
+            heapq.heappush(self._largest, (abs(move.value_after - move.value_before), -self._n_updates, move))
+            if len(self._largest) > self._n_moves:
+                heapq.heappop(self._largest)
+        if episode.record.ended:
+            row = self._state // width
+            self._moments += [
+                Moment(number, name, table, tuple(values[row].tolist()), tuple(visits[table, row].tolist()))
+                for table, values in enumerate(episode.tables_after)
+            ]
+
+    def history(self, log: str, n_states: int) -> StateHistory:
+        """Return the history of the state."""
+        return StateHistory(
+            log=log,
+            state=first_state(self._state // (N_STATES // n_states), n_states),
+            with_others=n_states == N_STATES,
+            n_updates=self._n_updates,
+            firsts=tuple(self._firsts.values()),
+            moments=tuple(self._moments),
+            moves=tuple(move for _, _, move in sorted(self._largest, reverse=True)),
+        )
+
+
+def _moves(found: LearnedEpisode, state: int) -> Iterator[Move]:
     """Yield the updates of a state in an episode; the k-th update of a brigade is about its k-th choice."""
     width = N_STATES // found.tables.shape[1]
     for brigade in range(len(found.state)):
@@ -243,7 +264,7 @@ def _moves(found: LearnedEpisode, state: int, scenario: str) -> Iterator[Move]:
         for row, update in zip(chosen.tolist(), updated.tolist(), strict=False):
             if found.state[brigade, row] // width == state // width:
                 yield Move(
-                    scenario=scenario,
+                    scenario=found.scenario.name,
                     episode=found.record.episode,
                     step=row + 1,
                     brigade=brigade,
@@ -252,4 +273,5 @@ def _moves(found: LearnedEpisode, state: int, scenario: str) -> Iterator[Move]:
                     value_before=float(found.value_before[brigade, update]),
                     value_after=float(found.value_after[brigade, update]),
                     td_error=float(found.td_error[brigade, update]),
+                    reward=float(found.reward[:, row].sum()) if row < found.record.n_steps else 0.0,
                 )

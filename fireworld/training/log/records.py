@@ -156,6 +156,33 @@ class Tables:
 
 
 @dataclass(frozen=True)
+class Updates:
+    """What an episode made of the values, update by update: in golden trainings only.
+
+    It follows from the tables before and the episode, as long as the rule of learning is what it was; where it is not,
+    this shows in which step.
+    """
+
+    topic: ClassVar[str] = "/updates"
+    value_after: Array = column(
+        1,
+        "double",
+        "the value after the update in each step, and in the update that ends the episode; nan where there was none",
+        per="update",
+    )
+
+    def shaped(self, n_brigades: int, n_steps: int) -> Array:
+        """Return the values as (b, steps + 1).
+
+        Raises:
+            LogError: they are not as many.
+        """
+        if len(self.value_after) != n_brigades * (n_steps + 1):
+            raise LogError(f"{len(self.value_after)} updates of {n_brigades} brigades in {n_steps} steps")
+        return self.value_after.reshape(n_brigades, n_steps + 1)
+
+
+@dataclass(frozen=True)
 class Tried:
     """What was tried in a generation of a search: the rankings that were tried, on which fires, and what came of it."""
 
@@ -191,8 +218,8 @@ TRAINING: Final = LogKind(
     header_type=TrainingHeader,
     commit_type=PartCommit,
     first_type=Plan,
-    topics=(Plan, Episode, Tables, Tried, PartCommit),
-    unchained=frozenset({Tables.topic}),
+    topics=(Plan, Episode, Tables, Updates, Tried, PartCommit),
+    unchained=frozenset({Tables.topic, Updates.topic}),
     unit="part",
     rescue="--resume to continue, or --force to begin again",
     seconds=1,

@@ -10,7 +10,7 @@ from typing import Any
 
 from fireworld.errors import LogError, TrainingError, expected
 from fireworld.executors import Workers, threads
-from fireworld.policy.teams.team import read_team
+from fireworld.policy.teams.team import Team, read_team
 from fireworld.scenario import Scenario
 from fireworld.training.log.difference import AnyTraining, TrainingDifference, compare_trainings
 from fireworld.training.log.reader import Part, TrainingLog, open_training
@@ -103,6 +103,23 @@ class TrainingVerification:
         return f"{self.name}: learned again it differs: {self.difference.first.sentence}"
 
 
+def check_team(log: TrainingLog, team: Team, *, source: str) -> str:
+    """Check that a team is what came of a training; return its digest.
+
+    Args:
+        log: the training.
+        team: the team.
+        source: what errors call it.
+
+    Raises:
+        TrainingError: it is another one.
+    """
+    digest = log.team().digest
+    if team.digest != digest:
+        raise TrainingError(expected(source, "", f"the team of {log.path}, digest {digest}", team.digest))
+    return digest
+
+
 def verify_training(
     log: AnyTraining,
     *,
@@ -125,11 +142,7 @@ def verify_training(
     opened = log if isinstance(log, TrainingLog) else open_training(log)
     if not len(opened):
         raise LogError(f"{opened.path}: it holds no {opened.header.unit}s; there is nothing to verify")
-    digest = opened.team().digest
-    if team is not None:
-        found = read_team(Path(team))[0].digest
-        if found != digest:
-            raise TrainingError(expected(str(team), "", f"the team of {opened.path}, digest {digest}", found))
+    digest = opened.team().digest if team is None else check_team(opened, read_team(Path(team))[0], source=str(team))
     n_parts = None if opened.done else len(opened)
     again = TrainedAgain(opened.trainer, opened.header, threads(jobs), n_parts=n_parts)
     difference = compare_trainings(opened, again, names=(str(opened.path), "again"), on_part=on_part)

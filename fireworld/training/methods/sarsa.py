@@ -26,7 +26,7 @@ from fireworld.scenario.document import with_kind
 from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.simulation.state import fresh_learner, fresh_trace
 from fireworld.training.curriculum import Curriculum
-from fireworld.training.log.records import Episode, Tables, trace_columns
+from fireworld.training.log.records import Episode, Tables, Updates, trace_columns
 from fireworld.training.method import Count, Limits, Method, NotNegative, Play, Report, Share, Trainer
 
 Rule = Literal["sarsa", "expected-sarsa", "q-learning"]
@@ -142,7 +142,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
 
     report_type: ClassVar[type[Report]] = EpisodeReport
     unit: ClassVar[str] = "episode"
-    topics: ClassVar[tuple[type[Any], ...]] = (Episode, Tables)
+    topics: ClassVar[tuple[type[Any], ...]] = (Episode, Tables, Updates)
     whole: ClassVar[type[Any] | None] = Tables
     plots: ClassVar[Mapping[str, str]] = {
         "return": "Return",
@@ -171,6 +171,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         shape = self.shape(0)
         untrained = Progress(tables=np.zeros(shape), visits=np.zeros(shape, dtype=np.int64))
         self.progress = progress if progress is not None else untrained
+        self._last_built: tuple[int, BuiltScenario] | None = None
         self._records: list[Any] = []
         self.full_every = 0
         """Every so many episodes of a scenario `start` is kept; 0: never."""
@@ -191,7 +192,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         del workers
         while not self.done:
             number = self.progress.scenario_number
-            built = self.build(self._plan[number][1])
+            built = self._built(number)
             while self.progress.scenario_number == number:
                 yield self._run_episode(built)
 
@@ -256,7 +257,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         Raises:
             LogError: the columns of the episode are not those of an episode of its scenario.
         """
-        built = self.build(self._plan[episode.scenario][1])
+        built = self._built(episode.scenario)
         policy, learner = self._learning(built.n_brigades, episode.epsilon, trace=episode.trace(built.n_brigades))
         updates = np.empty((3, built.n_brigades, episode.n_steps + 1))
         learn_again(policy.table_of, episode.epsilon, learner, episode.n_steps, episode.terminated, updates)
@@ -309,6 +310,12 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         varied = msgspec.structs.replace(scenario, choices=self.method.choices)
         return self._cities.build(with_kind(varied, self.method.reward))
 
+    def _built(self, number: int) -> BuiltScenario:
+        """Build a scenario of the curriculum, unless it is the one that was built last."""
+        if self._last_built is None or self._last_built[0] != number:
+            self._last_built = number, self.build(self._plan[number][1])
+        return self._last_built[1]
+
     def _learning(self, n_brigades: int, epsilon: float, *, trace: Trace) -> tuple[PolicyArrays, Learner]:
         """Return what a team follows in an episode and what it learns with; both share the tables, a copy."""
         method, progress = self.method, self.progress
@@ -333,7 +340,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         trace = fresh_trace(built.n_brigades, world.n_steps_max if traced else 0)
         policy, learner = self._learning(built.n_brigades, epsilon, trace=trace)
         before = progress.tables.argmax(axis=2)
-        keeps = self.watched or (self.full_every > 0 and episode % self.full_every == 0)
+        keeps = self.watched or self.detailed or (self.full_every > 0 and episode % self.full_every == 0)
         self.start = (progress.tables, progress.visits.copy()) if keeps else None
         n_steps = world.run(policy, learner)
         progress.tables = policy.tables
@@ -365,8 +372,9 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         )
         whole = self.recording and (ended or (episode + 1) % TABLES_EVERY == 0)
         self._records = [record, *([Tables.of(progress.tables, progress.visits)] if whole else [])]
-        if self.watched and self.start is not None:
+        if (self.watched or self.detailed) and self.start is not None:
             self._updates = self._learn_again(record, *self.start)
+            self._records += [Updates(self._updates[2].ravel())] if self.detailed else []
         return self._end_episode(record)
 
     def _learn_again(self, record: Episode, tables: Array, visits: Array) -> Array:

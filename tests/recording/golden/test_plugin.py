@@ -151,6 +151,49 @@ def test_options(project):
     run(project, outcome={"passed": 1})
 
 
+def test_a_training(project):
+    test = """
+        def test_it_learns(recording):
+            log = recording.training("quick", set={{"n_episodes_max": 3, "alpha": {alpha}}}, seed=2)
+            assert len(log) == 3
+            assert log.team().tables.shape == (2, 4320, 4)
+        """
+    project.makepyfile(test_mine=test.format(alpha=0.7))
+    run(project, outcome={"failed": 1}).fnmatch_lines(["recordings/test_mine-test_it_learns.mcap: there is no such *"])
+    run(project, UPDATE, outcome={"passed": 1}).fnmatch_lines(["*fireworld: 1 recordings stored*"])
+    run(project, outcome={"passed": 1})
+    (path,) = find_goldens(project.path / "recordings")
+    assert check_golden(path).result == "same"
+
+    project.makepyfile(test_mine=test.format(alpha=0.6))
+    out = run(project, outcome={"failed": 1})
+    out.fnmatch_lines(
+        [
+            "recordings/test_mine-test_it_learns.mcap: the training is not the same any more",
+            "quick, episode 0, step *, brigade * in state *: learned value of *",
+            "  alpha: 0.6, was 0.7",
+            "the new training: *test_mine-test_it_learns.mcap; *",
+        ]
+    )
+    run(project, UPDATE, outcome={"passed": 1})
+    run(project, outcome={"passed": 1})
+
+
+@pytest.mark.parametrize(
+    ("call", "complaint"),
+    [
+        ('"quack"', "quack: expected a curriculum file*"),
+        ('"quick", method="magic"', "--method: expected one of*"),
+        ('"quick", set={"beta": 1}', "--set: beta: expected one of*"),
+        ('"quick", stages="later"', "--stages: expected stages of quick*"),
+    ],
+)
+def test_mistakes_of_trainings_fail_in_a_line(project, call, complaint):
+    project.makepyfile(test_mine=f"def test_it(recording):\n    recording.training({call})\n")
+    run(project, UPDATE, outcome={"failed": 1}).fnmatch_lines([complaint])
+    assert not (project.path / "recordings").exists()
+
+
 def test_two_recordings_in_a_test_need_names(project):
     project.makepyfile(
         test_mine="""

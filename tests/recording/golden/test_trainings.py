@@ -6,6 +6,7 @@ import dataclasses
 import json
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 from fireworld.errors import LogError, OutputError, TrainingError
@@ -13,6 +14,7 @@ from fireworld.recording.golden.check import check_golden, check_goldens
 from fireworld.recording.golden.training import TrainingSpec, prepare_training, training_spec_of
 from fireworld.recording.golden.update import add_training, store_if_changed, update_goldens
 from fireworld.training.log.reader import open_training
+from fireworld.training.log.records import Updates
 from fireworld.training.log.writer import TrainingWriter
 from fireworld.training.methods import sarsa
 from fireworld.training.train import train
@@ -120,7 +122,7 @@ def test_another_default_is_located(kept, golden, other_default, changes, senten
 @pytest.mark.parametrize(
     ("name", "value", "where", "phase"),
     [
-        ("RULES", tuple(reversed(sarsa.RULES)), "alone-1, episode 0", "learn"),
+        ("RULES", tuple(reversed(sarsa.RULES)), "alone-1, episode 0, step 3", "learn"),
         ("_power", lambda *_: 0.5, "alone-1, episode 0", "draw"),
         ("hash_key", lambda *_: 77, "alone-1, episode 0", "draw"),
         ("below", lambda *_, bound: 0 * bound, "together-1, episode 3", "end"),
@@ -134,6 +136,30 @@ def test_another_rule_exploration_or_draw_is_located(kept, monkeypatch, name, va
     assert found.difference.header == {}
     assert found.difference.first.where.startswith(where)
     assert found.difference.first.phase == phase
+
+
+def test_another_rule_is_seen_in_a_plain_log_too_after_the_episode(here, monkeypatch):
+    """Which has no value after every update: the golden names the step."""
+    train("tiny.yaml", set={"n_episodes_max": 2}, record="plain.mcap")
+    monkeypatch.setattr(sarsa, "RULES", tuple(reversed(sarsa.RULES)))
+    found = check_golden(here / "plain.mcap")
+    assert found.sentence.startswith("alone-1, episode 0: values learned from the same steps, tables digest ")
+
+
+def test_values_after_updates_that_make_no_sense(kept, other_default):
+    path = kept / "tiny.mcap"
+    log = open_training(path)
+    trainer = log.trainer()
+    trainer.detailed = True
+    with TrainingWriter(path, trainer, header=log.header, force=True) as writer:
+        for _ in trainer:
+            trainer.records()[-1] = Updates(np.zeros(3))
+            writer.write()
+        writer.close()
+    assert check_golden(path).result == "same", "they are looked at where trainings differ"
+    other_default(alpha=0.6)
+    found = check_golden(path)
+    assert (found.result, found.sentence) == ("cannot", "3 updates of 1 brigades in 4 steps")
 
 
 def test_another_reward_of_the_scenario_is_located(kept, here):
