@@ -5,6 +5,8 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import threading
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
@@ -27,6 +29,8 @@ AnyExecutor = Executor | int | str | None
 """What an argument `executor` may be; see `workers_for`."""
 
 LOOK_EVERY_SECONDS: Final = 0.2
+PARENT_SECONDS: Final = 1.0
+"""How often a process looks whether its parent is still there."""
 """How long Ctrl-C waits at most until it is seen."""
 
 
@@ -169,4 +173,17 @@ def n_cores() -> int:
 def _pool_of_processes(n: int) -> Executor:
     """Make processes that leave Ctrl-C to this one."""
     fresh = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(n, mp_context=fresh, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN))
+    return ProcessPoolExecutor(n, mp_context=fresh, initializer=_begin_process, initargs=(os.getpid(),))
+
+
+def _begin_process(parent: int) -> None:
+    """Leave Ctrl-C to the parent, and end when it has ended."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(PARENT_SECONDS)
+        os._exit(1)
+
+    threading.Thread(target=watch, name="parent", daemon=True).start()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import tempfile
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -104,13 +105,15 @@ def written_beside(path: Path) -> Iterator[Path]:
     Raises:
         OutputError: it cannot be written.
     """
-    partial = path.with_name(path.name + ".partial")
+    path = path.absolute()  # whoever works meanwhile may change the current folder
     with _output_errors(path):
+        scratch = Path(tempfile.mkdtemp(prefix=".fireworld-", dir=path.parent))
+        partial = scratch / path.name
         try:
             yield partial
             partial.replace(path)
         finally:
-            partial.unlink(missing_ok=True)
+            shutil.rmtree(scratch, ignore_errors=True)
 
 
 @contextmanager

@@ -13,6 +13,12 @@ class Interrupted(KeyboardInterrupt):
     """Ctrl-C that ended some work; the text says what is left of it."""
 
 
+def end_like_ctrl_c() -> None:
+    """Let SIGTERM, by which CI systems and `timeout` end a process, do what Ctrl-C does."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+
+
 @contextmanager
 def gentle_interrupt(asked: Event | None = None) -> Iterator[Event]:
     """Let the first Ctrl-C only set an event, so that what is under way is done and kept; a second one stops it.
@@ -27,13 +33,19 @@ def gentle_interrupt(asked: Event | None = None) -> Iterator[Event]:
         yield asked
         return
 
+    # SIGTERM too, where it ends a process as Ctrl-C does.
+    numbers = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) is previous]
+
     def note(number: int, frame: object) -> None:
         del number, frame
         asked.set()
-        signal.signal(signal.SIGINT, previous)
+        for one in numbers:
+            signal.signal(one, previous)
 
-    signal.signal(signal.SIGINT, note)
+    for one in numbers:
+        signal.signal(one, note)
     try:
         yield asked
     finally:
-        signal.signal(signal.SIGINT, previous)
+        for one in numbers:
+            signal.signal(one, previous)

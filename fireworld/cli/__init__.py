@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import os
 import sys
@@ -85,9 +86,14 @@ root.params.append(DEBUG)
 def main() -> None:
     """Run the command line; an error ends in one line and exit code 2, one of fireworld's own too, Ctrl-C in 130."""
     from fireworld.errors import FireworldError, described
+    from fireworld.interrupt import end_like_ctrl_c
+    from fireworld.stdout import StandardOutputError, be_patient
 
+    end_like_ctrl_c()
+    be_patient()
     try:
         code = root.main(standalone_mode=False)
+        sys.stdout.flush()
     except FireworldError as error:
         code = _show(error, str(error))
     except click.ClickException as error:
@@ -96,8 +102,12 @@ def main() -> None:
     except (click.Abort, KeyboardInterrupt):
         click.echo("interrupted", err=True)
         code = INTERRUPTED
+    except StandardOutputError as error:
+        code = _show(error, f"standard output: cannot be written: {error}")
     except Exception as error:  # noqa: BLE001 - a fault of fireworld's own: never the exit code of a verdict
         code = _show(error, f"internal error: {described(error)}; run it again with --debug")
+    with contextlib.suppress(OSError, ValueError):
+        sys.stdout.flush()
     sys.exit(code)
 
 

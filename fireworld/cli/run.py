@@ -122,17 +122,20 @@ class Ending:
         """Print it as a table."""
         from rich.console import Console
         from rich.table import Table
+        from rich.text import Text
 
+        from fireworld.errors import one_line
         from fireworld.outcome import QUANTITIES
 
         header = self.header
-        table = Table(title=f"{header.scenario}, {header.policy}, seed {header.seed}", show_header=False)
+        title = one_line(f"{header.scenario}, {header.policy}, seed {header.seed}")
+        table = Table(title=Text(title), show_header=False)
         table.add_column(style="bold")
         table.add_column(justify="right", overflow="fold")
         for quantity in QUANTITIES:
             table.add_row(quantity.label, quantity.text(self.outcome))
         table.add_row("digest", self.digest)
-        Console().print(table)
+        Console(markup=False, emoji=False).print(table)
         if self.interrupted:
             click.echo(f"interrupted after step {self.outcome.steps}", err=True)
         if self.output is not None:

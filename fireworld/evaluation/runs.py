@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -10,13 +11,14 @@ from typing import Any, Final, get_type_hints
 
 import numpy as np
 
+from fireworld.errors import PolicyError, expected
 from fireworld.executors import Workers
 from fireworld.interrupt import Interrupted
 from fireworld.kernels.arrays import Array
 from fireworld.outcome import COLUMNS, Outcome
-from fireworld.policy.asking import begin
+from fireworld.policy.asking import begin, name_of
 from fireworld.policy.kernel import KernelPolicy
-from fireworld.policy.protocol import Policy
+from fireworld.policy.protocol import Decision, Observation, Policy
 from fireworld.simulation.built import BuiltScenario
 
 Row = tuple[Any, ...]  # how one run came out: COLUMNS in their order
@@ -69,12 +71,47 @@ def run_compiled(built: BuiltScenario, policy: KernelPolicy, *, seed: int) -> Ou
 
 
 def run_step_by_step(built: BuiltScenario, policy: Policy, *, seed: int) -> Outcome:
-    """Run any policy by asking it in every step; PolicyError if it fails."""
-    world = built.world(seed=seed)
+    """Run any policy by asking it in every step; PolicyError if it fails, or if it does more than decide.
+
+    Its decisions alone, in a world that it has never seen, must lead to the same outcome.
+    """
+    world, before = built.world(seed=seed), _checksum(built)
     begin(policy, world.city_arrays, n_brigades=world.n_brigades, seed=seed)
+    made = []
     while not (world.terminated or world.truncated):
-        world.step(policy)
+        made.append(world.step(policy).decisions)
+    again, decided = built.world(seed=seed), _Decided(made)
+    while not (again.terminated or again.truncated):
+        again.step(decided)
+    if row_of(again.outcome) != row_of(world.outcome) or _checksum(built) != before:
+        wanted = "decisions that lead to its outcome by themselves"
+        raise PolicyError(expected(f"policy {name_of(policy)}", f"seed {seed}", wanted, "a world that it has changed"))
     return world.outcome
+
+
+class _Decided(Policy):
+    """Decides as was decided."""
+
+    def __init__(self, made: Sequence[Sequence[Decision]]) -> None:
+        self._made = made
+
+    def decide(self, observation: Observation) -> Decision:
+        """Return what was decided; anything beyond the end, where the outcomes differ anyway."""
+        step = observation.step - 1
+        return self._made[step][observation.brigade] if step < len(self._made) else Decision(0)
+
+
+def _checksum(built: BuiltScenario) -> int:
+    """Return a checksum of the city's arrays, which all runs share."""
+
+    def update(value: Any, checksum: int) -> int:
+        if isinstance(value, np.ndarray):
+            return zlib.crc32(np.ascontiguousarray(value).data, checksum) if value.size else checksum
+        for part in value if isinstance(value, tuple) else ():
+            checksum = update(part, checksum)
+        return checksum
+
+    return update(built.city_arrays, 0)
 
 
 def row_of(outcome: Outcome) -> Row:

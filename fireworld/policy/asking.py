@@ -5,32 +5,92 @@ from __future__ import annotations
 import inspect
 import math
 import operator
-import sysconfig
+import sys
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
+from threading import Lock, local
 from typing import Any, Final, TypeVar
+
+import numpy as np
 
 from fireworld.errors import FireworldError, PolicyError, described, expected, nearest, shown
 from fireworld.kernels.arrays import CityArrays
+from fireworld.policy.identity import LIBRARIES
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
 from fireworld.records import ACTION_NAMES, ACTIONS
 
-LIBRARIES: Final = (
-    str(Path(__file__).parents[1]),
-    *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")),
-    "<",  # code without a file
-)
-"""Where code that is not the user's own comes from."""
 AN_ANSWER: Final = f"a Decision or an action ({', '.join(ACTION_NAMES)}, or 0 to {len(ACTION_NAMES) - 1})"
 
 PASSING: Final = (FireworldError, KeyboardInterrupt)
 """What is raised in a policy and is no fault of it."""
 
 Value = TypeVar("Value")
+
+
+class PrintsAside:
+    """Lets what users' code prints go to the error stream, for what fireworld prints is read by machines, too.
+
+    Threads may be within at the same time; the last one to leave puts standard output back.
+    """
+
+    def __init__(self) -> None:
+        self._lock, self._n_within = Lock(), 0
+        self._before: Any = None
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._n_within == 0:
+                self._before, sys.stdout = sys.stdout, sys.stderr
+            self._n_within += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._n_within -= 1
+            if self._n_within == 0:
+                sys.stdout = self._before
+
+
+PRINTS_ASIDE: Final = PrintsAside()
+
+
+def read_only(given: Any) -> Any:
+    """Return named arrays, or tuples of such, as views that cannot be written."""
+    if isinstance(given, np.ndarray):
+        view = given.view()
+        view.flags.writeable = False
+        return view
+    if isinstance(given, tuple) and hasattr(given, "_make"):
+        return type(given)._make(map(read_only, given))
+    return given
+
+
+class _Views(local):
+    """The read-only views that were made last, in this thread: those of one world serve a whole run."""
+
+    of: tuple[Any, Any] = (None, None)
+    views: tuple[Any, Any] = (None, None)
+
+
+_VIEWS: Final = _Views()
+
+
+def _shown(observation: Observation) -> Observation:
+    """Return an observation as users' code sees it: it cannot change the world."""
+    seen = observation.city, observation.world
+    if seen[0] is not _VIEWS.of[0] or seen[1] is not _VIEWS.of[1]:
+        _VIEWS.of, _VIEWS.views = seen, (read_only(seen[0]), read_only(seen[1]))
+    city, world = _VIEWS.views
+    return replace(observation, city=city, world=world, known_targets=read_only(observation.known_targets))
+
+
+def _is_ours(policy: Policy) -> bool:
+    """Return whether a policy is fireworld's own: it changes nothing, and kernels want arrays as they are."""
+    return type(policy).__module__.startswith("fireworld.") and not isinstance(policy, Adapted)
 
 
 class Adapted(Policy):
@@ -63,14 +123,19 @@ def complete(given: Any, *, where: str = "policy") -> Policy:
 
 def begin(policy: Policy, city: CityArrays, *, n_brigades: int, seed: int) -> None:
     """Let a policy prepare for a run; raise PolicyError if its own `begin` fails."""
+    asked = complete(policy)
     with users_code(policy, "begin"):
-        complete(policy).begin(city, n_brigades, seed)
+        asked.begin(city if _is_ours(asked) else read_only(city), n_brigades, seed)
 
 
 def ask(policy: Policy, observation: Observation) -> Decision:
     """Return a policy's decision, checked and in plain Python values; PolicyError if it fails or makes no sense."""
-    try:
+    if _is_ours(policy):
         return _checked(policy.decide(observation), policy, observation)
+    try:
+        with PRINTS_ASIDE:
+            answer = policy.decide(_shown(observation))
+            return _checked(answer, policy, observation)
     except PASSING:
         raise
     except BaseException as error:
@@ -79,8 +144,11 @@ def ask(policy: Policy, observation: Observation) -> Decision:
 
 def keeps(policy: Policy, brigade: int, last_action: int, step: int) -> bool:
     """Return whether a policy lets a brigade repeat its last action, False if it has none; PolicyError if it fails."""
+    if last_action < 0:
+        return False
     try:
-        return last_action >= 0 and bool(policy.keeps(brigade, last_action, step))
+        with PRINTS_ASIDE:
+            return bool(policy.keeps(brigade, last_action, step))
     except PASSING:
         raise
     except BaseException as error:
@@ -94,7 +162,8 @@ def users_code(what: object, moment: str) -> Iterator[None]:
     Its message begins with `what`, a policy or words, and says next the `moment` in which the code runs.
     """
     try:
-        yield
+        with PRINTS_ASIDE:
+            yield
     except PASSING:
         raise
     except BaseException as error:
@@ -118,7 +187,13 @@ def describe(error: BaseException) -> str:
 
 def _failure(what: object, moment: str, error: BaseException) -> PolicyError:
     place = what if isinstance(what, str) else f"policy {name_of(what)}"
-    return PolicyError(f"{place}: {moment}: {describe(error)}")
+    hint = "; the world it sees cannot be changed, only copies of it" if _is_refused_write(error) else ""
+    return PolicyError(f"{place}: {moment}: {describe(error)}{hint}")
+
+
+def _is_refused_write(error: BaseException) -> bool:
+    """Return whether an error is numpy's, about writing into a view that is read-only."""
+    return type(error) is ValueError and "read-only" in str(error.args[:1])
 
 
 def _moment(observation: Observation) -> str:

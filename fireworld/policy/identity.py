@@ -9,6 +9,7 @@ import inspect
 import json
 import linecache
 import sys
+import sysconfig
 from collections.abc import Iterator
 from contextlib import suppress
 from enum import Enum
@@ -19,6 +20,12 @@ from typing import Any, Final
 
 import numpy as np
 
+LIBRARIES: Final = (
+    str(Path(__file__).parents[1]),
+    *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")),
+    "<",  # code without a file
+)
+"""Where code that is not the user's own comes from."""
 NOTEBOOK: Final = "__main__"
 """The module of what is made in a notebook, or in a script that is run."""
 _NO_MEMBERS: Final = ("_abc_impl", "__annotate__", "__annotate_func__")
@@ -61,6 +68,41 @@ def digest_of(given: Any) -> str:
 
 
 def digest_of_module(module: ModuleType) -> str:
+    """Return the SHA-256 of the file of a module, and of those of all modules that it brought in; "" if it has none.
+
+    Brought in are its package, and the modules that it, and these in turn, name or take names from, as far as they are
+    neither fireworld's, nor Python's, nor installed as a library.
+    """
+    own, others = _digest_of_file(module), _brought_in(module)
+    return covering(own, {one.__name__: _digest_of_file(one) for one in others})
+
+
+def _brought_in(module: ModuleType) -> list[ModuleType]:
+    """Return the modules of a user's that a module needs, besides itself."""
+    found, left = {module.__name__: module}, [module]
+    while left:
+        one = left.pop()
+        named = [value if isinstance(value, ModuleType) else _module_of(value) for value in [*vars(one).values()]]
+        package = sys.modules.get(one.__name__.rpartition(".")[0])
+        for other in (*named, package):
+            file = str(getattr(other, "__file__", None) or "<")
+            if other is None or other.__name__ in found or file.startswith(LIBRARIES):
+                continue
+            found[other.__name__] = other
+            left.append(other)
+    return [one for name, one in sorted(found.items()) if one is not module]
+
+
+def _module_of(value: Any) -> ModuleType | None:
+    """Return the module that a class, function or object was taken from."""
+    try:
+        name = getattr(value, "__module__", None)
+    except Exception:  # noqa: BLE001 - a user's object may do anything
+        return None
+    return sys.modules.get(name) if isinstance(name, str) else None
+
+
+def _digest_of_file(module: ModuleType) -> str:
     """Return the SHA-256 of the file of a module; "" if it has none."""
     with suppress(AttributeError, OSError):
         return hashlib.sha256(Path(str(module.__file__)).read_bytes()).hexdigest()

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from fireworld.errors import LogError, expected
@@ -50,12 +50,13 @@ def check_format(found: str, kind: LogKind = RUN) -> None:
     raise ForeignError(expected("format", "", kind.format, found, hint))
 
 
-def from_metadata(metadata: Mapping[str, str], attachments: Mapping[str, bytes], kind: LogKind = RUN) -> Any:
+def from_metadata(metadata: Mapping[str, str], attachments: Mapping[str, Sequence[bytes]], kind: LogKind = RUN) -> Any:
     """Read a header and the attachments it names; keys of later versions are ignored.
 
     Args:
         metadata: that of the log's kind.
-        attachments: every attachment of the log; those that the header does not name are left out.
+        attachments: all attachments of the log by name; what the header does not name, or other tools have added under
+            a name of ours, is left out.
         kind: of the log.
 
     Raises:
@@ -75,9 +76,10 @@ def from_metadata(metadata: Mapping[str, str], attachments: Mapping[str, bytes],
     for key, digest in metadata.items():
         if key.startswith(_ATTACHMENT):
             name = key.removeprefix(_ATTACHMENT)
-            if name not in attachments or hashlib.sha256(attachments[name]).hexdigest() != digest:
+            found = [data for data in attachments.get(name, ()) if hashlib.sha256(data).hexdigest() == digest]
+            if not found:
                 raise LogError(expected(name, "", "the attachment as it was recorded", "other bytes or none"))
-            named[name] = attachments[name]
+            named[name] = found[0]
     return kind.header_type(**values, attachments=named)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from fireworld.errors import LogError
 from fireworld.records import STEP_TOPICS, Array, CityRecord, RecordingBase, RunHeader, Snapshot, StepRecord
 from fireworld_recorder.codec import decode, decode_field, decode_snapshot
-from fireworld_recorder.scan import Scan, State, TopicSize, messages, scan
+from fireworld_recorder.scan import Scan, State, TopicSize, messages, readable, scan
 from fireworld_recorder.schema import Commit
 
 RawStep = list[tuple[str, memoryview]]
@@ -32,8 +32,11 @@ def open_log(path: Path | str, *, partial: bool = False) -> Log:
         LogError: the file is not a log of this format, has lost its header or city, or (unless `partial`) is
             cut off or damaged; with how far it is good.
     """
-    path = Path(path)
-    log = Log(path, scan(path))
+    path, read = Path(path), readable(Path(path))
+    try:
+        log = Log(path, scan(read), read)
+    except LogError as error:
+        raise LogError(str(error).replace(str(read), str(path))) from None
     if log.damage is not None and not partial:
         raise LogError(f"{path}: {log.damage}; try `fireworld recover {path}`")
     return log
@@ -74,8 +77,9 @@ class Log(RecordingBase):
     Only the places of the steps are held in memory; every access reads the file again.
     """
 
-    def __init__(self, path: Path, found: Scan) -> None:
+    def __init__(self, path: Path, found: Scan, read: Path | None = None) -> None:
         self.path = path
+        self._read = read or path  # another one where it came from a pipe
         self.found = found
         self.header: RunHeader = found.header
         self.city: CityRecord = decode(CityRecord, found.first)
@@ -125,7 +129,7 @@ class Log(RecordingBase):
         Raises:
             LogError: the log changed since it was opened.
         """
-        return raw_commits(self.path, self.found, first)
+        return raw_commits(self._read, self.found, first)
 
     def _record(self, raw: RawStep) -> StepRecord:
         payloads = dict(raw)

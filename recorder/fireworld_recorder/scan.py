@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import atexit
+import stat
+import tempfile
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -25,6 +28,15 @@ State = Literal["complete", "partial", "damaged"]
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = (
     int(opcode) for opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK)
 )
+PIPE_BYTES_MAX: Final = 4 << 30
+_PIECE_BYTES: Final = 1 << 20
+_HINTS: Final = {
+    b"\x1f\x8b": "it is compressed: unpack it with gzip -d",
+    b"(\xb5/\xfd": "it is compressed: unpack it with zstd -d",
+    b"version ": "it is a pointer of Git LFS: fetch the file with git lfs pull",
+    b"PK": "it is an archive: unpack it",
+}
+"""What to do with files that begin so."""
 _BARE: Final = frozenset({_SCHEMA, _CHANNEL, _MESSAGE})
 
 
@@ -102,6 +114,31 @@ def scan(path: Path, kind: LogKind = RUN) -> Scan:
             return _scan(str(path), _Stream(file, n_bytes, kind))
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def readable(path: Path) -> Path:
+    """Return a log that can be read in any order: itself, or the private copy of what comes from a pipe.
+
+    Raises:
+        LogError: it is a folder or a device, or more comes than a log is.
+    """
+    try:
+        mode = path.stat().st_mode
+        if stat.S_ISREG(mode):
+            return path
+        if not (stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode)):
+            what = "a folder" if stat.S_ISDIR(mode) else "a device"
+            raise LogError(expected(str(path), "", "a recording", what))
+        with tempfile.NamedTemporaryFile(prefix="fireworld-", suffix=".mcap", delete=False) as copy:
+            atexit.register(Path(copy.name).unlink, missing_ok=True)
+            with path.open("rb") as pipe:
+                while data := pipe.read(_PIECE_BYTES):
+                    if copy.tell() > PIPE_BYTES_MAX:
+                        raise LogError(expected(str(path), "", f"at most {PIPE_BYTES_MAX} bytes from a pipe", "more"))
+                    copy.write(data)
+        return Path(copy.name)
+    except OSError as error:
+        raise LogError(f"{path}: cannot be read: {error.strerror or error}") from error
 
 
 def holds_nothing(path: Path, kind: LogKind = RUN) -> bool:
@@ -217,7 +254,7 @@ class _Stream:
         self.n_bytes = n_bytes
         self.kind = kind
         self.metadata: dict[str, str] = {}
-        self.attachments: dict[str, bytes] = {}
+        self.attachments: dict[str, list[bytes]] = {}  # other tools may add some, of whatever name
         self.schemas: dict[int, SchemaRecord] = {}
         self.channels: dict[int, ChannelRecord] = {}
         self._file = file
@@ -228,7 +265,8 @@ class _Stream:
         found = self._file.read(len(container.MAGIC))
         if found != container.MAGIC:
             what = f"a file that begins with {found!r}" if found else "an empty file"
-            raise ForeignError(f"expected an MCAP recording, got {what}")
+            hint = next((f"; {hint}" for start, hint in _HINTS.items() if found.startswith(start)), "")
+            raise ForeignError(f"expected an MCAP recording, got {what}{hint}")
         checksum = zlib.crc32(container.MAGIC)
         for record in container.records(self._file, self.n_bytes):
             if record.opcode == Opcode.DATA_END:
@@ -261,7 +299,7 @@ class _Stream:
                 self.metadata = fields.mapping()
         elif record.opcode == Opcode.ATTACHMENT:
             name, data = container.read_attachment(record.body)
-            self.attachments[name] = data
+            self.attachments.setdefault(name, []).append(data)
 
     def _register(self, opcode: int, body: memoryview) -> None:
         if opcode == _SCHEMA:

@@ -9,7 +9,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Final, Protocol, Self
+from typing import IO, Final, Protocol, Self
 
 from fireworld.errors import OutputError, expected
 from fireworld.files import check_output
@@ -74,6 +74,7 @@ class StepFile:
     ) -> None:
         self.path, self.kind = path, kind
         self.partial = path.with_name(path.name + (scratch_suffix or PARTIAL_SUFFIX))
+        self._folder = Path.cwd()  # a policy may change it
         self.n_commits = 0
         self._force = force
         self._keep_partial = not scratch_suffix
@@ -86,7 +87,7 @@ class StepFile:
                 f" try {self.kind.rescue}"
             )
         with self._guard():
-            self._file = self.partial.open("wb" if replace_partial else "xb")
+            self._file = _begin_file(self.partial, replace=replace_partial)
             self._open = True
             self._writer = ContainerWriter(self._file, profile=PROFILE, library=kind.format)
             self._writer.add_metadata(kind.metadata_name, metadata)
@@ -123,15 +124,15 @@ class StepFile:
             self._writer.finish()
             os.fsync(self._file.fileno())
             self._file.close()
-            check_output(self.path, force=self._force)
-            self.partial.replace(self.path)
+            check_output(self._folder / self.path, force=self._force)
+            (self._folder / self.partial).replace(self._folder / self.path)
             self._open = False
 
     def keep_partial(self) -> None:
         """From now on this is the partial log of its path, and is kept: what it took the place of was copied."""
         partial = self.path.with_name(self.path.name + PARTIAL_SUFFIX)
         with self._guard():
-            self.partial.replace(partial)
+            (self._folder / self.partial).replace(self._folder / partial)
         self.partial, self._keep_partial = partial, True
 
     def abort(self) -> None:
@@ -142,7 +143,7 @@ class StepFile:
         with contextlib.suppress(OSError):  # a full disk complains again; what it could not hold is lost anyway
             self._file.close()
         if not self._holds_steps:
-            self.partial.unlink(missing_ok=True)
+            (self._folder / self.partial).unlink(missing_ok=True)
 
     def __enter__(self) -> Self:
         return self
@@ -183,6 +184,39 @@ class StepFile:
         except BaseException:
             self.abort()
             raise
+
+
+def _begin_file(path: Path, *, replace: bool) -> IO[bytes]:
+    """Open a new file that this process alone writes; with `replace` in the place of one that nobody writes any more.
+
+    Raises:
+        OutputError: it is no regular file, or another process is writing it.
+    """
+    if replace and (path.exists() or path.is_symlink()):
+        if path.is_symlink() or not path.is_file():
+            raise OutputError(expected(str(path), "", "a regular file, or none", "a link or a device"))
+        with path.open("rb") as old:
+            if not _lock(old):
+                raise OutputError(f"{path}: another process is writing it; try another name, or wait for it")
+            path.unlink()
+    file = path.open("xb")
+    _lock(file)
+    return file
+
+
+def _lock(file: IO[bytes]) -> bool:
+    """Lock a file for this process, where the system can; return whether no other process has it."""
+    try:
+        import fcntl
+    except ImportError:
+        return True
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # a file system without locks
+        return True
+    return True
 
 
 class LogWriter(StepFile):

@@ -238,7 +238,7 @@ def test_other_files_are_refused(tmp_path, data, words):
 def test_missing_file_and_folder_are_refused(tmp_path):
     with pytest.raises(LogError, match="No such file"):
         open_log(tmp_path / "a.mcap")
-    with pytest.raises(LogError, match="directory"):
+    with pytest.raises(LogError, match="expected a recording, got a folder"):
         open_log(tmp_path)
 
 

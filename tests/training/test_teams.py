@@ -219,7 +219,7 @@ class FullDisk(zipfile.ZipFile):
         super().__init__(file, *words, **more)
 
     def fails_at(self, file):
-        return file.name.endswith(".npz.partial")
+        return file.name.endswith(".npz")
 
 
 def test_a_full_disk_loses_no_training(make_training, whole, here, monkeypatch):
@@ -288,7 +288,8 @@ def test_a_kill_while_a_checkpoint_is_written_leaves_the_one_before(make_trainin
         with pytest.raises(Killed):
             run(resumed, until=2)
     assert checkpoint.read_bytes() == content
-    (here / "team.npz.checkpoint.partial").write_bytes(b"what a kill leaves behind")
+    (here / ".fireworld-left").mkdir()
+    (here / ".fireworld-left" / "team.npz.checkpoint").write_bytes(b"what a kill leaves behind")
     training = make_training()
     assert training.resume()
     run(training)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import io
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -27,15 +28,20 @@ STILLS: Final[Mapping[str, Mapping[str, Any]]] = {
     ".pdf": {"Creator": "fireworld", "CreationDate": None},
 }
 """Endings of still pictures, and what is written into such a file besides the picture: no time, no version."""
+_BACKEND: Final = "MPLBACKEND"
 _MISSING: Final = "pictures: matplotlib is not installed; try pip install 'fireworld[figures]'"
 
 
 def import_library(name: str, hint: str) -> Any:
     """Import a library that need not be installed; ViewError with the hint if it is not."""
+    backend = os.environ.pop(_BACKEND, None)  # of a notebook, say, which only its own environment has
     try:
         return importlib.import_module(name)
     except ImportError:
         raise ViewError(hint) from None
+    finally:
+        if backend is not None:
+            os.environ[_BACKEND] = backend
 
 
 def new_figure(
