@@ -76,7 +76,7 @@ class GlobalNumpy:
 
 class Meddler:
     def decide(self, observation):
-        observation.world.fire.energy[0] += 1.0
+        observation.world.fire.energy.base[0] += 1.0  # behind the view that it was given
         return Decision(0)
 
 
@@ -106,7 +106,7 @@ class Wordless:
 
 class CityMeddler(AlwaysNear):
     def begin(self, city, n_brigades, seed):
-        city.buildings.capacity[0] += 1.0
+        city.buildings.capacity.base[0] += 1.0
 
 
 class Hasty(AlwaysNear):

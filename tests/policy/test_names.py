@@ -6,12 +6,12 @@ import hashlib
 import json
 import pickle
 import sys
-from pathlib import Path
 
 import pytest
 
 from fireworld.errors import PolicyError
 from fireworld.policy.asking import ask, name_of
+from fireworld.policy.identity import digest_of_module
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.names import BUILT_IN, RULES, TEAM_ATTACHMENT, NamedPolicy, find_policy, policies
 from fireworld.policy.protocol import Decision
@@ -272,7 +272,7 @@ def nearest(observation):
 
 
 def test_what_is_given_in_python():
-    file = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
+    file = digest_of_module(sys.modules[__name__])
     by_class, function = find_policy(Own), find_policy(nearest)
     assert (by_class.name, by_class.digest) == ("tests.policy.test_names:Own", file)
     assert (function.name, function.digest) == ("tests.policy.test_names:nearest", file)
