@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
+from collections.abc import Iterator
 from typing import Any, TextIO
 
 
@@ -20,31 +21,35 @@ class PatientOutput:
     """
 
     def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
+        self.stream = stream
+        self._fault = ""  # why it cannot be written any more: whoever swallowed the first error gets the next
 
     def write(self, text: Any) -> int:
         """Write a text."""
-        try:
-            return self._stream.write(text)
-        except BrokenPipeError:
-            forget(self._stream)
-            return len(text)
-        except OSError as error:
-            forget(self._stream)
-            raise StandardOutputError(error.strerror or str(error)) from error
+        with self._watched():
+            return self.stream.write(text)
+        return len(text)
 
     def flush(self) -> None:
         """Hand over what was written."""
+        with self._watched():
+            self.stream.flush()
+
+    @contextlib.contextmanager
+    def _watched(self) -> Iterator[None]:
+        if self._fault:
+            raise StandardOutputError(self._fault)
         try:
-            self._stream.flush()
+            yield
         except BrokenPipeError:
-            forget(self._stream)
+            forget(self.stream)
         except OSError as error:
-            forget(self._stream)
-            raise StandardOutputError(error.strerror or str(error)) from error
+            forget(self.stream)
+            self._fault = error.strerror or str(error)
+            raise StandardOutputError(self._fault) from error
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self._stream, name)
+        return getattr(self.stream, name)
 
 
 def forget(stream: Any) -> None:
@@ -53,6 +58,14 @@ def forget(stream: Any) -> None:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())
         os.close(nowhere)
+
+
+def leave() -> None:
+    """Hand over the last of it, and put standard output back as it was; what it does not take by now is lost."""
+    if isinstance(sys.stdout, PatientOutput):
+        with contextlib.suppress(StandardOutputError, ValueError):
+            sys.stdout.flush()
+        sys.stdout = sys.stdout.stream
 
 
 def be_patient() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import importlib
 import os
 import sys
@@ -87,7 +86,7 @@ def main() -> None:
     """Run the command line; an error ends in one line and exit code 2, one of fireworld's own too, Ctrl-C in 130."""
     from fireworld.errors import FireworldError, described
     from fireworld.interrupt import end_like_ctrl_c
-    from fireworld.stdout import StandardOutputError, be_patient
+    from fireworld.stdout import StandardOutputError, be_patient, leave
 
     end_like_ctrl_c()
     be_patient()
@@ -106,8 +105,7 @@ def main() -> None:
         code = _show(error, f"standard output: cannot be written: {error}")
     except Exception as error:  # noqa: BLE001 - a fault of fireworld's own: never the exit code of a verdict
         code = _show(error, f"internal error: {described(error)}; run it again with --debug")
-    with contextlib.suppress(OSError, ValueError):
-        sys.stdout.flush()
+    leave()
     sys.exit(code)
 
 

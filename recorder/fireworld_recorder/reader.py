@@ -12,8 +12,9 @@ import numpy as np
 from fireworld.errors import LogError
 from fireworld.records import STEP_TOPICS, Array, CityRecord, RecordingBase, RunHeader, Snapshot, StepRecord
 from fireworld_recorder.codec import decode, decode_field, decode_snapshot
+from fireworld_recorder.fit import check_city, check_field, check_record, counts_of
 from fireworld_recorder.scan import Scan, State, TopicSize, messages, readable, scan
-from fireworld_recorder.schema import Commit
+from fireworld_recorder.schema import Commit, message_of
 
 RawStep = list[tuple[str, memoryview]]
 """Topic and payload of every message of a step, /commit last."""
@@ -83,6 +84,11 @@ class Log(RecordingBase):
         self.found = found
         self.header: RunHeader = found.header
         self.city: CityRecord = decode(CityRecord, found.first)
+        try:
+            check_city(self.city)
+        except LogError as error:
+            raise LogError(f"{path}: {error}") from None
+        self._counts = counts_of(self.city)
         self.digest = found.hash.hex()
         """The hash of the last committed step: the identity of the run up to there, 64 hexadecimal digits."""
         self.state: State = found.state
@@ -117,8 +123,14 @@ class Log(RecordingBase):
 
     def values(self, record_type: type[Any], item: dataclasses.Field[Any]) -> Iterator[Any]:
         """Yield a field of every step, decoding nothing else."""
-        for raw in self.raw_steps():
-            yield decode_field(record_type, item.metadata["number"], dict(raw).get(record_type.topic, b""))
+        field = next(one for one in message_of(record_type).fields if one.name == item.name)
+        for step, raw in zip(self.found.steps, self.raw_steps(), strict=False):
+            value = decode_field(record_type, field.number, dict(raw).get(record_type.topic, b""))
+            try:
+                check_field(record_type, field, value, self._counts)
+            except LogError as error:
+                raise LogError(f"{self.path}: step {step}: {error}") from None
+            yield value
 
     def raw_steps(self, first: int = 0) -> Iterator[RawStep]:
         """Yield the committed steps as they lie in the file.
@@ -138,6 +150,8 @@ class Log(RecordingBase):
             topics: dict[str, Any] = {
                 topic[1:]: decode(record_type, payloads.get(topic, b"")) for topic, record_type in _TYPES.items()
             }
+            for record in topics.values():
+                check_record(record, self._counts)
             snapshot = decode_snapshot(payloads[Snapshot.topic]) if Snapshot.topic in payloads else None
         except LogError as error:
             raise LogError(f"{self.path}: step {commit.step}: {error}") from error

@@ -152,8 +152,10 @@ def _share(one: Counts, n: int) -> str:
 def _event_counts(logs: Sequence[StoredRun], names: Sequence[str]) -> str:
     """Write how often each kind of event happened, and when first and last."""
     found = [_steps_by_kind(log) for log in logs]
-    kinds = [kind for kind in EVENT_KINDS if any(len(steps[kind]) for steps in found)]
-    rows = [[text_cell(kind.replace("-", " ")), *chain(*(_count_cells(one[kind]) for one in found))] for kind in kinds]
+    known = dict.fromkeys([*EVENT_KINDS, *(kind for steps in found for kind in steps)])
+    kinds = [kind for kind in known if any(steps.get(kind) for steps in found)]
+    counts = [[_count_cells(steps.get(kind, [])) for steps in found] for kind in kinds]
+    rows = [[text_cell(kind.replace("-", " ")), *chain(*cells)] for kind, cells in zip(kinds, counts, strict=True)]
     heads = [f"{escape(name)}: {what}" if len(logs) > 1 else what for name in names for what in ("how often", "steps")]
     return html_table(["event", *heads], rows) if rows else "<p>Nothing happened.</p>"
 
@@ -168,13 +170,18 @@ def _steps_by_kind(log: StoredRun) -> dict[str, list[int]]:
     steps: dict[str, list[int]] = {kind: [] for kind in EVENT_KINDS}
     for step, kinds in zip(log.steps.tolist(), log.ragged("/events", "kind"), strict=True):
         for kind in np.asarray(kinds).tolist():
-            steps[EVENT_KINDS[kind]].append(step)
+            steps.setdefault(_event_kind(kind), []).append(step)
     return steps
+
+
+def _event_kind(kind: int) -> str:
+    """Return the name of a kind of events, its number where only a later version knows it."""
+    return EVENT_KINDS[kind] if kind < len(EVENT_KINDS) else f"kind {kind}"
 
 
 def _events_of_note(log: StoredRun, name: str) -> Iterator[str]:
     """List what happened to people, fires that are out, and the first of what happens often."""
-    kinds = [EVENT_KINDS[kind] for row in log.ragged("/events", "kind") for kind in np.asarray(row).tolist()]
+    kinds = [_event_kind(kind) for row in log.ragged("/events", "kind") for kind in np.asarray(row).tolist()]
     met: set[str] = set()
     noted: list[tuple[int, str]] = []
     for kind, (step, _, text, _) in zip(kinds, event_lines(log), strict=True):

@@ -40,13 +40,25 @@ _EVENT_LINES: Final = {
 }
 
 
+_UNKNOWN_EVENT: Final = ("INFO", "event of kind {} of {}", colors.GREY_RGB)
+"""Of a kind that a later version knows."""
+
+
 def event_lines(recording: Recording) -> Iterator[LogLine]:
     """Write the events in words, in the order in which they happened."""
     building_id = np.asarray(recording.city.building_id).tolist()
     kinds, entities = recording.ragged("/events", "kind"), recording.ragged("/events", "entity")
     for step, kind_row, entity_row in zip(recording.steps.tolist(), kinds, entities, strict=True):
         for kind, entity in zip(kind_row.tolist(), entity_row.tolist(), strict=True):
-            level, wording, rgb = _EVENT_LINES[EVENT_KINDS[kind]]
+            level, wording, rgb = _UNKNOWN_EVENT
+            if kind < len(EVENT_KINDS):
+                level, wording, rgb = _EVENT_LINES[EVENT_KINDS[kind]]
+            else:
+                wording = wording.format(kind, "{}")
+            if "building" in wording and not 0 <= entity < len(building_id):
+                wording = wording.replace("building", "building of index")
+                yield LogLine(step, level, wording.format(entity), rgb)
+                continue
             yield LogLine(step, level, wording.format(building_id[entity] if "building" in wording else entity), rgb)
 
 

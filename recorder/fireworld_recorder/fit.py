@@ -1,0 +1,86 @@
+"""Whether what a log holds fits its city: numbers of entries, indices, codes, and that numbers are numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from fireworld.errors import LogError
+from fireworld.records import Brigades, Buildings, CityRecord, Civilians, Events
+from fireworld_recorder.schema import Field, message_of
+
+ALWAYS: Final = (Brigades, Buildings, Civilians)
+"""Topics whose columns are there in every step; others have none in step 0."""
+BUILDING: Final = frozenset({"target", "link_building", "refuge_building", "civilian_building"})
+"""Fields that hold indices of buildings, -1 for none."""
+OFFSETS: Final = frozenset({"outline_ptr", "link_ptr"})
+_FREE: Final = frozenset({Events})
+"""Topics to which later versions may add names for numbers."""
+
+
+def counts_of(city: CityRecord) -> dict[str, int]:
+    """Return how many entries there are for each of what a city has."""
+    return {
+        "building": len(city.building_id),
+        "brigade": len(city.brigade_tank_litres),
+        "civilian": len(city.civilian_hp),
+        "offset": len(city.building_id) + 1,
+    }
+
+
+def check_city(city: CityRecord) -> None:
+    """Raise LogError if the columns of a city do not fit each other."""
+    counts = counts_of(city)
+    for item in message_of(CityRecord).fields:
+        check_field(CityRecord, item, getattr(city, item.name), counts)
+    for offsets, entries in (("outline_ptr", city.outline_x_m), ("link_ptr", city.link_building)):
+        column = getattr(city, offsets)
+        if column[0] != 0 or (np.diff(column) < 0).any() or column[-1] != len(entries):
+            raise LogError(f"/city: {offsets}: it does not divide {len(entries)} entries")
+    same = {"corners": (city.outline_x_m, city.outline_y_m), "links": (city.link_building, city.link_share)}
+    same |= {"nodes": (city.node_x_m, city.node_y_m), "streets": (city.street_from, city.street_to)}
+    same |= {"hydrants": (city.hydrant_x_m, city.hydrant_y_m)}
+    for what, (first, second) in same.items():
+        if len(first) != len(second):
+            raise LogError(f"/city: columns of {what} of {len(first)} and {len(second)} entries")
+    for ends in (city.street_from, city.street_to):
+        if len(ends) and not 0 <= ends.min() <= ends.max() < len(city.node_x_m):
+            raise LogError("/city: a street ends at a node that there is not")
+
+
+def check_record(record: Any, counts: Mapping[str, int]) -> None:
+    """Raise LogError if a topic of a step does not fit the city."""
+    kind = type(record)
+    lengths: dict[str, int] = {}
+    for item in message_of(kind).fields:
+        value = getattr(record, item.name)
+        check_field(kind, item, value, counts)
+        if item.per in {"site", "event"}:
+            first = lengths.setdefault(item.per, len(value))
+            if len(value) != first:
+                raise LogError(f"{kind.topic}: {item.name}: {len(value)} entries, where others have {first}")
+
+
+def check_field(kind: type[Any], item: Field, value: Any, counts: Mapping[str, int]) -> None:
+    """Raise LogError if a field does not fit the city."""
+    where = f"{kind.topic}: {item.name}"
+    if not item.repeated:
+        if item.wire in {"double", "float"} and not np.isfinite(value):
+            raise LogError(f"{where}: {value} is no number")
+        return
+    if item.per in counts:
+        wanted = counts[item.per] * item.width
+        if len(value) != wanted and (len(value) or kind in ALWAYS or kind is CityRecord):
+            raise LogError(f"{where}: {len(value)} entries, where the city has {wanted}")
+    if not len(value):
+        return
+    if item.wire in {"double", "float"}:
+        if not np.isfinite(value).all():
+            raise LogError(f"{where}: a value is no number")
+        return
+    if item.names and kind not in _FREE and not -1 <= int(value.min()) <= int(value.max()) < len(item.names):
+        raise LogError(f"{where}: {int(value.max())} is none of {len(item.names)} names")
+    if item.name in BUILDING and not -1 <= int(value.min()) <= int(value.max()) < counts["building"]:
+        raise LogError(f"{where}: a building that there is not")
