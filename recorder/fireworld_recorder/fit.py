@@ -8,16 +8,16 @@ from typing import Any, Final
 import numpy as np
 
 from fireworld.errors import LogError
-from fireworld.records import Brigades, Buildings, CityRecord, Civilians, Events
+from fireworld.records import Brigades, Buildings, CityRecord, Civilians
 from fireworld_recorder.schema import Field, message_of
 
 ALWAYS: Final = (Brigades, Buildings, Civilians)
 """Topics whose columns are there in every step; others have none in step 0."""
-BUILDING: Final = frozenset({"target", "link_building", "refuge_building", "civilian_building"})
+NAMED: Final = (*ALWAYS, CityRecord)
+"""Topics whose numbers all have names; to others later versions may add some."""
+BUILDING: Final = frozenset({"link_building", "refuge_building", "civilian_building"})
 """Fields that hold indices of buildings, -1 for none."""
 OFFSETS: Final = frozenset({"outline_ptr", "link_ptr"})
-_FREE: Final = frozenset({Events})
-"""Topics to which later versions may add names for numbers."""
 
 
 def counts_of(city: CityRecord) -> dict[str, int]:
@@ -80,7 +80,7 @@ def check_field(kind: type[Any], item: Field, value: Any, counts: Mapping[str, i
         if not np.isfinite(value).all():
             raise LogError(f"{where}: a value is no number")
         return
-    if item.names and kind not in _FREE and not -1 <= int(value.min()) <= int(value.max()) < len(item.names):
+    if item.names and kind in NAMED and not -1 <= int(value.min()) <= int(value.max()) < len(item.names):
         raise LogError(f"{where}: {int(value.max())} is none of {len(item.names)} names")
     if item.name in BUILDING and not -1 <= int(value.min()) <= int(value.max()) < counts["building"]:
         raise LogError(f"{where}: a building that there is not")

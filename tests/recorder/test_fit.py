@@ -1,0 +1,59 @@
+"""Values that do not fit the city are refused as they are read, by one line, in every way of reading."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from fireworld_recorder.reader import open_log
+from fireworld_recorder.writer import LogWriter
+
+from fireworld.errors import LogError
+from tests.recorder import synthetic
+
+CHANGES = [
+    ("buildings", "fieryness", lambda column: np.full(len(column), 99, dtype=np.uint8), "99 is none of 9 names"),
+    ("buildings", "energy", lambda column: column[:-1], "entries, where the city has"),
+    ("buildings", "energy", lambda column: np.full(len(column), np.nan), "a value is no number"),
+    ("buildings", "water_litres", lambda column: column[:0], "0 entries, where the city has"),
+    ("brigades", "hp", lambda column: np.concatenate([column, column]), "entries, where the city has"),
+    ("brigades", "activity", lambda column: np.full(len(column), 17, dtype=np.uint8), "17 is none of 6 names"),
+    ("civilians", "hp", lambda column: column[:0], "0 entries, where the city has"),
+    ("events", "entity", lambda column: np.zeros(len(column) + 3, dtype=np.int32), "entries, where others have"),
+    ("score", "score", lambda _: float("inf"), "inf is no number"),
+]
+
+
+@pytest.mark.parametrize(("topic", "field", "change", "message"), CHANGES)
+def test_a_step_that_does_not_fit(tmp_path, topic, field, change, message):
+    city = synthetic.city()
+    steps = synthetic.run(4, city_record=city)
+    with LogWriter(tmp_path / "a.mcap", synthetic.header(), city) as writer:
+        for step in steps:
+            if step.step == 2:
+                part = getattr(step, topic)
+                part = dataclasses.replace(part, **{field: change(getattr(part, field))})
+                writer.write(dataclasses.replace(step, **{topic: part}))
+            else:
+                writer.write(step)
+    log = open_log(tmp_path / "a.mcap")
+    assert log.step(1).step == 1
+    with pytest.raises(LogError, match=f"a.mcap: step 2: /{topic}: .*{message}"):
+        log.step(2)
+    with pytest.raises(LogError, match=f"step 2: /{topic}: .*{message}"):
+        list(log)
+
+
+def test_a_city_that_does_not_fit_itself(tmp_path):
+    city = synthetic.city()
+    for changed, message in [
+        ({"link_ptr": city.link_ptr + 1}, "link_ptr: it does not divide"),
+        ({"floors": city.floors[:-1]}, "floors: .* entries, where the city has"),
+        ({"center_x_m": np.full(len(city.center_x_m), np.inf)}, "center_x_m: a value is no number"),
+        ({"material": np.full(len(city.material), 8, dtype=np.uint8)}, "material: 8 is none of 3 names"),
+    ]:
+        other = dataclasses.replace(city, **changed)
+        with LogWriter(tmp_path / "a.mcap", synthetic.header(), other, force=True) as log:
+            for step in synthetic.run(1, city_record=city):
+                log.write(step)
+        with pytest.raises(LogError, match=f"a.mcap: /city: {message}"):
+            open_log(tmp_path / "a.mcap")
