@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Mapping
 from typing import Any, Final
@@ -20,7 +19,6 @@ NAMED: Final = (*ALWAYS, CityRecord)
 """Topics whose numbers all have names; to others later versions may add some."""
 BUILDING: Final = frozenset({"link_building", "refuge_building", "civilian_building"})
 """Fields that hold indices of buildings, -1 for none."""
-OFFSETS: Final = frozenset({"outline_ptr", "link_ptr"})
 
 
 def counts_of(city: CityRecord) -> dict[str, int]:
@@ -53,10 +51,14 @@ def check_city(city: CityRecord) -> None:
             raise LogError("/city: a street ends at a node that there is not")
 
 
-@functools.cache
+_FIELDS: Final[dict[type[Any], tuple[Field, ...]]] = {}
+
+
 def _fields(kind: type[Any]) -> tuple[Field, ...]:
     """Return the fields of a record type; worked out once."""
-    return message_of(kind).fields
+    if kind not in _FIELDS:
+        _FIELDS[kind] = message_of(kind).fields
+    return _FIELDS[kind]
 
 
 def check_record(record: Any, counts: Mapping[str, int]) -> None:
