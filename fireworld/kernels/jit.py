@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from typing import Any, Final, NoReturn
 
-from numba import njit
+from numba import config, njit
 from numba.core.registry import CPUDispatcher
 
 OPEN: Final = os.environ.get("FIREWORLD_OPEN_KERNELS") == "1"
@@ -15,11 +15,26 @@ OPEN: Final = os.environ.get("FIREWORLD_OPEN_KERNELS") == "1"
 # float64 as written, kept in the cache folder, without the interpreter's lock. numpy's error model, because a test for
 # zero before each division would keep loops from becoming vector instructions; no kernel divides by what can be zero.
 _how: Final = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+
+
+def _compiler(**more: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Return a decorator that compiles, whatever NUMBA_DISABLE_JIT says: plain Python computes other numbers."""
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        before, config.DISABLE_JIT = config.DISABLE_JIT, 0
+        try:
+            return njit(**_how, **more)(function)
+        finally:
+            config.DISABLE_JIT = before
+
+    return decorate
+
+
 # Without numba's runtime, `_nrt`, which counts the references to every array: that costs more than a small kernel does,
 # and a kernel makes no arrays. One that did would not compile.
-kernel = njit(**_how, _nrt=False)
-_closed = njit(**_how, _nrt=False, no_cpython_wrapper=True)
-making_arrays = njit(**_how)
+kernel = _compiler(_nrt=False)
+_closed = _compiler(_nrt=False, no_cpython_wrapper=True)
+making_arrays = _compiler()
 """For the few kernels that make arrays."""
 
 
