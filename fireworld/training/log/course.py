@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import shlex
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
+from fireworld.errors import one_line
 from fireworld.policy.words import N_STATES, describe_state
 from fireworld.records import Array
 from fireworld.training.log.reader import TrainingLog
@@ -25,6 +27,7 @@ class TablePicture:
     Attributes:
         parts: (m,) after which episodes the tables are known.
         states: (s,) 0..4319, the most visited first; of states that a table takes for one the first.
+        with_others: the tables see what the other brigades do.
         words: what a brigade sees in each.
         visits: (s,) how often all brigades together learned in it in the last stage.
         action: (s, b, m) the greedy action, -1 where a table has never been in the state.
@@ -33,6 +36,7 @@ class TablePicture:
 
     parts: Array
     states: Array
+    with_others: bool
     words: tuple[str, ...]
     visits: Array
     action: Array
@@ -84,7 +88,7 @@ class Course:
 
 
 def course_of(log: TrainingLog) -> Course:
-    """Read the course of a training from its log, in one pass and a second one over the tables.
+    """Read the course of a training from its log, a part at a time, and then its tables, one moment at a time.
 
     Raises:
         LogError: the log changed since it was opened.
@@ -117,36 +121,34 @@ def course_of(log: TrainingLog) -> Course:
 
 def mark_of(log: TrainingLog, number: int, episode: Episode, report: Report, names: list[str]) -> Mark:
     """Return the mark of an episode that ends its scenario."""
-    name = names[episode.scenario]
-    where = f"--scenario {name} --episode {episode.episode}"
-    command = f"fireworld replay {log.path.name} {where} -o {name}-{episode.episode:04d}.mcap"
-    return Mark(number, report.text, episode.converged, command)
+    return Mark(number, report.text, episode.converged, opening(log, names[episode.scenario], episode.episode))
+
+
+def opening(log: TrainingLog, scenario: str, episode: int) -> str:
+    """Return the command that opens an episode, for a shell."""
+    where = ["--scenario", scenario, "--episode", str(episode)]
+    words = ["fireworld", "replay", log.path.name, *where, "-o", f"{scenario}-{episode:04d}.mcap"]
+    return shlex.join(map(one_line, words))
 
 
 def table_picture(log: TrainingLog) -> TablePicture | None:
-    """Return the tables over a training, read in one pass; None where it has none yet."""
-    found = list(_tables(log))
-    if not found:
+    """Return the tables over a training; None where it has none yet."""
+    if log.trainer().whole is not Tables or not log.wholes:
         return None
-    last = found[-1][1]
-    _, visits = last.arrays
-    learned = visits.sum(axis=(0, 2))
+    last = _tables(log, log.wholes[-1])
+    learned = last.arrays[1].sum(axis=(0, 2))
     order = sorted(np.flatnonzero(learned).tolist(), key=lambda row: (-learned[row], row))[:STATES_SHOWN]
     width = N_STATES // last.n_states
     states = np.array(order, dtype=np.int64) * width
-    n_tables = max(tables.n_tables for _, tables in found)
-    action = np.full((len(states), n_tables, len(found)), -1, dtype=np.int64)
-    value = np.full(action.shape, np.nan)
-    for moment, (_, tables) in enumerate(found):
-        values, visits = tables.arrays
-        rows = states // (N_STATES // tables.n_states)
-        seen = values[:, rows].any(axis=2) | visits[:, rows].any(axis=2)  # (tables, states)
-        n = tables.n_tables if tables.n_tables > 1 else n_tables  # one table serves all brigades
-        action[:, :n, moment] = np.where(seen, values[:, rows].argmax(axis=2), -1).T
-        value[:, :n, moment] = np.where(seen, values[:, rows].max(axis=2), np.nan).T
+    moments = [_moment(_tables(log, number), states) for number in log.wholes]
+    n_tables = max(action.shape[1] for action, _ in moments)
+    action, value = (
+        np.stack([np.broadcast_to(one[k], (len(states), n_tables)) for one in moments], axis=2) for k in (0, 1)
+    )  # one table serves all brigades
     return TablePicture(
-        parts=np.array([number for number, _ in found]),
+        parts=np.array(log.wholes),
         states=states,
+        with_others=width == 1,
         words=tuple(describe_state(int(state), with_others=width == 1) for state in states),
         visits=learned[order],
         action=action,
@@ -154,8 +156,14 @@ def table_picture(log: TrainingLog) -> TablePicture | None:
     )
 
 
-def _tables(log: TrainingLog) -> Iterator[tuple[int, Tables]]:
-    """Yield the tables where they are whole, one record at a time."""
-    for number, part in enumerate(log.parts()):
-        if Tables in part:
-            yield number, part[Tables]
+def _moment(tables: Tables, states: Array) -> tuple[Array, Array]:
+    """Return (s, tables) greedy actions and their values, -1 and nan where a table has never been in the state."""
+    values, visits = (array[:, states // (N_STATES // tables.n_states)] for array in tables.arrays)
+    seen = values.any(axis=2) | visits.any(axis=2)
+    return np.where(seen, values.argmax(axis=2), -1).T, np.where(seen, values.max(axis=2), np.nan).T
+
+
+def _tables(log: TrainingLog, number: int) -> Tables:
+    """Return the tables that a part holds."""
+    tables: Tables = next(log.parts(number))[Tables]
+    return tables

@@ -135,8 +135,8 @@ class TrainingLog(Shown):
         if not 0 <= number <= len(self):
             raise LogError(expected(str(self.path), "part", f"one from 0 to {len(self)}", number))
         trainer = self.trainer()
-        n_wholes = bisect_right(self._wholes, number - 1)
-        first = self._wholes[n_wholes - 1] if n_wholes else 0
+        n_wholes = bisect_right(self.wholes, number - 1)
+        first = self.wholes[n_wholes - 1] if n_wholes else 0
         for place, part in zip(range(first, number), self.parts(first) if first < number else (), strict=False):
             self.follow(trainer, part, place)
         return trainer
@@ -166,8 +166,8 @@ class TrainingLog(Shown):
         return self._index[0]
 
     @property
-    def _wholes(self) -> list[int]:
-        """Parts that hold the whole team."""
+    def wholes(self) -> list[int]:
+        """Numbers of the parts that hold the whole team."""
         return self._index[1]
 
     @cached_property

@@ -18,9 +18,9 @@ from fireworld.errors import one_line
 from fireworld.files import check_output, write_file
 from fireworld.html_page import compared_row, html_figure, html_page, html_table, text_cell
 from fireworld.picture import Picture
-from fireworld.policy.words import N_STATES, short_state
+from fireworld.policy.words import short_state
 from fireworld.records import Array
-from fireworld.training.log.course import Course, course_of
+from fireworld.training.log.course import Course, course_of, opening
 from fireworld.training.log.difference import AnyTraining
 from fireworld.training.log.pages.view import TABLES_HELP, names_of, open_trainings
 from fireworld.training.log.reader import TrainingLog
@@ -181,9 +181,8 @@ def _tables(course: Course, name: str) -> Iterator[str]:
     picture = course.tables
     if picture is None:
         return
-    with_others = int(picture.states.max(initial=0)) < N_STATES and "others" in " ".join(picture.words)
     labels = [
-        f"{state}: {_brief(short_state(int(state), with_others=with_others))}" for state in picture.states.tolist()
+        f"{state}: {_brief(short_state(state, with_others=picture.with_others))}" for state in picture.states.tolist()
     ]
     yield f"<h2>The tables of {escape(name)}</h2>"
     figure = draw_tables(picture.action, picture.value, labels, picture.parts, unit=course.unit)
@@ -211,7 +210,6 @@ def _scenarios(log: TrainingLog, name: str) -> Iterator[str]:
             continue
         last = lines[-WINDOW:]
         end = lines[-1]
-        command = f"fireworld replay {log.path.name} --scenario {scenario} --episode {end.episode} -o {scenario}.mcap"
         rows.append(
             [
                 text_cell(escape(scenario)),
@@ -221,7 +219,7 @@ def _scenarios(log: TrainingLog, name: str) -> Iterator[str]:
                 f"{np.mean([line.score / line.score_max for line in last if line.score_max]):.3f}",
                 f"{np.mean([line.n_steps for line in last]):.0f}",
                 str(end.n_visited),
-                text_cell(f"<code>{escape(command)}</code>"),
+                text_cell(f"<code>{escape(opening(log, scenario, end.episode))}</code>"),
             ]
         )
     if rows:
