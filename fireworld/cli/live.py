@@ -72,15 +72,14 @@ def watched_trainings(screen: Screen | None, trainings: Sequence[Training]) -> I
 
     for training in trainings:
         training.trainer.watched = True
-    lock = Lock()
-    with closing(
-        TrainingView(screen, layout_of([one.trainer for one in trainings]), warn=partial(click.echo, err=True))
-    ) as watched:
+    lock, trainers = Lock(), [one.trainer for one in trainings]
+    layout = layout_of(trainers, [f"seed {one.seed}" for one in trainers])
+    with closing(TrainingView(screen, layout, warn=partial(click.echo, err=True))) as watched:
 
         def show(training: Training, report: Report) -> None:
             with lock:
-                number, team = training.n_reports, f"seed {training.seed}"
-                point = point_of(training.trainer, report, number=number, team=team)
+                team = trainers.index(training.trainer)
+                point = point_of(training.trainer, report, number=training.n_reports - 1, team=team)
                 play = training.trainer.play(report) if training is trainings[0] else None
                 watched.add(point, play=play and _play_run(play))
 

@@ -119,6 +119,16 @@ class Report(ABC):
     def text(self) -> str:
         """What happened, in one line."""
 
+    @property
+    def place(self) -> str:
+        """What is learned in, which viewers show as bands; "" if that never changes."""
+        return ""
+
+    @property
+    def ending(self) -> str:
+        """How what was learned in has ended: "settled", or another word for a mark; "" if it goes on."""
+        return ""
+
     @classmethod
     def columns(cls) -> list[str]:
         """Return the names of the columns of the log."""

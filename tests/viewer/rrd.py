@@ -34,6 +34,22 @@ def read(path: Path, *, timelines: Collection[str] = ("step",)) -> dict[str, Row
     return found
 
 
+def read_all(path: Path) -> dict[str, Rows]:
+    """Read a file of several recordings, each on its timeline; what is there always has no number."""
+    from rerun.chunk import RrdReader
+
+    found: dict[str, Rows] = defaultdict(lambda: defaultdict(list))
+    reader = RrdReader(path)
+    for store in reader.recordings():
+        for chunk in reader.stream(store=store):
+            batch = chunk.to_record_batch()
+            times = [batch.column(name).to_pylist() for name in chunk.timeline_names] or [[None] * chunk.num_rows]
+            for name in batch.schema.names:
+                if "RowId" not in name and name not in chunk.timeline_names:
+                    found[chunk.entity_path][name].extend(zip(times[0], batch.column(name), strict=True))
+    return found
+
+
 def at_every_step(rows: list[tuple[int | None, Any]], steps: list[int]) -> list[np.ndarray]:
     """What a viewer shows of a component at each step: the latest row."""
     shown, latest, place = [], None, 0

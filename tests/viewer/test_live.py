@@ -262,11 +262,19 @@ def test_a_watched_training_is_the_same_training(here, fireworld, window):
     assert (here / "seen.npz").read_bytes() == (here / "alone.npz").read_bytes()
     lines = [line.split(",") for line in (here / "seen.csv").read_text().splitlines()]
     column = lines[0].index("total_reward")
-    seen = read_all(window)
+    seen = rrd.read_all(window)
     returns = [row.as_py()[0] for _, row in seen["/return/seed\\ 1"]["Scalars:scalars"]]
     assert returns == [float(line[column]) for line in lines[1:]]
     notes = [row.as_py()[0] for _, row in seen["/log"]["TextLog:text"]]
     assert [note.split(": ")[1] for note in notes] == ["alone-1", "alone-2"]
+    bands = seen["/bands/seed\\ 1"]["StateChange:state"]
+    scenarios = [line[lines[0].index("scenario")] for line in lines[1:]]
+    assert [(number, row.as_py()[0]) for number, row in bands] == [
+        (0, "alone-1"),
+        (scenarios.index("alone-2"), "alone-2"),
+    ]
+    marked = [number for path in seen if path.startswith("/return/") for number, _ in seen[path]["Scalars:scalars"]]
+    assert sorted(marked) == sorted([*range(len(scenarios)), scenarios.index("alone-2") - 1, len(scenarios) - 1])
     assert len(seen["/city/buildings"]["Mesh3D:vertex_positions"]) == 1  # one stage, one fire
     assert seen["/plots/score"]["Scalars:scalars"]
 
@@ -282,7 +290,7 @@ def test_a_watched_search_is_the_same_search(here, fireworld, window):
     done = fireworld(*SEARCH, "-o", "seen.npz", "--view")
     assert (done.code, done.err) == (0, alone.err)
     assert (here / "seen.npz").read_bytes() == (here / "alone.npz").read_bytes()
-    seen = read_all(window)
+    seen = rrd.read_all(window)
     told = [line.split(", ") for line in alone.err.splitlines()]
     assert len(told) == 3
     for path, words, digits in (
@@ -292,21 +300,21 @@ def test_a_watched_search_is_the_same_search(here, fireworld, window):
     ):
         drawn = seen[path]["Scalars:scalars"]
         assert [f"{row.as_py()[0]:.{digits}f}" for _, row in drawn] == words, path
-        assert [number for number, _ in drawn] == [1, 2, 3], path
+        assert [number for number, _ in drawn] == [0, 1, 2], path
     team = load_team(here / "seen.npz")
     names = [*OF_BUILDING, *OF_BRIGADE, *OF_TEAM]
-    assert weights_drawn(seen, seed=1) == dict(zip((one.name for one in names), team.weights[0], strict=False))
-    pages = [row.as_py()[0] for _, row in seen["/page/1"]["TextDocument:text"]]
+    assert weights_drawn(seen) == dict(zip((one.name for one in names), team.weights[0], strict=False))
+    pages = [row.as_py()[0] for _, row in seen["/page/0"]["TextDocument:text"]]
     assert [page.splitlines()[0] for page in pages] == [f"# Generation {k} of 3" for k in (1, 2, 3)]
     assert all(f"* {sentence}\n" in pages[-1] for sentence in team.sentences(row=0))
     assert all(f"* **{one.name}**: {one.meaning}\n" in pages[-1] for one in names)
 
 
-def weights_drawn(seen: dict[str, rrd.Rows], *, seed: int) -> dict[str, float]:
+def weights_drawn(seen: dict[str, rrd.Rows], *, team: int = 0) -> dict[str, float]:
     """The last point of every curve of weights of a search, by the name of the curve."""
-    drawn = {path: rows for path, rows in seen.items() if path.startswith(f"/weights/{seed}/")}
+    drawn = {path: rows for path, rows in seen.items() if path.startswith(f"/own/{team}/weights/")}
     lasts = {path: rows["Scalars:scalars"][-1] for path, rows in drawn.items()}
-    assert {number for number, _ in lasts.values()} == {3}
+    assert {number for number, _ in lasts.values()} == {2}
     return {drawn[path]["SeriesLines:names"][0][1].as_py()[0]: row.as_py()[0] for path, (_, row) in lasts.items()}
 
 
@@ -314,15 +322,15 @@ def test_only_weights_that_are_searched_for_are_drawn(here, fireworld, window):
     (here / "tiny.yaml").write_text(TINY)
     words = ("--set", "cooperation=false", "--set", "own_targets=false", "--repetitions", 2)
     assert fireworld(*SEARCH, *words, "-o", "seen.npz", "--view").code == 0
-    seen = read_all(window)
+    seen = rrd.read_all(window)
     for seed in (1, 2):
         weights = load_team(here / f"seen-{seed}.npz").weights[0]
         names = [weight.name for weight in WEIGHTS]
         free = dict(zip(names, weights, strict=True))
         for one in OF_TEAM:
             assert free.pop(one.name) == 0
-        assert weights_drawn(seen, seed=seed) == free
-        last = seen[f"/page/{seed}"]["TextDocument:text"][-1][1].as_py()[0]
+        assert weights_drawn(seen, team=seed - 1) == free
+        last = seen[f"/page/{seed - 1}"]["TextDocument:text"][-1][1].as_py()[0]
         assert ("**nearest-to-me**" in last, "**others_here**" in last) == (True, False)
 
 
@@ -333,21 +341,3 @@ def test_a_viewer_closed_in_mid_search(here, fireworld, monkeypatch):
     done = fireworld(*SEARCH, "-o", "seen.npz", "--view")
     assert (done.code, NOTE in done.err) == (0, True)
     assert (here / "seen.npz").read_bytes() == (here / "alone.npz").read_bytes()
-
-
-def read_all(path: Path) -> dict[str, rrd.Rows]:
-    """Read a file of several recordings, each on its timeline; what is there always has no number."""
-    from collections import defaultdict
-
-    from rerun.chunk import RrdReader
-
-    found: dict[str, rrd.Rows] = defaultdict(lambda: defaultdict(list))
-    reader = RrdReader(path)
-    for store in reader.recordings():
-        for chunk in reader.stream(store=store):
-            batch = chunk.to_record_batch()
-            times = [batch.column(name).to_pylist() for name in chunk.timeline_names] or [[None] * chunk.num_rows]
-            for name in batch.schema.names:
-                if "RowId" not in name and name not in chunk.timeline_names:
-                    found[chunk.entity_path][name].extend(zip(times[0], batch.column(name), strict=True))
-    return found

@@ -115,11 +115,22 @@ class EpisodeReport(Report):
                 f"{self.scenario}, episode {self.episode + 1}, epsilon {self.epsilon:.3f}, "
                 f"return {self.total_reward:,.0f}, {self.n_changed} changes"
             )
-        settled = "settled" if self.converged else "not settled"
         return (
-            f"{self.scenario}: {self.episode + 1} episodes, {settled}, "
+            f"{self.scenario}: {self.episode + 1} episodes, {self.ending}, "
             f"score {self.score:.2f} of {self.score_max:.0f}, return {self.total_reward:,.0f}"
         )
+
+    @property
+    def place(self) -> str:
+        """The scenario."""
+        return self.scenario
+
+    @property
+    def ending(self) -> str:
+        """Whether the policy had settled when the scenario ended."""
+        if not self.milestone:
+            return ""
+        return "settled" if self.converged else "not settled"
 
 
 @dataclass
@@ -149,7 +160,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         "score": "Score, as a share of the best",
         "epsilon": "Epsilon",
         "n_changed": "States in which the greedy action changed",
-        "td_error": "Size of the TD errors, quantiles",
+        "td_error": f"Size of the TD errors, {', '.join(map(str, TD_QUANTILES))} % quantiles",
         "n_visited": "States visited, summed over the tables",
         "agreement": "Share of common states in which the tables agree",
         "n_burnt_out": "Burnt out",
@@ -267,7 +278,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
     def points(self, report: EpisodeReport) -> Mapping[str, Mapping[str, float]]:
         """Return what is drawn of the last episode."""
         values = report.as_dict()
-        values |= {"return": values["total_reward"], "score": values["score"] / values["score_max"]}
+        values |= {"return": values["total_reward"], "score": values["score"] / (values["score_max"] or 1.0)}
         found = {name: {"": values[name]} for name in self.plots if name in values}
         if self._updates is None:
             return found

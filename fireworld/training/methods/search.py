@@ -242,7 +242,7 @@ class SearchTrainer(Trainer[Search, Generation]):
         return from_rankings(weights[np.newaxis], own_targets=self.method.own_targets)
 
     def _plot(self, group: str) -> str:
-        return f"weights/{self.seed}/{group.replace(' ', '-')}"
+        return f"weights/{group.replace(' ', '-')}"
 
     def _groups(self) -> Mapping[str, Mapping[int, Weight]]:
         """Return the weights that are searched for, by their place among all, in groups of what they are about."""

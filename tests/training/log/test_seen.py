@@ -1,6 +1,8 @@
 """Trainings in Rerun, as pictures and as pages."""
 
 import re
+import shlex
+import shutil
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from fireworld.training.log.reader import open_training
 from fireworld.training.train import prepare_trainings
 from fireworld.training.training import train_all
 from tests.training.log.conftest import SHORT
+from tests.viewer import rrd
 
 pytest.importorskip("matplotlib")
 
@@ -104,13 +107,68 @@ def test_a_log_under_way_is_shown_as_far_as_it_is_good(log_path, tmp_path, firew
     assert "the page ends there" in (tmp_path / "cut.html").read_text()
 
 
-def test_in_rerun(log_path, make_log, tmp_path):
+def words(rows):
+    return [(number, row.as_py()[0]) for number, row in rows]
+
+
+def test_in_rerun(log, tmp_path):
     pytest.importorskip("rerun")
-    view_trainings(log_path, save=tmp_path / "a.rrd")
-    view_trainings([log_path, make_log(alpha=0.6)], save=tmp_path / "ab.rrd")
-    view_trainings(make_log("search"), save=tmp_path / "s.rrd")
-    assert all(path.stat().st_size > 10_000 for path in tmp_path.iterdir())
-    log = open_training(log_path)
-    log.view(save=tmp_path / "b.rrd")
+    log.view(save=tmp_path / "a.rrd")
+    seen = rrd.read_all(tmp_path / "a.rrd")
+    course = course_of(log)
+    for plot in ("return", "score", "epsilon", "n_changed", "n_visited"):
+        assert words(seen[f"/{plot}"]["Scalars:scalars"]) == [*enumerate(course.plots[plot][""])], plot
+    for share in (10, 50, 90):
+        drawn = words(seen[rf"/td_error/{share}\ \%"]["Scalars:scalars"])
+        assert drawn == [(k, one) for k, one in enumerate(course.plots["td_error"][f"{share} %"]) if not np.isnan(one)]
+    ends = [mark.part for mark in course.marks]
+    marked = {number for one in ("settled", r"not\ settled") for number, _ in seen[f"/return/{one}"]["Scalars:scalars"]}
+    assert marked == set(ends)
+    notes = words(seen["/log"]["TextLog:text"])
+    assert notes == [(mark.part, f"{mark.text}; {mark.command}") for mark in course.marks]
+    begins = [0, *(number + 1 for number in ends[:-1])]
+    assert words(seen["/bands/Scenario"]["StateChange:state"]) == [*zip(begins, course.scenarios, strict=True)]
+    assert [number for number, _ in seen["/tables/0/now"]["LineStrips2D:strips"]][-len(log.wholes) :] == log.wholes
+
+
+def test_two_in_rerun(log_path, make_log, tmp_path):
+    pytest.importorskip("rerun")
+    other = make_log(alpha=0.6)
+    view_trainings([log_path, other], save=tmp_path / "ab.rrd")
+    seen = rrd.read_all(tmp_path / "ab.rrd")
+    for k, path in enumerate((log_path, other)):
+        returns = [line.total_reward for line in open_training(path).lines]
+        assert [value for _, value in words(seen[f"/return/{path.name}"]["Scalars:scalars"])] == returns
+        assert f"/tables/{k}/picture" in seen
+    notes = [note for _, note in words(seen["/log"]["TextLog:text"])]
+    assert {note.partition(": ")[0] for note in notes} == {log_path.name, other.name}
+
+
+def test_searches_in_rerun(make_log, tmp_path):
+    pytest.importorskip("rerun")
+    paths = [make_log("search"), make_log("search", spread=0.5)]
+    view_trainings(paths, save=tmp_path / "s.rrd")
+    seen = rrd.read_all(tmp_path / "s.rrd")
+    for k, path in enumerate(paths):
+        drawn = {one for one in seen if one.startswith(f"/own/{k}/weights/")}
+        means = open_training(path).team().weights[0]
+        assert sorted(words(seen[one]["Scalars:scalars"])[-1][1] for one in drawn) == sorted(means[means != 0])
+        assert len(seen[f"/page/{k}"]["TextDocument:text"]) == 3
+
+
+def test_names_of_files_that_need_care(log_path, tmp_path, fireworld):
+    pytest.importorskip("rerun")
+    odd = tmp_path / "my run (1), ä.mcap"
+    shutil.copy(log_path, odd)
+    view_trainings([log_path, odd], save=tmp_path / "ab.rrd")
+    log = open_training(odd)
+    command = shlex.split(course_of(log).marks[0].command)
+    assert command[:3] == ["fireworld", "replay", odd.name]
+    command[command.index(odd.name)], command[-1] = odd, tmp_path / command[-1]
+    assert fireworld(*command[1:]).code == 0
+    assert fireworld("verify", command[-1]).code == 0
+
+
+def test_in_notebooks(log):
     assert log.show().png.startswith(b"\x89PNG")
     assert "episodes" in log._repr_html_()

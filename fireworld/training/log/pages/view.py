@@ -10,61 +10,62 @@ from pathlib import Path
 from typing import Any, Final
 
 from fireworld_viewer.rerun_view import app
-from fireworld_viewer.rerun_view.training_curves import CurveWriter, LayoutTab, TrainingLayout, TrainingPoint
+from fireworld_viewer.rerun_view.training_curves import (
+    CurveWriter,
+    LayoutTab,
+    TablePixels,
+    TrainingLayout,
+    TrainingPoint,
+)
 from fireworld_viewer.table_pixels import table_pixels
 
 from fireworld.errors import LogError, expected
 from fireworld.records import ACTIONS
-from fireworld.training.log.course import TablePicture, mark_of, table_picture
+from fireworld.training.log.course import TablePicture, opening, table_picture
 from fireworld.training.log.difference import AnyTraining
 from fireworld.training.log.reader import TrainingLog, open_training
-from fireworld.training.log.records import Episode
+from fireworld.training.log.records import Episode, Tables
 from fireworld.training.method import Report, Trainer
 
 TALL: Final = 3
-"""Pixels of a table's row in the picture; a moment is so wide that the picture is twice as wide as high at most."""
+"""Pixels of a table's row in the picture; a moment is so wide that the picture is about three times as wide as high."""
 TABLES_HELP: Final = (
     "A row for each of the {n} states that were learned in most, and in it one for each brigade; a column for each"
     " moment at which the tables are recorded whole. The color is the greedy action: "
     "easiest blue, nearest-to-civilian vermilion, nearest-to-center yellow, nearest-to-me green."
     " The darker it is, the more the state costs; grey: never visited."
 )
-MARKED: Final = "return"
-"""The plot that has the marks of where scenarios end."""
 
 
-def layout_of(trainers: Sequence[Trainer[Any, Any]]) -> TrainingLayout:
-    """Return what is drawn: plots of all teams, and a tab for each that has plots of its own."""
+def layout_of(trainers: Sequence[Trainer[Any, Any]], names: Sequence[str]) -> TrainingLayout:
+    """Return what is drawn: plots that teams of these names share, and a tab for each that has plots of its own."""
     first = trainers[0]
     return TrainingLayout(
         title=f"training-{first.method.name}",
         timeline=first.unit,
         plots=first.plots,
-        tabs={f"Seed {one.seed}": LayoutTab(one.own_plots(), page_of(one)) for one in trainers if one.own_plots()},
+        teams=names,
+        tabs={
+            name.capitalize() or "The team": LayoutTab(team, trainer.own_plots())
+            for team, (trainer, name) in enumerate(zip(trainers, names, strict=True))
+            if trainer.own_plots()
+        },
+        bands="Scenario" if Tables in first.topics else "",
         log="Milestones",
     )
 
 
-def point_of(trainer: Trainer[Any, Any], report: Report, *, number: int, team: str) -> TrainingPoint:
-    """Return a report as it is drawn: the number-th of a team, which curves are named after."""
-    values = {
-        plot: {", ".join(filter(None, (team, name))): value for name, value in curves.items()}
-        if plot in trainer.plots
-        else curves
-        for plot, curves in trainer.points(report).items()
-    }
-    page = trainer.page()
+def point_of(trainer: Trainer[Any, Any], report: Report, *, number: int, team: int, command: str = "") -> TrainingPoint:
+    """Return the number-th report of a team as it is drawn; the command opens it."""
     return TrainingPoint(
         number=number,
-        values=values,
-        note=f"{team}: {report.text}" if report.milestone else "",
-        pages={page_of(trainer): page} if page else {},
+        team=team,
+        values=trainer.points(report),
+        band=report.place,
+        mark=report.ending,
+        note="; ".join(filter(None, (report.text, command))) if report.milestone else "",
+        page=trainer.page(),
     )
-
-
-def page_of(trainer: Trainer[Any, Any]) -> str:
-    """Return the name of the page about a team."""
-    return f"page/{trainer.seed}"
 
 
 def view_trainings(
@@ -136,37 +137,36 @@ def _write(logs: Sequence[TrainingLog], stream: Any) -> None:
     """Write all that is to be seen of trainings."""
     names = names_of(logs)
     pictures = [table_picture(log) for log in logs]
-    layout = layout_of([log.trainer() for log in logs])
-    tabs = dict(layout.tabs) if len(logs) == 1 else {}
-    for k, (name, picture) in enumerate(zip(names, pictures, strict=True)):
+    layout = layout_of([log.trainer() for log in logs], names if len(logs) > 1 else [""])
+    tables = {
+        f"Tables of {name}": LayoutTab(team)
+        for team, (name, picture) in enumerate(zip(names, pictures, strict=True))
+        if picture is not None
+    }
+    layout = replace(layout, tabs={**layout.tabs, **tables}, n_parts=max(map(len, logs)))
+    writer = CurveWriter(stream, layout)
+    writer.write([point for team, log in enumerate(logs) for point in _points(log, team)])
+    for team, picture in enumerate(pictures):
         if picture is not None:
-            tabs[f"Tables of {name}"] = LayoutTab({}, f"states/{k}", f"tables/{k}")
-    writer = CurveWriter(stream, replace(layout, tabs=tabs, n_parts=max(map(len, logs))))
-    for log, name in zip(logs, names, strict=True):
-        writer.write(list(_points(log, name if len(logs) > 1 else "")))
-    for k, picture in enumerate(pictures):
-        if picture is not None:
-            pixels = table_pixels(picture.action, picture.value)
-            wide = max(1, 2 * TALL * len(pixels) // pixels.shape[1])
-            enlarged = pixels.repeat(TALL, axis=0).repeat(wide, axis=1)
-            writer.write_picture(f"tables/{k}", enlarged, f"states/{k}", states_page(picture))
+            writer.write_tables(team, _table_pixels(picture))
 
 
-def _points(log: TrainingLog, team: str) -> Iterator[TrainingPoint]:
-    """Yield what is drawn of each part of a log, with a mark at the end of every scenario."""
+def _points(log: TrainingLog, team: int) -> Iterator[TrainingPoint]:
+    """Yield what is drawn of each part of a log, with the command that opens it where a scenario ended."""
     names = [one.name for one in log.scenarios]
     trainer = log.trainer()
     for number, part in enumerate(log.parts()):
-        report = log.follow(trainer, part, number)
-        point = point_of(trainer, report, number=number, team=team)
-        if report.milestone and Episode in part:
-            mark = mark_of(log, number, part[Episode], report, names)
-            kind = ", ".join(filter(None, (team, "settled" if mark.settled else "not settled")))
-            value = trainer.points(report).get(MARKED, {}).get("")
-            marks = {MARKED: {kind: value}} if value is not None else {}
-            note = ": ".join(filter(None, (team, f"{mark.text}; {mark.command}")))
-            point = replace(point, marks=marks, note=note)
-        yield point
+        report, episode = log.follow(trainer, part, number), part.get(Episode)
+        command = opening(log, names[episode.scenario], episode.episode) if report.milestone and episode else ""
+        yield point_of(trainer, report, number=number, team=team, command=command)
+
+
+def _table_pixels(picture: TablePicture) -> TablePixels:
+    """Return the picture of the tables in pixels."""
+    pixels = table_pixels(picture.action, picture.value)
+    wide = max(1, 3 * TALL * len(pixels) // pixels.shape[1])
+    enlarged = pixels.repeat(TALL, axis=0).repeat(wide, axis=1)
+    return TablePixels(enlarged, picture.parts.tolist(), states_page(picture))
 
 
 def states_page(picture: TablePicture) -> str:
@@ -176,7 +176,7 @@ def states_page(picture: TablePicture) -> str:
     lines = [
         "# The tables over the training",
         "",
-        TABLES_HELP.format(n=len(picture.states)),
+        TABLES_HELP.format(n=len(picture.states)) + " The white line moves with the time that is looked at.",
         "",
         f"| state | sees | learned | {heads} |",
         "|---|---|---|" + "---|" * n_tables,
