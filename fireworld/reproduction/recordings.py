@@ -88,6 +88,7 @@ def draw_policy_changes(study: Study) -> Figure:
 
 
 def _draw_curves(study: Study, label: str, of: Callable[[LearningCurve], Array]) -> Figure:
+    mark = "paper converged"
     panels = [
         LearningPanel(
             title=row.scenario,
@@ -95,11 +96,11 @@ def _draw_curves(study: Study, label: str, of: Callable[[LearningCurve], Array])
                 team: [of(curve) for curve in study.curves_of(team, row.scenario)]
                 for team in (TOGETHER, TOGETHER_WITHOUT_FLAGS)
             },
-            marked_episode=row.convergence_episode,
+            marks={mark: row.convergence_episode},
         )
         for row in paper.TABLE_1
     ]
-    return draw_learning_curves(panels, label=label, mark="paper converged")
+    return draw_learning_curves(panels, label=label, mark=mark)
 
 
 def _map(run: RecordedRun, record: StepRecord, moment: str) -> bytes:

@@ -68,6 +68,7 @@ class Course:
         name: of the log's file.
         unit: what a part is.
         titles: of the plots by their names.
+        own: names of the plots whose curves are to be told apart: those that a method draws of each team alone.
         plots: by plot, then by curve: (k,) values, nan where there is none.
         scenarios: names of those that have begun, in their order.
         stages: the stage of each.
@@ -79,6 +80,7 @@ class Course:
     name: str
     unit: str
     titles: Mapping[str, str]
+    own: frozenset[str]
     plots: Mapping[str, Mapping[str, Array]]
     scenarios: tuple[str, ...]
     stages: tuple[str, ...]
@@ -110,6 +112,7 @@ def course_of(log: TrainingLog) -> Course:
         name=log.path.name,
         unit=log.header.unit,
         titles={**trainer.plots, **trainer.own_plots()},
+        own=frozenset(trainer.own_plots()),
         plots=plots,
         scenarios=tuple(names[: scenario.max(initial=-1) + 1]),
         stages=tuple(log.curriculum.stages[k].name for k in log.plan.stage[: scenario.max(initial=-1) + 1]),

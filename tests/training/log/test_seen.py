@@ -10,7 +10,7 @@ import pytest
 from fireworld.errors import LogError, OutputError
 from fireworld.policy.teams.table_team import agreement
 from fireworld.training.log.course import course_of
-from fireworld.training.log.pages.page import render_training, report_training
+from fireworld.training.log.pages.page import _by_scenario, _panels, render_training, report_training
 from fireworld.training.log.pages.view import states_page, view_trainings
 from fireworld.training.log.reader import open_training
 from fireworld.training.train import prepare_trainings
@@ -80,6 +80,33 @@ def test_pages_and_pictures(log_path, make_log, tmp_path, fireworld):
         assert fireworld("render", log_path, other, "-o", tmp_path / f"a{ending}").code == 0
     report_training(make_log("search"), tmp_path / "search.html")
     assert "Tables of" not in (tmp_path / "search.html").read_text()
+
+
+def test_convergence_is_drawn_scenario_by_scenario_of_both(log_path, make_log):
+    logs = [open_training(log_path), open_training(make_log(alpha=0.6))]
+    names = ["a", "b"]
+    courses = [course_of(one) for one in logs]
+    panels = _by_scenario(courses, names, "return", 1.0)
+    assert [panel.title for panel in panels] == [one.name for one in logs[0].scenarios]
+    for number, panel in enumerate(panels):
+        for one, name in zip(logs, names, strict=True):
+            lines = [line for line in one.lines if line.scenario == number]
+            assert panel.curves[name][0].tolist() == [line.total_reward for line in lines]
+            assert panel.marks.get(name) == (len(lines) - 1 if lines[-1].converged else None)
+    assert any(panel.marks for panel in panels)
+
+
+def test_weights_of_two_searches_are_told_apart(make_log):
+    paths = [make_log("search"), make_log("search", seed=2)]
+    panels = _panels([course_of(open_training(one)) for one in paths], ["a", "b"])
+    weights = [panel for panel in panels if panel.by_curve]
+    assert [panel.title for panel in weights] == [
+        f"Weights of the {what}; dashed: b" for what in ("building", "brigade", "team")
+    ]
+    for name, path in zip("ab", paths, strict=True):
+        means = open_training(path).team().weights[0]
+        assert [values[-1] for panel in weights for values in panel.curves[name].values()] == means[means != 0].tolist()
+    assert len(panels) == len(weights) + 2
 
 
 def test_what_cannot_be_shown(log_path, make_log, tmp_path, fireworld):

@@ -210,26 +210,39 @@ class LearningPanel:
     title: str
     curves: Mapping[str, Sequence[Array]]
     """By team, one or two: (episodes,) numbers of each repetition; repetitions may differ in length."""
-    marked_episode: float  # where a dotted line stands
+    marks: Mapping[str, float]
+    """Episodes where dotted lines stand: by team, in its color, or by another word, in grey."""
 
 
-def draw_learning_curves(panels: Sequence[LearningPanel], *, label: str, mark: str) -> Figure:
-    """Draw the panels in rows of four; the label is that of the numbers, the mark that of the dotted lines."""
+def draw_learning_curves(panels: Sequence[LearningPanel], *, label: str, mark: str, shares: bool = False) -> Figure:
+    """Draw the panels in rows of four.
+
+    `label` says what the numbers are, `shares` that they are from 0 to 1, `mark` what the dotted lines are.
+    """
+    from matplotlib.lines import Line2D
+
     n_rows = -(-len(panels) // _PANELS_ACROSS)
     figure = new_figure(12.0, 2.8 + 1.4 * n_rows, dpi=110, paper="white", layout="constrained")
     grid = figure.subplots(n_rows, _PANELS_ACROSS, sharex=True, squeeze=False).ravel()
+    color_of = dict(zip(dict.fromkeys(team for panel in panels for team in panel.curves), PAIR_COLORS, strict=False))
     for axes, panel in zip(grid, panels, strict=False):
-        for (team, repetitions), color in zip(panel.curves.items(), PAIR_COLORS, strict=False):
-            for curve in repetitions:
-                axes.plot(curve, color=color, linewidth=0.5, alpha=0.25)
-            axes.plot(_mean_curve(repetitions), color=color, linewidth=1.8, label=team)
-        axes.axvline(panel.marked_episode, color="#555555", linewidth=1.0, linestyle=":", label=mark)
+        for team, repetitions in panel.curves.items():
+            if len(repetitions) > 1:
+                for curve in repetitions:
+                    axes.plot(curve, color=color_of[team], linewidth=0.5, alpha=0.25)
+            axes.plot(_mean_curve(repetitions), color=color_of[team], linewidth=1.8 if len(repetitions) > 1 else 1.1)
+        for whose, episode in panel.marks.items():
+            axes.axvline(episode, color=color_of.get(whose, "#555555"), linewidth=1.0, linestyle=":")
         axes.set_title(panel.title, fontsize=10, loc="left")
         open_frame(axes)
         axes.tick_params(labelsize=8)
+        if shares:
+            axes.set_ylim(-0.04, 1.04)
     for axes in grid[len(panels) :]:
         axes.set_visible(False)
-    grid[0].legend(fontsize=8, frameon=False)
+    handles = [Line2D([], [], color=color, linewidth=1.8, label=team) for team, color in color_of.items()]
+    handles.append(Line2D([], [], color="#555555", linewidth=1.0, linestyle=":", label=mark))
+    figure.legend(handles=handles, loc="outside upper left", ncols=3, fontsize=8, frameon=False)
     figure.supxlabel("episode", fontsize=10)
     figure.supylabel(label, fontsize=10)
     return figure

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[Any]
-_ACROSS: Final = 2
-_WIDTH_INCHES: Final = 12.0
-_PANEL_INCHES: Final = 2.0
+_ACROSS: Final = 3
+_WIDTH_INCHES: Final = 14.0
+_PANEL_INCHES: Final = 2.3
 _BAND: Final = "#efece5"
 
 
@@ -35,12 +35,14 @@ class CoursePanel:
         curves: by training, then by curve: (k,) values, nan where there is none.
         marks: (m,) parts of each training at which a scenario ended with a settled policy, drawn on the first curve.
         logarithmic: both ways from zero.
+        by_curve: curves have a color each, those of a second training dashed; else every training has a color.
     """
 
     title: str
     curves: Mapping[str, Mapping[str, Array]]
     marks: Mapping[str, Array] = field(default_factory=dict)
     logarithmic: bool = False
+    by_curve: bool = False
 
 
 def draw_course(
@@ -50,7 +52,7 @@ def draw_course(
     *,
     unit: str,
 ) -> Figure:
-    """Draw the panels two abreast.
+    """Draw the panels three abreast.
 
     `bands` are first and last part of each scenario of the first training, of which every second is shaded; `labels`
     are first and last part of what is named above the panels.
@@ -60,27 +62,37 @@ def draw_course(
     grid = figure.subplots(n_rows, _ACROSS, sharex=True, squeeze=False).ravel()
     for axes, panel in zip(grid, panels, strict=False):
         _draw_bands(axes, bands, labels)
-        several = len(panel.curves) > 1
         for k, (name, curves) in enumerate(panel.curves.items()):
             for j, (curve, values) in enumerate(curves.items()):
-                color = PAIR_COLORS[k] if several else hexadecimal(_COLORS[j % len(_COLORS)])
-                label = curve if not several else name if j == 0 and axes is grid[0] else ""
-                width = 1.2 if len(curves) == 1 or j == 1 else 0.7
-                axes.plot(np.arange(len(values)), values, color=color, linewidth=width, alpha=0.9, label=label or None)
+                look = _look(panel, k, j, name=name if axes is grid[0] else "", curve=curve)
+                axes.plot(np.arange(len(values)), values, alpha=0.85, **look)
                 if j == 0 and name in panel.marks:
                     places = panel.marks[name]
-                    axes.plot(places, values[places], "D", color=color, markersize=3.5, markeredgecolor="white",
-                              markeredgewidth=0.4)  # fmt: skip
+                    axes.plot(places, values[places], "D", color=look["color"], markersize=3.5,
+                              markeredgecolor="white", markeredgewidth=0.4)  # fmt: skip
         _dress(axes, panel)
     for axes in grid[len(panels) :]:
         axes.set_visible(False)
     for axes in grid[max(0, len(panels) - _ACROSS) : len(panels)]:
         axes.tick_params(labelbottom=True)
-        axes.set_xlabel(unit, fontsize=9, color=INK)
+    figure.supxlabel(unit, fontsize=9, color=INK)
     return figure
 
 
-_COLORS: Final = ((31, 111, 235), (194, 87, 26), (120, 120, 120), (30, 143, 69), (138, 111, 176))
+def _look(panel: CoursePanel, k: int, j: int, *, name: str, curve: str) -> dict[str, Any]:
+    """Return how the j-th curve of the k-th training is drawn, and what the legend calls it."""
+    several, single = len(panel.curves) > 1, all(len(curves) == 1 for curves in panel.curves.values())
+    look: dict[str, Any] = {"color": hexadecimal(_COLORS[j % len(_COLORS)]), "linewidth": 1.2 if single else 0.9}
+    if panel.by_curve:
+        return {**look, "linestyle": "--" if k else "-", "label": None if k else curve}
+    if several:
+        return {**look, "color": PAIR_COLORS[k % len(PAIR_COLORS)], "label": None if j else name or None}
+    return {**look, "label": curve or None}
+
+
+_COLORS: Final = (
+    (31, 111, 235), (194, 87, 26), (30, 143, 69), (176, 60, 150), (120, 120, 120), (150, 120, 10), (10, 150, 165),
+)  # fmt: skip
 
 
 def _draw_bands(axes: Axes, bands: Sequence[tuple[int, int]], labels: Sequence[tuple[int, int, str]]) -> None:
@@ -97,12 +109,14 @@ def _draw_bands(axes: Axes, bands: Sequence[tuple[int, int]], labels: Sequence[t
 def _dress(axes: Axes, panel: CoursePanel) -> None:
     if panel.logarithmic:
         axes.set_yscale("symlog", linthresh=10.0)
+    from matplotlib.ticker import MaxNLocator
+
     axes.set_title(panel.title, fontsize=9.5, loc="left", color=INK, pad=12)
-    handles, _ = axes.get_legend_handles_labels()
-    if handles:
-        axes.legend(fontsize=7.5, frameon=False, labelcolor=INK, loc="best")
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize=7.5, framealpha=0.6, edgecolor="none", labelcolor=INK, loc="best")
     open_frame(axes)
     axes.margins(x=0.01)
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=6, integer=True))
     axes.tick_params(labelsize=8, colors=INK)
     if not panel.logarithmic:
         axes.yaxis.set_major_formatter(lambda number, _: f"{number:,.6g}")

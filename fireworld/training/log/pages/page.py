@@ -31,8 +31,18 @@ if TYPE_CHECKING:
 
 ENDINGS: Final = (".html", ".htm")
 RETURN: Final = "return"
+SCORE: Final = "score"
+CONVERGENCE: Final = (
+    (RETURN, 1000.0, "return of the episode, in thousands"),
+    (SCORE, 1.0, "score of the episode, as a share of the best"),
+)
+"""Plots that are drawn scenario by scenario, by what their values are divided, and their labels."""
 LOGARITHMIC: Final = frozenset({"return", "td_error"})
 WINDOW: Final = 20
+CAPTION: Final = (
+    "Bands are scenarios of the first training; diamonds stand where a policy had settled. Returns and errors on a"
+    " logarithmic scale."
+)
 NAMED_MAX: Final = 12
 """Scenarios at most that there is room to name in a panel."""
 
@@ -89,8 +99,7 @@ def training_page(logs: Sequence[TrainingLog]) -> str:
             *_convergence(courses, names),
             "<h2>The whole training</h2>",
             html_figure(png_bytes(_whole(courses, names)),
-                        "Bands are scenarios; diamonds stand where a policy had settled. Returns and errors on a "
-                        "logarithmic scale."),
+                        CAPTION if courses[0].scenarios else "All curves, generation by generation."),
             *(part for course, name in zip(courses, names, strict=True) for part in _tables(course, name)),
             *(part for log, name in zip(logs, names, strict=True) for part in _scenarios(log, name)),
             "<h2>How to get the same again</h2>",
@@ -125,11 +134,14 @@ def _panels(courses: Sequence[Course], names: Sequence[str]) -> list[CoursePanel
         for course, name in zip(courses, names, strict=True)
     }
     found = []
-    for plot, title in courses[0].titles.items():
+    titles = {plot: title for course in courses for plot, title in course.titles.items()}
+    for plot, title in titles.items():
         curves = {name: course.plots.get(plot, {}) for course, name in zip(courses, names, strict=True)}
         if any(curves.values()):
+            own = plot in courses[0].own | courses[-1].own
+            shown = f"{title}; dashed: {names[1]}" if own and len(names) > 1 else title
             marked = marks if plot == RETURN else {}
-            found.append(CoursePanel(title, curves, marked, logarithmic=plot in LOGARITHMIC))
+            found.append(CoursePanel(shown, curves, marked, logarithmic=plot in LOGARITHMIC, by_curve=own))
     return found
 
 
@@ -157,24 +169,32 @@ def _whole(courses: Sequence[Course], names: Sequence[str]) -> Figure:
 
 
 def _convergence(courses: Sequence[Course], names: Sequence[str]) -> Iterator[str]:
-    """Yield the paper's kind of graph: the return of every episode, scenario by scenario."""
-    first = courses[0]
-    returns = [course.plots.get(RETURN, {}).get("") for course in courses]
-    if not first.scenarios or any(one is None for one in returns):
+    """Yield the paper's kind of graphs: return and score of every episode, scenario by scenario."""
+    if not courses[0].scenarios:
         return
-    panels = []
-    for number, name in enumerate(first.scenarios):
-        curves: dict[str, list[Array]] = {}
-        for course, values, label in zip(courses, returns, names, strict=True):
-            if values is not None and (course.scenario == number).any():
-                curves[label] = [values[course.scenario == number]]
-        ends = [mark for mark in first.marks if first.scenario[mark.part] == number and mark.settled]
-        settled = float((first.scenario == number).sum() - 1) if ends else float("nan")
-        panels.append(LearningPanel(title=name, curves=curves, marked_episode=settled))
     yield "<h2>Convergence</h2>"
-    figure = draw_learning_curves(panels, label="return of the episode", mark="policy settled")
-    caption = "The return of every episode, by scenario; the dotted line: the policy has settled."
-    yield html_figure(png_bytes(figure), caption)
+    for plot, scale, label in CONVERGENCE:
+        panels = _by_scenario(courses, names, plot, scale)
+        figure = draw_learning_curves(panels, label=label, mark="policy settled", shares=plot == SCORE)
+        caption = f"By scenario: {label}. The dotted lines: the policy has settled."
+        yield html_figure(png_bytes(figure), caption)
+
+
+def _by_scenario(courses: Sequence[Course], names: Sequence[str], plot: str, scale: float) -> list[LearningPanel]:
+    """Return a panel for every scenario that one of the trainings has begun, with a plot's only curve in it."""
+    panels = []
+    for scenario in dict.fromkeys(name for course in courses for name in course.scenarios):
+        curves: dict[str, list[Array]] = {}
+        marks = {}
+        for course, name in zip(courses, names, strict=True):
+            if scenario not in course.scenarios:
+                continue
+            mine = course.scenario == course.scenarios.index(scenario)
+            curves[name] = [course.plots[plot][""][mine] / scale]
+            if any(mark.settled and mine[mark.part] for mark in course.marks):
+                marks[name] = float(mine.sum() - 1)
+        panels.append(LearningPanel(title=scenario, curves=curves, marks=marks))
+    return panels
 
 
 def _tables(course: Course, name: str) -> Iterator[str]:
