@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from fireworld.cli.compiling import announce_compilation
+
 if TYPE_CHECKING:
     from fireworld_recorder.reader import Log
 
@@ -16,6 +18,8 @@ if TYPE_CHECKING:
 
 def open_trainings(paths: Sequence[Path], *, doing: str) -> list[TrainingLog]:
     """Open training logs as `open_one_or_two` does runs; empty if these are none.
+
+    What is shown of them is learned again: it may be announced that kernels are compiled.
 
     Raises:
         UsageError: there are more than two.
@@ -38,6 +42,7 @@ def open_trainings(paths: Sequence[Path], *, doing: str) -> list[TrainingLog]:
     for log in logs:
         if log.damage is not None:
             click.echo(f"{log.path}: {log.damage}; {doing} {len(log)} committed {log.header.unit}s", err=True)
+    announce_compilation()
     return logs
 
 

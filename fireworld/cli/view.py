@@ -77,7 +77,6 @@ def command(
     if trainings:
         if focus or first is not None or last is not None or every != 1 or air:
             raise click.UsageError("--focus, --from, --to, --every and --air go with runs, not with trainings.")
-        announce_compilation()
         from fireworld.training.log.pages.view import view_trainings
 
         view_trainings(trainings, save=output, force=force, web=web, port=port, announce=_announce)

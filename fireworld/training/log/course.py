@@ -16,7 +16,7 @@ from fireworld.training.log.reader import TrainingLog
 from fireworld.training.log.records import Episode, Tables
 from fireworld.training.method import Report
 
-STATES_SHOWN: Final = 32
+STATES_SHOWN: Final = 40
 """States in the picture of the tables: those visited most."""
 
 

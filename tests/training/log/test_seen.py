@@ -10,7 +10,7 @@ import pytest
 from fireworld.errors import LogError, OutputError
 from fireworld.policy.teams.table_team import agreement
 from fireworld.training.log.course import course_of
-from fireworld.training.log.pages.page import _by_scenario, _panels, render_training, report_training
+from fireworld.training.log.pages.page import _by_scenario, _panels, _training_command, render_training, report_training
 from fireworld.training.log.pages.view import states_page, view_trainings
 from fireworld.training.log.reader import open_training
 from fireworld.training.train import prepare_trainings
@@ -194,6 +194,26 @@ def test_names_of_files_that_need_care(log_path, tmp_path, fireworld):
     command[command.index(odd.name)], command[-1] = odd, tmp_path / command[-1]
     assert fireworld(*command[1:]).code == 0
     assert fireworld("verify", command[-1]).code == 0
+
+
+def test_a_training_is_had_again_from_its_log_alone(log, log_path, here):
+    shutil.copy(log_path, here / "a.mcap")
+    command = shlex.split(_training_command(open_training(here / "a.mcap")), comments=True)
+    assert command[:2] == ["python", "-c"]
+    exec(command[2], {})  # noqa: S102 - a command of our own
+    assert open_training(here / "again.mcap").digest == log.digest
+
+
+@pytest.mark.parametrize("words", [("quick",), ("paper", "--stages", "together")])
+def test_a_training_in_what_comes_with_fireworld_is_had_again(words, here, fireworld):
+    settings = ("--set", "n_episodes_max=1", "--set", "rule=q-learning", "--set", "shared_table=true", "--seed", 3)
+    assert fireworld("train", *words, *settings, "-o", "a.npz", "--record", "a.mcap").code == 0
+    log = open_training("a.mcap")
+    command = shlex.split(_training_command(log))
+    assert command[:2] == ["fireworld", "train"]
+    assert command[2 : 2 + len(words)] == [*words]
+    assert fireworld(*command[1:]).code == 0
+    assert open_training("again.mcap").digest == log.digest
 
 
 def test_in_notebooks(log):

@@ -20,6 +20,8 @@ from fireworld.html_page import compared_row, html_figure, html_page, html_table
 from fireworld.picture import Picture
 from fireworld.policy.words import short_state
 from fireworld.records import Array
+from fireworld.scenario import scenario_names
+from fireworld.training.curriculum import curriculum_names, find_curriculum
 from fireworld.training.log.course import Course, course_of, opening
 from fireworld.training.log.difference import AnyTraining
 from fireworld.training.log.pages.view import TABLES_HELP, names_of, open_trainings
@@ -120,6 +122,7 @@ def _facts(logs: Sequence[TrainingLog], names: Sequence[str]) -> str:
         facts = {key: str(value) for key, value in log.method.as_dict().items()}
         facts |= {"curriculum": f"{log.header.curriculum} ({log.header.curriculum_digest[:12]})"}
         facts |= {"seed": str(log.header.seed), f"{log.header.unit}s": f"{len(log):,}"}
+        facts |= {"recorded by": f"fireworld {log.header.fireworld_version}"}
         facts |= {"ended": "yes" if log.done else "no", "digest": log.digest[:16], "team": log.team().digest[:16]}
         columns.append(facts)
     rows = [compared_row(escape(key), [column[key] for column in columns]) for key in columns[0]]
@@ -259,11 +262,38 @@ def _scenarios(log: TrainingLog, name: str) -> Iterator[str]:
 
 
 def _repetition(log: TrainingLog, name: str) -> Iterator[str]:
-    """Yield the command that trains the same again."""
+    """Yield the commands that train the same again, and that check it."""
+    path = shlex.quote(one_line(log.path.name))
+    check = f"fireworld verify {path}   # from the log alone: every {log.header.unit} is trained again and compared"
+    yield f"<h3>{escape(one_line(name))}</h3>"
+    yield f"<pre>{escape(chr(10).join([check, _training_command(log)]))}</pre>"
+
+
+def _training_command(log: TrainingLog) -> str:
+    """Return the command that trains the same; in Python where the curriculum does not come with fireworld."""
     header, default = log.header, type(log.method)().as_dict()
-    words = ["fireworld", "train", header.curriculum, "--method", header.method, "--seed", str(header.seed)]
+    chosen = _shipped(log)
+    if chosen is None:
+        call = (
+            f"import fireworld as fw; log = fw.open_training({one_line(log.path.name)!r}); fw.train(log.curriculum, "
+            'method=log.method, seed=log.header.seed, output="again.npz", record="again.mcap")'
+        )
+        return f"{shlex.join(['python', '-c', call])}   # its curriculum is in the log"
+    words = ["fireworld", "train", *chosen, "--method", header.method, "--seed", str(header.seed)]
     for key, value in log.method.as_dict().items():
         if value != default.get(key):
             words += ["--set", f"{key}={value if isinstance(value, str) else json.dumps(value)}"]
-    words += ["-o", f"{Path(name).stem}.npz", "--record", log.path.name]
-    yield f"<pre>{escape(shlex.join(words))}\nfireworld verify {escape(shlex.quote(log.path.name))}</pre>"
+    return shlex.join([*words, "-o", "again.npz", "--record", "again.mcap"])
+
+
+def _shipped(log: TrainingLog) -> list[str] | None:
+    """Return the curriculum as `fireworld train` is told of it; None where it does not come with fireworld."""
+    name, stages = log.header.curriculum, [stage.name for stage in log.curriculum.stages]
+    if name not in curriculum_names() and name not in scenario_names():
+        return None
+    whole = find_curriculum(name)
+    if whole.digest == log.header.curriculum_digest:
+        return [name]
+    if {*stages} <= {stage.name for stage in whole.stages} and whole.only(stages).digest == log.curriculum.digest:
+        return [name, "--stages", ",".join(stages)]
+    return None
