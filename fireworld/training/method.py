@@ -126,7 +126,7 @@ class Report(ABC):
 
     @property
     def ending(self) -> str:
-        """How what was learned in has ended: "settled", or another word for a mark; "" if it goes on."""
+        """How what was learned in has ended: "settled", or another word for a mark; "" if it has not."""
         return ""
 
     @classmethod

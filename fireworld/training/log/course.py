@@ -68,7 +68,7 @@ class Course:
         name: of the log's file.
         unit: what a part is.
         titles: of the plots by their names.
-        own: names of the plots whose curves are to be told apart: those that a method draws of each team alone.
+        own: names of the plots with a color for each curve: those that a method draws of each team alone.
         plots: by plot, then by curve: (k,) values, nan where there is none.
         scenarios: names of those that have begun, in their order.
         stages: the stage of each.

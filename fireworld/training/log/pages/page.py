@@ -287,7 +287,7 @@ def _training_command(log: TrainingLog) -> str:
 
 
 def _shipped(log: TrainingLog) -> list[str] | None:
-    """Return the curriculum as `fireworld train` is told of it; None where it does not come with fireworld."""
+    """Return the curriculum in the words of `fireworld train`; None where it does not come with fireworld."""
     name, stages = log.header.curriculum, [stage.name for stage in log.curriculum.stages]
     if name not in curriculum_names() and name not in scenario_names():
         return None
