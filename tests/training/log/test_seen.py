@@ -185,8 +185,12 @@ def test_searches_in_rerun(make_log, tmp_path):
 
 def test_names_of_files_that_need_care(log_path, tmp_path, fireworld):
     pytest.importorskip("rerun")
-    odd = tmp_path / "my run (1), ä.mcap"
+    odd = tmp_path / r"_my run $(\a)$ <i>, ä.mcap"
     shutil.copy(log_path, odd)
+    render_training([log_path, odd], tmp_path / "ab.svg")
+    assert r"_my run $(\a)$ &lt;i&gt;, ä.mcap" in (tmp_path / "ab.svg").read_text()
+    report_training(odd, tmp_path / "a.html")
+    assert "<i>" not in (tmp_path / "a.html").read_text()
     view_trainings([log_path, odd], save=tmp_path / "ab.rrd")
     log = open_training(odd)
     command = shlex.split(course_of(log).marks[0].command)

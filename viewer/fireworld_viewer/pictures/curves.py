@@ -12,7 +12,7 @@ import numpy as np
 from fireworld.records import ACTION_NAMES, ACTIVITIES, Array, Recording
 from fireworld_viewer import colors
 from fireworld_viewer.pictures.city_map import hexadecimal
-from fireworld_viewer.pictures.figure_files import INK, PAIR_COLORS, new_figure, open_frame
+from fireworld_viewer.pictures.figure_files import INK, PAIR_COLORS, label_text, new_figure, open_frame
 from fireworld_viewer.story.series import LABELS, per_brigade, series
 
 if TYPE_CHECKING:
@@ -233,14 +233,14 @@ def draw_learning_curves(panels: Sequence[LearningPanel], *, label: str, mark: s
             axes.plot(_mean_curve(repetitions), color=color_of[team], linewidth=1.8 if len(repetitions) > 1 else 1.1)
         for whose, episode in panel.marks.items():
             axes.axvline(episode, color=color_of.get(whose, "#555555"), linewidth=1.0, linestyle=":")
-        axes.set_title(panel.title, fontsize=10, loc="left")
+        axes.set_title(label_text(panel.title), fontsize=10, loc="left")
         open_frame(axes)
         axes.tick_params(labelsize=8)
         if shares:
             axes.set_ylim(-0.04, 1.04)
     for axes in grid[len(panels) :]:
         axes.set_visible(False)
-    handles = [Line2D([], [], color=color, linewidth=1.8, label=team) for team, color in color_of.items()]
+    handles = [Line2D([], [], color=color, linewidth=1.8, label=label_text(team)) for team, color in color_of.items()]
     handles.append(Line2D([], [], color="#555555", linewidth=1.0, linestyle=":", label=mark))
     figure.legend(handles=handles, loc="outside upper left", ncols=3, fontsize=8, frameon=False)
     figure.supxlabel("episode", fontsize=10)

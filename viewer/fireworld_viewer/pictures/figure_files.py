@@ -57,6 +57,12 @@ def new_figure(
     return figure
 
 
+def label_text(name: str) -> str:
+    """Return a user's name as matplotlib writes it: it takes $ for formulas, and leaves out what begins with _."""
+    plain = name.replace("$", r"\$")
+    return f" {plain}" if plain.startswith("_") else plain
+
+
 def open_frame(axes: Axes) -> None:
     """Leave out the lines above and to the right of a panel."""
     axes.spines[["top", "right"]].set_visible(False)

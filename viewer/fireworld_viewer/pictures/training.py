@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fireworld.records import ACTIONS
 from fireworld_viewer import colors
 from fireworld_viewer.pictures.city_map import hexadecimal
-from fireworld_viewer.pictures.figure_files import INK, PAIR_COLORS, new_figure, open_frame
+from fireworld_viewer.pictures.figure_files import INK, PAIR_COLORS, label_text, new_figure, open_frame
 from fireworld_viewer.table_pixels import UNSEEN_RGB, table_pixels
 
 if TYPE_CHECKING:
@@ -84,10 +84,14 @@ def _look(panel: CoursePanel, k: int, j: int, *, name: str, curve: str) -> dict[
     several, single = len(panel.curves) > 1, all(len(curves) == 1 for curves in panel.curves.values())
     look: dict[str, Any] = {"color": hexadecimal(_COLORS[j % len(_COLORS)]), "linewidth": 1.2 if single else 0.9}
     if panel.by_curve:
-        return {**look, "linestyle": "--" if k else "-", "label": None if k else curve}
+        return {**look, "linestyle": "--" if k else "-", "label": None if k else label_text(curve)}
     if several:
-        return {**look, "color": PAIR_COLORS[k % len(PAIR_COLORS)], "label": None if j else name or None}
-    return {**look, "label": curve or None}
+        return {
+            **look,
+            "color": PAIR_COLORS[k % len(PAIR_COLORS)],
+            "label": None if j or not name else label_text(name),
+        }
+    return {**look, "label": label_text(curve) or None}
 
 
 _COLORS: Final = (
@@ -101,7 +105,7 @@ def _draw_bands(axes: Axes, bands: Sequence[tuple[int, int]], labels: Sequence[t
         axes.axvspan(first - 0.5, last + 0.5, color=_BAND, linewidth=0, zorder=0)
     for first, last, name in labels:
         axes.text(
-            (first + last) / 2, 1.0, name, fontsize=6.5, color="#777777", ha="center", va="bottom",
+            (first + last) / 2, 1.0, label_text(name), fontsize=6.5, color="#777777", ha="center", va="bottom",
             transform=axes.get_xaxis_transform(), clip_on=False,
         )  # fmt: skip
 
@@ -111,7 +115,7 @@ def _dress(axes: Axes, panel: CoursePanel) -> None:
         axes.set_yscale("symlog", linthresh=10.0)
     from matplotlib.ticker import MaxNLocator
 
-    axes.set_title(panel.title, fontsize=9.5, loc="left", color=INK, pad=12)
+    axes.set_title(label_text(panel.title), fontsize=9.5, loc="left", color=INK, pad=12)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=7.5, framealpha=0.6, edgecolor="none", labelcolor=INK, loc="best")
     open_frame(axes)
