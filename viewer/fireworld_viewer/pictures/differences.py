@@ -11,7 +11,7 @@ import numpy as np
 from fireworld.records import Array, CityRecord, StepRecord
 from fireworld_viewer import colors
 from fireworld_viewer.pictures.city_map import hexadecimal, outlines_m
-from fireworld_viewer.pictures.figure_files import INK, PAIR_COLORS, new_figure, open_frame
+from fireworld_viewer.pictures.figure_files import INK, PAIR_COLORS, label_text, new_figure, open_frame
 from fireworld_viewer.pictures.map_grid import LEGEND_STYLE, mark
 from fireworld_viewer.pictures.maps import draw_map
 from fireworld_viewer.story.steps import compare_damage
@@ -61,7 +61,7 @@ def draw_paired_differences(panels: Sequence[DifferencePanel], *, title: str) ->
         _draw_panel(axes, panel)
     for axes in grid[len(panels) :]:
         axes.remove()
-    figure.suptitle(title, fontsize=12, x=0.01, ha="left")
+    figure.suptitle(label_text(title), fontsize=12, x=0.01, ha="left")
     figure.supxlabel(
         "a point is a seed: B - A. Blue, upward: B is better; orange, downward: A is; grey: equal. "
         "Black: mean and 95 % interval.",
@@ -85,7 +85,7 @@ def _draw_panel(axes: Axes, panel: DifferencePanel) -> None:
     n = len(panel.lines)
     if n > 1:
         axes.axhline(n - 1.5, color="#cccccc", linewidth=0.8)
-    axes.set_yticks(range(n), list(panel.lines), fontsize=9)
+    axes.set_yticks(range(n), [*map(label_text, panel.lines)], fontsize=9)
     axes.set_ylim(n - 0.4, -0.6)
     widest = max(float(np.abs(differences).max()) for differences, _ in panel.lines.values())
     axes.set_xlim(-1.08 * (widest or 1.0), 1.08 * (widest or 1.0))
