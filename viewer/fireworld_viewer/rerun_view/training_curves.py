@@ -22,6 +22,8 @@ SETTLED: Final = "settled"
 _FEW: Final = 6
 """Plots that stand in two columns; more stand in three."""
 _COLUMNS_OF_TAB: Final = 3
+_BANDS_MAX: Final = 4
+"""Teams whose bands there is room for; those of more are scrolled to."""
 
 
 @dataclass(frozen=True)
@@ -204,7 +206,7 @@ def _blueprint(layout: TrainingLayout, points: Sequence[TrainingPoint]) -> Any:
     rows, shares = [grid(layout.plots, 2 if len(layout.plots) <= _FEW else 3)], [8]
     if layout.bands:
         rows.insert(0, rrb.StateTimelineView(name=layout.bands, origin=f"/{BANDS_PATH}", time_view=axis))
-        shares.insert(0, len(layout.teams))
+        shares.insert(0, min(len(layout.teams), _BANDS_MAX))
     if layout.tabs:
         tabs = []
         for title, tab in layout.tabs.items():
