@@ -34,9 +34,9 @@ def command(context: click.Context, *, log: Path | None, as_json: bool, schema: 
 
     Exit code: 0 good, 1 cut off or damaged but good up to a step, 2 not readable.
     """
-    from fireworld_recorder.kind import noun_of
     from fireworld_recorder.reader import open_log
     from fireworld_recorder.schema import PROTO
+    from fireworld_recorder.source import noun_of
 
     from fireworld.recording.summary import summary
 

@@ -25,7 +25,7 @@ def open_trainings(paths: Sequence[Path], *, doing: str) -> list[TrainingLog]:
         UsageError: there are more than two.
         LogError: one is a training and the other is not.
     """
-    from fireworld_recorder.kind import noun_of
+    from fireworld_recorder.source import noun_of
 
     are = [noun_of(path) == "training" for path in paths]
     if not any(are):

@@ -24,7 +24,7 @@ _WANTED = "the path of a recording, or a run"
 def is_training(given: object) -> TypeGuard[str | os.PathLike[str] | TrainingLog]:
     """Return whether a training log is given, or the path of one."""
     if isinstance(given, str | os.PathLike):
-        from fireworld_recorder.kind import noun_of
+        from fireworld_recorder.source import noun_of
 
         return noun_of(Path(given)) == "training"
     return hasattr(given, "raw_parts")

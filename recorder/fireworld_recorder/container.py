@@ -202,6 +202,12 @@ def split(block: bytes, position: int = 0) -> Iterator[tuple[int, int, memoryvie
         position = start + length
 
 
+def read_header(body: bytes) -> tuple[str, str]:
+    """Read the header record: the profile of the file and the library that wrote it."""
+    fields = Fields(body)
+    return fields.text(), fields.text()
+
+
 def read_message(body: memoryview) -> tuple[int, memoryview]:
     """Return the channel and the payload of a message record."""
     if len(body) < _MESSAGE.size:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import struct
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 from fireworld.records import FORMAT, STEP_SECONDS, CityRecord, RunHeader, Snapshot
-from fireworld_recorder.container import MAGIC
 from fireworld_recorder.schema import TOPICS, Commit
 
 NOUNS: Final = {"fireworld-log": "run", "fireworld-training": "training"}
@@ -61,24 +58,3 @@ RUN: Final = LogKind(
     unit="step",
     seconds=STEP_SECONDS,
 )
-
-
-def noun_of(path: Path) -> str:
-    """Return what a file is the log of by its first bytes, as in NOUNS; "run" for whatever is none: to be refused."""
-    try:
-        with path.open("rb") as file:
-            start = file.read(_START_BYTES)
-    except OSError:
-        return "run"
-    try:
-        position = len(MAGIC) + 9  # opcode and length of the header record
-        (n_profile,) = struct.unpack_from("<I", start, position)
-        (n_library,) = struct.unpack_from("<I", start, position + 4 + n_profile)
-        begin = position + 8 + n_profile
-        name = start[begin : begin + n_library].decode(errors="replace").partition("/")[0]
-    except struct.error:
-        return "run"
-    return NOUNS.get(name, "run")
-
-
-_START_BYTES: Final = 256

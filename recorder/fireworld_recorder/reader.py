@@ -13,8 +13,9 @@ from fireworld.errors import LogError
 from fireworld.records import STEP_TOPICS, Array, CityRecord, RecordingBase, RunHeader, Snapshot, StepRecord
 from fireworld_recorder.codec import decode, decode_field, decode_snapshot
 from fireworld_recorder.fit import check_city, check_field, check_record, counts_of
-from fireworld_recorder.scan import Scan, State, TopicSize, messages, readable, scan
+from fireworld_recorder.scan import Scan, State, TopicSize, messages, scan
 from fireworld_recorder.schema import Commit, message_of
+from fireworld_recorder.source import unreadable
 
 RawStep = list[tuple[str, memoryview]]
 """Topic and payload of every message of a step, /commit last."""
@@ -33,22 +34,17 @@ def open_log(path: Path | str, *, partial: bool = False) -> Log:
         LogError: the file is not a log of this format, has lost its header or city, or (unless `partial`) is
             cut off or damaged; with how far it is good.
     """
-    path, read = Path(path), readable(Path(path))
-    try:
-        log = Log(path, scan(read), read)
-    except LogError as error:
-        raise LogError(str(error).replace(str(read), str(path))) from None
+    log = Log(scan(Path(path)))
     if log.damage is not None and not partial:
         raise LogError(f"{path}: {log.damage}; try `fireworld recover {path}`")
     return log
 
 
-def raw_commits(path: Path, found: Scan, first: int = 0) -> Iterator[RawStep]:
+def raw_commits(found: Scan, first: int = 0) -> Iterator[RawStep]:
     """Yield the commits of a log, of whatever kind, as they lie in the file.
 
     Args:
-        path: the log.
-        found: what its scan has found.
+        found: what the scan of the log has found.
         first: position of the commit to begin with.
 
     Raises:
@@ -58,7 +54,7 @@ def raw_commits(path: Path, found: Scan, first: int = 0) -> Iterator[RawStep]:
     if left == 0:
         return
     try:
-        with path.open("rb") as file:
+        with found.file.open("rb") as file:
             for topic, payload in messages(file, found.n_bytes, found.starts[first], found.channels):
                 raw.append((topic, payload))
                 if topic == found.kind.commit_type.topic:
@@ -67,9 +63,9 @@ def raw_commits(path: Path, found: Scan, first: int = 0) -> Iterator[RawStep]:
                     if left == 0:
                         return
     except OSError as error:
-        raise LogError(f"{path}: cannot be read: {error.strerror}") from error
+        raise unreadable(found.path, error) from error
     except LogError as error:
-        raise LogError(f"{path}: {error}; it has changed since it was opened") from error
+        raise LogError(f"{found.path}: {error}; it has changed since it was opened") from error
 
 
 class Log(RecordingBase):
@@ -78,16 +74,15 @@ class Log(RecordingBase):
     Only the places of the steps are held in memory; every access reads the file again.
     """
 
-    def __init__(self, path: Path, found: Scan, read: Path | None = None) -> None:
-        self.path = path
-        self._read = read or path  # another one where it came from a pipe
+    def __init__(self, found: Scan) -> None:
+        self.path = found.path
         self.found = found
         self.header: RunHeader = found.header
         self.city: CityRecord = decode(CityRecord, found.first)
         try:
             check_city(self.city)
         except LogError as error:
-            raise LogError(f"{path}: {error}") from None
+            raise LogError(f"{self.path}: {error}") from None
         self._counts = counts_of(self.city)
         self.digest = found.hash.hex()
         """The hash of the last committed step: the identity of the run up to there, 64 hexadecimal digits."""
@@ -141,7 +136,7 @@ class Log(RecordingBase):
         Raises:
             LogError: the log changed since it was opened.
         """
-        return raw_commits(self._read, self.found, first)
+        return raw_commits(self.found, first)
 
     def _record(self, raw: RawStep) -> StepRecord:
         payloads = dict(raw)

@@ -57,7 +57,7 @@ def recover(path: Path | str, output: Path | str, *, force: bool = False, kind: 
         scratch_suffix=".recovering",
     )
     with copy:
-        for step, raw in zip(found.steps, raw_commits(Path(path), found), strict=True):
+        for step, raw in zip(found.steps, raw_commits(found), strict=True):
             copy.commit(step, [(topic, bytes(payload)) for topic, payload in raw])
     return Recovery(len(found.steps), found.steps[-1], found.damage, found.hash.hex(), kind.unit)
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
-import stat
-import tempfile
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -22,14 +19,13 @@ from fireworld_recorder.codec import decode
 from fireworld_recorder.container import ChannelRecord, Fields, Record, SchemaRecord, TruncatedError
 from fireworld_recorder.header import PROFILE, ForeignError, check_format, from_metadata
 from fireworld_recorder.kind import RUN, LogKind
+from fireworld_recorder.source import take, unreadable
 
 State = Literal["complete", "partial", "damaged"]
 # Plain integers, because comparing enumeration members takes as long as decoding a message.
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = (
     int(opcode) for opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK)
 )
-PIPE_BYTES_MAX: Final = 4 << 30
-_PIECE_BYTES: Final = 1 << 20
 _HINTS: Final = {
     b"\x1f\x8b": "it is compressed: unpack it with gzip -d",
     b"(\xb5/\xfd": "it is compressed: unpack it with zstd -d",
@@ -57,8 +53,13 @@ class TopicSize:
 
 @dataclass
 class Scan:
-    """What one pass over a log has found; it grows step by step, or part by part of a training."""
+    """What one pass over a log has found; it grows step by step, or part by part of a training.
 
+    Its bytes are in `file`: the log at `path`, or the copy of what came from a pipe.
+    """
+
+    path: Path
+    file: Path
     kind: LogKind
     n_bytes: int
     metadata: Mapping[str, str]
@@ -107,38 +108,14 @@ def scan(path: Path, kind: LogKind = RUN) -> Scan:
     Raises:
         LogError: the file cannot be read, is no log of this kind, or its header or city are lost.
     """
+    file = take(path)
     try:
-        with path.open("rb") as file:
-            n_bytes = file.seek(0, 2)
-            file.seek(0)
-            return _scan(str(path), _Stream(file, n_bytes, kind))
+        with file.open("rb") as opened:
+            n_bytes = opened.seek(0, 2)
+            opened.seek(0)
+            return _scan(path, file, _Stream(opened, n_bytes, kind))
     except OSError as error:
-        raise LogError(f"{path}: cannot be read: {error.strerror}") from error
-
-
-def readable(path: Path) -> Path:
-    """Return a log that can be read in any order: itself, or the private copy of what comes from a pipe.
-
-    Raises:
-        LogError: it is a folder or a device, or more comes than a log is.
-    """
-    try:
-        mode = path.stat().st_mode
-        if stat.S_ISREG(mode):
-            return path
-        if not (stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode)):
-            what = "a folder" if stat.S_ISDIR(mode) else "a device"
-            raise LogError(expected(str(path), "", "a recording", what))
-        with tempfile.NamedTemporaryFile(prefix="fireworld-", suffix=".mcap", delete=False) as copy:
-            atexit.register(Path(copy.name).unlink, missing_ok=True)
-            with path.open("rb") as pipe:
-                while data := pipe.read(_PIECE_BYTES):
-                    if copy.tell() > PIPE_BYTES_MAX:
-                        raise LogError(expected(str(path), "", f"at most {PIPE_BYTES_MAX} bytes from a pipe", "more"))
-                    copy.write(data)
-        return Path(copy.name)
-    except OSError as error:
-        raise LogError(f"{path}: cannot be read: {error.strerror or error}") from error
+        raise unreadable(path, error) from error
 
 
 def holds_nothing(path: Path, kind: LogKind = RUN) -> bool:
@@ -156,7 +133,7 @@ def holds_nothing(path: Path, kind: LogKind = RUN) -> bool:
         raise
 
 
-def _scan(path: str, stream: _Stream) -> Scan:
+def _scan(path: Path, file: Path, stream: _Stream) -> Scan:
     stream_of_messages, kind = stream.messages(), stream.kind
     try:
         first = _read_first(stream_of_messages, kind.first_type)
@@ -168,6 +145,8 @@ def _scan(path: str, stream: _Stream) -> Scan:
         raise LogError(f"{path}: {error}; without {lost} nothing can be read") from error
     chain = Chain(first, kind)
     found = Scan(
+        path=path,
+        file=file,
         kind=kind,
         n_bytes=stream.n_bytes,
         metadata=stream.metadata,
@@ -287,8 +266,7 @@ class _Stream:
 
     def _take(self, record: Record) -> None:
         if record.opcode == Opcode.HEADER:
-            fields = Fields(record.body)
-            profile, library = fields.text(), fields.text()
+            profile, library = container.read_header(record.body)
             if profile != PROFILE:
                 raise ForeignError(expected("profile", "", PROFILE, profile, "this is no fireworld log"))
             if library.startswith("fireworld-"):  # other tools that rewrite a log put their own name here

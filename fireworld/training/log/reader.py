@@ -104,7 +104,7 @@ class TrainingLog(Shown):
 
     def raw_parts(self, first: int = 0) -> Iterator[RawStep]:
         """Yield the parts as they lie in the file: topic and payload of every message, /commit last."""
-        return raw_commits(self.path, self.found, first)
+        return raw_commits(self.found, first)
 
     def parts(self, first: int = 0) -> Iterator[Part]:
         """Yield the parts: records by type.

@@ -73,7 +73,7 @@ def test_pages_and_pictures(log_path, make_log, tmp_path, fireworld):
     page = (tmp_path / "a.html").read_text()
     assert page == (tmp_path / "again.html").read_text()
     assert "Convergence" in page
-    assert "fireworld replay 0.mcap --scenario together-2 --episode" in page
+    assert f"fireworld replay {log_path.name} --scenario together-2 --episode" in page
     assert not re.search(r"(src|href)=\"http", page)
     assert "Bold: where they differ" in (tmp_path / "two.html").read_text()
     for ending in (".png", ".svg"):
