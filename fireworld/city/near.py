@@ -56,8 +56,8 @@ def _boxes_closer(footprints: Footprints, gap_mm: int) -> tuple[Int64Array, Int6
 
 def _outlines_closer(walls: Walls, footprints: Footprints, first: Int64Array, second: Int64Array, gap_mm: int) -> Array:
     """Return which pairs of buildings have walls closer than a gap, (p,) bool."""
-    starts = footprints.outline_ptr.astype(np.int64)
-    n_walls = np.diff(starts)
+    n_walls = np.bincount(walls.building, minlength=len(footprints.building_id))
+    starts = np.concatenate([[0], np.cumsum(n_walls)])
     n_pairs = n_walls[first] * n_walls[second]
     close = np.zeros(len(first), dtype=np.bool_)
     total = np.cumsum(n_pairs)
