@@ -54,9 +54,9 @@ def cover_cells(footprints: Footprints, cell_mm: int, *, where: str = "city") ->
         cell_mm=cell_mm,
         shape=(int(shape[0]), int(shape[1])),
         ptr=ptr,
-        x=x,
-        y=y,
-        percent=percent,
+        x=x.copy(),  # without the room left for cells that have no sample inside
+        y=y.copy(),
+        percent=percent.copy(),
     )
 
 

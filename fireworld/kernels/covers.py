@@ -44,8 +44,11 @@ def flip_band(corners: Array, sample_x: Array, sample_y: Array, step_mm: float, 
     """Mark in every row of samples where a building's inside begins and ends.
 
     Every crossing of a wall with row r flips all samples at and right of it: flips[r, sample]. `corners` (c, 2) are
-    those of one building, `step_mm` is about the distance of two samples.
+    those of one building, `step_mm` is about the distance of two samples. The marks made before are wiped out.
     """
+    for row in range(len(sample_y)):
+        for sample in range(len(sample_x) + 1):
+            flips[row, sample] = 0
     last = len(corners) - 1
     for k in range(len(corners)):
         start, end = (last if k == 0 else k - 1), k
@@ -95,8 +98,8 @@ def count_covers(
     ptr = np.zeros(n + 1, dtype=np.int32)
     cell_x, cell_y = np.empty(n_cells, dtype=np.int32), np.empty(n_cells, dtype=np.int32)
     count = np.empty(n_cells, dtype=np.int32)
-    inside_of = np.empty(largest, dtype=np.uint8)
-    band = np.empty(SAMPLES * (widest * SAMPLES + 1), dtype=np.uint8)
+    samples = np.empty(largest, dtype=np.uint8)  # inside, by cell of the current building
+    flips = np.empty((SAMPLES, widest * SAMPLES + 1), dtype=np.uint8)  # one to spare takes crossings at the end
     step_mm = (sample_x[SAMPLES - 1] - sample_x[0]) / (SAMPLES - 1)
     end = 0
     for b in range(n):
@@ -104,11 +107,9 @@ def count_covers(
         width = nx * SAMPLES
         corners = outline_mm[outline_ptr[b] : outline_ptr[b + 1]]
         columns = sample_x[first[b, 0] * SAMPLES : (first[b, 0] + nx) * SAMPLES]
-        samples = inside_of[: nx * ny]
-        samples[:] = 0
-        flips = band[: SAMPLES * (width + 1)].reshape(SAMPLES, width + 1)  # one to spare takes crossings at the end
+        for cell in range(nx * ny):
+            samples[cell] = 0
         for y in range(ny):
-            flips[:] = 0
             row = (first[b, 1] + y) * SAMPLES
             flip_band(corners, columns, sample_y[row : row + SAMPLES], step_mm, flips)
             for k in range(SAMPLES):
@@ -123,4 +124,4 @@ def count_covers(
                 count[end] = samples[cell]
                 end += 1
         ptr[b + 1] = end
-    return ptr, cell_x[:end].copy(), cell_y[:end].copy(), count[:end].copy()
+    return ptr, cell_x[:end], cell_y[:end], count[:end]
