@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fireworld.city.formats import json_plan
 from fireworld.city.formats.json_plan import parse_plan
 from fireworld.city.generator import generate_plan
 from fireworld.conformance.city_file import load_city_file
@@ -116,6 +117,12 @@ def test_corners_are_kept_as_they_are_listed():
     plan = parse(changed(("buildings", 0, "apexes"), doubled))
     assert plan.footprints.outline_ptr.tolist() == [0, 7, 10]
     assert plan.footprints.outline_mm.ravel().tolist()[:14] == doubled
+
+
+def test_too_many_buildings_are_refused_at_once(monkeypatch):
+    monkeypatch.setattr(json_plan, "BUILDINGS_MAX", 1)
+    with pytest.raises(CityError, match=r"^city.json: buildings: expected at most 1 buildings, got 2 of them"):
+        parse(CITY)
 
 
 def test_a_source_may_be_anything_that_json_holds():

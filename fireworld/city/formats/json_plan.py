@@ -31,6 +31,8 @@ COORDINATE_MAX_MM: Final = 1_000_000_000
 ID_MAX: Final = 2**31 - 1
 FLOORS_MAX: Final = 500
 GROUND_AREA_MAX_M2: Final = 10_000_000
+BUILDINGS_MAX: Final = 500_000
+"""As in generated cities; reading so many takes about 2 GB."""
 SOURCE_MAX_BYTES: Final = 65_536
 SOURCE_DEPTH_MAX: Final = 20
 IDS_SHOWN_MAX: Final = 5
@@ -43,6 +45,8 @@ def parse_plan(text: bytes, *, where: str, name: str = "city") -> Plan:
     items = document.array("buildings")
     if not items:
         document.refuse("buildings", "at least one building", "an empty array")
+    if len(items) > BUILDINGS_MAX:
+        document.refuse("buildings", f"at most {BUILDINGS_MAX} buildings", f"{len(items)} of them")
     buildings: list[Building] = []
     taken: set[int] = set()
     for index, item in enumerate(items):
@@ -101,7 +105,7 @@ def _building(item: Fields) -> Building:
     doubled_area = abs(doubled_area_mm2(corners))
     if doubled_area < 2_000_000:
         item.refuse("apexes", "an area of at least 1 m2", f"{doubled_area / 2_000_000:.6f} m2")
-    middle = centroid_mm(corners)
+    middle = (0, 0) if {"x", "y"} <= item.object().keys() else centroid_mm(corners)
     span = (-COORDINATE_MAX_MM, COORDINATE_MAX_MM)
     return Building(
         building_id=building_id,
