@@ -37,7 +37,8 @@ def radiation_links(footprints: Footprints, order: Int32Array, fire: FireParamet
 def wall_table(footprints: Footprints, order: Int32Array, fire: FireParameters) -> WallTable:
     """Lay out the walls for the ray caster; a wall sends ceil(length * rate) rays.
 
-    Where walls of two buildings coincide, a ray meets the one whose building the official program visits first.
+    The rate is a number of single precision, as in the official program: at 0.002, which is a bit more then, a wall of
+    2 m sends 5 rays. Where walls of two buildings coincide, a ray meets the one whose building the official program visits first.
     """
     walls = walls_of(footprints)
     visited = np.empty(len(order), dtype=np.int64)
@@ -51,7 +52,7 @@ def wall_table(footprints: Footprints, order: Int32Array, fire: FireParameters) 
         y=np.ascontiguousarray(walls.start_mm[:, 1]),
         dx=np.ascontiguousarray(span[:, 0]),
         dy=np.ascontiguousarray(span[:, 1]),
-        n_rays=np.ceil(walls.length_mm * fire.ray_rate_per_mm).astype(np.int64),
+        n_rays=np.ceil(walls.length_mm * float(np.float32(fire.ray_rate_per_mm))).astype(np.int64),
     )
 
 

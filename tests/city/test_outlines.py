@@ -80,6 +80,15 @@ def test_walls_without_length_send_no_rays():
         assert reference.n_rays(outline, FIRE.ray_rate_per_mm) == n_rays
 
 
+@pytest.mark.parametrize(("rate", "n_rays"), [(0.0025, [5, 3, 5, 3]), (0.002, [5, 3, 5, 3]), (0.0021, [5, 3, 5, 3])])
+def test_the_rate_of_rays_is_a_number_of_single_precision(rate, n_rays):
+    # In single precision 0.002 is 0.0020000000949949026: 2 m make 4.00000019 rays, which are 5, and 1 m makes 3.
+    assert float(np.float32(0.002)) * 2000 > 4
+    outline = rectangle(0, 0, 2000, 1000)
+    walls = wall_table(footprints(outline), np.array([0], dtype=np.int32), FireParameters(ray_rate_per_mm=rate))
+    assert walls.n_rays.tolist() == n_rays == reference.n_rays(outline, rate)
+
+
 def test_a_repeated_corner_changes_no_link():
     other = rectangle(14_000, 0, 10_000, 6000)
     plain = links_of(OPEN, other)

@@ -30,8 +30,8 @@ def wall_area_m2(outline: Outline) -> float:
 
 
 def n_rays(outline: Outline, rays_per_mm: float) -> list[int]:
-    """Return how many rays each wall sends."""
-    return [math.ceil(_length_mm(*wall) * rays_per_mm) for wall in walls(outline)]
+    """Return how many rays each wall sends; the rate is rounded to single precision."""
+    return [math.ceil(_length_mm(*wall) * float(np.float32(rays_per_mm))) for wall in walls(outline)]
 
 
 def holds(outline: Outline, x: float, y: float) -> bool:
