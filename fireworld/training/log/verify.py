@@ -12,8 +12,8 @@ from fireworld.errors import LogError, TrainingError, expected
 from fireworld.executors import Workers, threads
 from fireworld.policy.teams.team import Team, read_team
 from fireworld.scenario import Scenario
-from fireworld.training.log.difference import AnyTraining, TrainingDifference, compare_trainings
-from fireworld.training.log.reader import Part, TrainingLog, open_training
+from fireworld.training.log.difference import TrainingDifference, compare_trainings
+from fireworld.training.log.reader import AnyTraining, Part, TrainingLog, opened
 from fireworld.training.log.records import TrainingHeader
 from fireworld.training.method import Method, Report, Trainer
 
@@ -139,18 +139,20 @@ def verify_training(
         LogError: the log cannot be read.
         TrainingError: the team is not that of the log.
     """
-    opened = log if isinstance(log, TrainingLog) else open_training(log)
-    if not len(opened):
-        raise LogError(f"{opened.path}: it holds no {opened.header.unit}s; there is nothing to verify")
-    digest = opened.team().digest if team is None else check_team(opened, read_team(Path(team))[0], source=str(team))
-    n_parts = None if opened.done else len(opened)
-    again = TrainedAgain(opened.trainer, opened.header, threads(jobs), n_parts=n_parts)
-    difference = compare_trainings(opened, again, names=(str(opened.path), "again"), on_part=on_part)
+    training = opened(log)
+    if not len(training):
+        raise LogError(f"{training.path}: it holds no {training.header.unit}s; there is nothing to verify")
+    digest = (
+        training.team().digest if team is None else check_team(training, read_team(Path(team))[0], source=str(team))
+    )
+    n_parts = None if training.done else len(training)
+    again = TrainedAgain(training.trainer, training.header, threads(jobs), n_parts=n_parts)
+    difference = compare_trainings(training, again, names=(str(training.path), "again"), on_part=on_part)
     return TrainingVerification(
-        name=str(opened.path),
-        digest=opened.digest,
+        name=str(training.path),
+        digest=training.digest,
         team_digest=digest,
-        n_parts=len(opened),
-        unit=opened.header.unit,
+        n_parts=len(training),
+        unit=training.header.unit,
         difference=None if difference.same else difference,
     )

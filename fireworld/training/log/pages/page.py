@@ -23,9 +23,8 @@ from fireworld.records import Array
 from fireworld.scenario import scenario_names
 from fireworld.training.curriculum import curriculum_names, find_curriculum
 from fireworld.training.log.course import Course, course_of, opening
-from fireworld.training.log.difference import AnyTraining
 from fireworld.training.log.pages.view import TABLES_HELP, names_of, open_trainings
-from fireworld.training.log.reader import TrainingLog
+from fireworld.training.log.reader import AnyTraining, TrainingLog
 from fireworld.training.log.records import Episode
 
 if TYPE_CHECKING:
