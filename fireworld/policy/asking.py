@@ -241,6 +241,8 @@ def _action_index(action: Any) -> int | None:
     """Return the index of an action given by its name or index; None if there is no such action."""
     if isinstance(action, str):
         return ACTION_NAMES.index(action) if action in ACTION_NAMES else None
+    if isinstance(action, np.bool_):  # older versions of numpy take it for an index
+        return None
     try:
         index = operator.index(action)
     except TypeError:
