@@ -142,13 +142,15 @@ def _check_comparable(a: Trained, b: Trained, names: tuple[str, str]) -> None:
 
 
 def _header(a: Trained, b: Trained) -> dict[str, tuple[Any, Any]]:
-    """Return what was asked for differently."""
+    """Return what was asked for differently; of the simulators, where both logs know theirs."""
+    both_know = bool(a.header.simulator_digest and b.header.simulator_digest)
     values = [
         {
             **one.method.as_dict(),
             "seed": one.header.seed,
             "curriculum": f"{one.header.curriculum} ({one.header.curriculum_digest[:12]})",
             "fireworld": one.header.fireworld_version,
+            **({"simulator": one.header.simulator_digest[:12]} if both_know else {}),
         }
         for one in (a, b)
     ]

@@ -39,6 +39,8 @@ class TrainingHeader:
     fireworld_version: str
     unit: str
     """What a part of the training is: an episode, a generation."""
+    simulator_digest: str = ""
+    """Of the sources of all that computes a run, "" where nobody wrote it down."""
     attachments: Mapping[str, bytes] = field(default_factory=dict)
     """curriculum.json, method.json, scenarios/NUMBER-NAME.yaml of all that is learned in, cities/SHA256.json."""
 
