@@ -293,3 +293,13 @@ def test_it_imports_nothing_before_a_test_asks():
 def test_pytest_finds_it(pytestconfig):
     """Installed with fireworld, not only imported by these tests."""
     assert pytestconfig.pluginmanager.get_plugin("fireworld").__name__ == "fireworld.pytest_plugin"
+
+
+def test_a_policy_that_changes_its_world_fails_and_is_not_stored(project):
+    project.makepyfile(test_mine=ONE)
+    line = "        return Decision(Action.NEAREST_TO_ME)"
+    assert line in POLICY
+    project.makepyfile(mine=POLICY.replace(line, f"        observation.world.fire.energy.base[:] = 0.0\n{line}"))
+    out = run(project, UPDATE, outcome={"failed": 1})
+    out.fnmatch_lines(["*policy mine:Policy: seed 3: expected decisions that lead to its outcome by themselves, *"])
+    assert not (project.path / "recordings").exists()
