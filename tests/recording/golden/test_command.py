@@ -414,3 +414,28 @@ def test_an_update_that_was_killed_is_finished_by_another(kept, golden, change_p
     text = (kept / "REASONS.md").read_text()
     assert text.count("* Easier.") == 1
     assert text.count("  * quick-mine-Policy: ") == 1
+
+
+def test_goldens_are_listed_and_removed(kept, golden):
+    (kept / "gone.txt").write_bytes((kept / "quick-easiest.txt").read_bytes())
+    (kept / "notes.txt").write_text("not of a golden\n")
+    (kept / "new.mcap.partial").write_bytes(b"")
+    (kept / "bad.mcap").write_bytes(b"no log")
+    done = golden("list")
+    assert done.code == 0
+    assert [line.split()[:4] for line in done.out.splitlines()[2:5]] == [
+        ["bad", "-", "-", "0"],
+        ["quick-easiest", "quick", "easiest", "1"],
+        ["quick-mine-Policy", "quick", "mine:Policy", "1"],
+    ]
+    assert "bad.mcap" in done.out
+    assert done.out.count(": left over; fireworld golden remove --leftovers") == 2
+    found = json.loads(golden("list", "--json").out)
+    assert [Path(path).name for path in found["leftovers"]] == ["gone.txt", "new.mcap.partial"]
+    assert [len(one["digest"]) for one in found["goldens"]] == [0, 64, 64]
+    done = golden("remove", "bad", "quick-easy")
+    assert (done.code, "try quick-easiest" in done.err) == (2, True)
+    assert golden("remove").code == 2
+    assert golden("remove", "bad", "quick-easiest", "--leftovers").code == 0
+    assert sorted(contents(kept)) == ["notes.txt", "quick-mine-Policy.mcap", "quick-mine-Policy.txt"]
+    assert golden("remove", "--leftovers").out == "nothing is left over\n"
