@@ -9,7 +9,7 @@ PICTURE := recordings/picture-
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help install demo check test static check-format check-lint check-types check-imports check-tests format docs pictures fuzz bench check-teams clean
+.PHONY: help install demo check test static check-format check-lint check-types check-imports check-tests format docs oldest pictures fuzz bench check-teams clean
 
 help:  ## List these targets.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -54,6 +54,16 @@ check-imports: install  ## Check that imports go down only.
 check-tests: install  ## Run all tests; PYTEST=... are further options of pytest.
 	$(BIN)/python -m pytest --numprocesses $(WORKERS) $(PYTEST)
 
+# The lowest versions that pyproject.toml allows. Pages of the docs are as the newest libraries write them.
+oldest: .venv-oldest/.installed  ## Run the tests of everything but docs and packages with the oldest libraries, in a .venv-oldest.
+	.venv-oldest/bin/python -m pytest --numprocesses $(WORKERS) --ignore tests/docs --ignore tests/installed $(PYTEST)
+
+.venv-oldest/.installed: pyproject.toml constraints-oldest.txt
+	$(PYTHON) -m venv .venv-oldest
+	PIP_CONSTRAINT=constraints-oldest.txt .venv-oldest/bin/python -m pip install --quiet --editable '.[view,film,archive]' \
+		hypothesis import-linter protobuf pytest pytest-xdist scipy
+	touch $@
+
 format: install  ## Format the code and fix what the linter can fix.
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
@@ -92,6 +102,6 @@ check-teams: install  ## Train the teams that come with fireworld again; they mu
 	$(BIN)/python -m benchmarks.shipped
 
 clean:  ## Remove what the other targets made, .venv too.
-	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist build reports
+	rm -rf .venv .venv-oldest .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist build reports
 	rm -f $(DEMO).mcap $(DEMO).mcap.partial $(DEMO).rrd $(PICTURE)*.mcap
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 UPDATE: Final = "--fireworld-update"
 FOLDER_INI: Final = "fireworld_recordings"
 STORED: Final = "fireworld-stored"
+COMPARED: Final = "fireworld-compared"
 NAME_MAX: Final = 150
 
 
@@ -46,6 +47,37 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.write_sep("=", f"fireworld: {len(stored)} recordings stored")
         for line in stored:
             terminalreporter.write_line(str(line))
+    unused = [] if _is_selection(terminalreporter) else _unused(reports)
+    if unused and terminalreporter.config.getoption(UPDATE):
+        for path in unused:
+            path.unlink()
+            path.with_suffix(".txt").unlink(missing_ok=True)
+        terminalreporter.write_sep("=", f"fireworld: {len(unused)} recordings removed, which no test uses")
+    elif unused:
+        terminalreporter.write_sep("=", f"fireworld: {len(unused)} recordings that no test uses; {UPDATE} removes them")
+    for path in unused:
+        terminalreporter.write_line(_shown(path))
+
+
+def _is_selection(terminalreporter: pytest.TerminalReporter) -> bool:
+    """Return whether tests of a file may have been left out, skipped or broken off, which may use recordings.
+
+    Where pytest-xdist shares tests out nobody knows which ones were left out.
+    """
+    stats, config = terminalreporter.stats, terminalreporter.config
+    some = any("::" in str(word) for word in config.invocation_params.args)
+    some = some or bool(config.getoption("keyword") or config.getoption("markexpr") or config.getoption("maxfail"))
+    some = some or bool(config.getoption("numprocesses", None))
+    return some or any(stats.get(key) for key in ("deselected", "skipped", "failed", "error", "xfailed"))
+
+
+def _unused(reports: Sequence[pytest.TestReport]) -> list[Path]:
+    """Return the recordings of the files of tests that ran which no test of theirs has compared or stored."""
+    compared = {str(value) for report in reports for key, value in report.user_properties if key == COMPARED}
+    files = {Path(name).name.split("-", 1)[0] for name in compared}
+    folders = {Path(name).parent for name in compared}
+    found = (path for folder in sorted(folders) for path in sorted(folder.glob("*.mcap")))
+    return [path for path in found if path.name.split("-", 1)[0] in files and str(path) not in compared]
 
 
 @pytest.fixture(scope="session")
@@ -111,8 +143,8 @@ class Recorder:
         """
         from fireworld.errors import FireworldError
         from fireworld.policy.names import find_policy
+        from fireworld.recording.golden.again import run_again
         from fireworld.recording.golden.spec import make_spec, prepare_golden
-        from fireworld.recording.record import run_prepared
 
         path = self._path(name)
         try:
@@ -127,7 +159,7 @@ class Recorder:
                 tolerances=tolerances,
                 ignore=ignore,
             )
-            fresh = run_prepared(prepare_golden(spec, path.parent, policy=named, cities=self._cities))
+            fresh = run_again(prepare_golden(spec, path.parent, policy=named, cities=self._cities))
             self._compare(path, fresh)
         except FireworldError as error:
             raise _failure(str(error)) from None
@@ -179,6 +211,7 @@ class Recorder:
         if path in self._paths:
             raise _failure("recording: a second one in a test needs a name of its own: recording(..., name=...)")
         self._paths.add(path)
+        self._node.user_properties.append((COMPARED, str(path)))
         if not (self._update or path.exists()):
             raise _failure(f"{_shown(path)}: there is no such recording; run with {UPDATE} to store it")
         return path

@@ -109,6 +109,8 @@ class RunHeader:
     n_steps_max: int
     forked_from: str = ""
     """Digest and step of the recording this run branched off, "" for a run of its own."""
+    simulator_digest: str = ""
+    """Of the sources of all that computed the run, "" where nobody wrote it down."""
     attachments: Mapping[str, bytes] = field(default_factory=dict)
     """Files that a replay needs, by name: scenario.yaml always, city.json, policy.npz where used."""
 

@@ -15,6 +15,7 @@ from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.options import seed_option, steps_option
 from fireworld.cli.progress import bar
 from fireworld.cli.tables import print_table
+from fireworld.errors import one_line
 
 if TYPE_CHECKING:
     from fireworld.recording.golden.check import GoldenResult
@@ -37,6 +38,7 @@ def command() -> None:
     fireworld golden add quick --train --set n_episodes_max=20    store a training
     fireworld golden check                                        do all again and compare
     fireworld golden update --reason "Brigades refill earlier."   accept what changed
+    fireworld golden list, fireworld golden remove NAME           see what is there, remove it
 
     A golden is two files: NAME.mcap, the recording, which holds what to run or to train, and NAME.txt, what happened
     in it, to be read in reviews. Both belong under version control.
@@ -80,6 +82,53 @@ def check(
     else:
         _show(results, keep=keep)
     context.exit(max(EXIT_CODES[result.result] for result in results))
+
+
+@command.command("list", short_help="List the goldens, and what is left over beside them.")
+@click.argument("folder", metavar="[DIR]", type=_DIRECTORY, default=FOLDER)
+@click.option("--json", "as_json", is_flag=True, help="Write JSON.")
+def list_(*, folder: Path, as_json: bool) -> None:
+    """List the goldens in DIR (recordings/golden if left out) without running them.
+
+    Below them are listed what killed commands left, and texts whose recording is gone; `fireworld golden remove
+    --leftovers` removes these.
+
+    Exit code: 0 listed, 2 there is none.
+    """
+    from fireworld.recording.golden.remove import leftovers_of, list_goldens
+
+    found, leftovers = list_goldens(folder), leftovers_of(folder)
+    if as_json:
+        known = {"goldens": [one.to_dict() for one in found], "leftovers": [str(path) for path in leftovers]}
+        click.echo(json.dumps(known, indent=2))
+        return
+    rows = [(one.name, one.what or "-", one.by or "-", str(one.seed), f"{one.n_bytes:,}") for one in found]
+    print_table(("golden", "scenario", "policy", "seed", "bytes"), rows, left=(0, 1, 2), whole=(0,))
+    for one in found:
+        if one.error:
+            click.echo(f"{one.name}: {one_line(one.error)}")
+    for path in leftovers:
+        click.echo(f"{one_line(str(path))}: left over; fireworld golden remove --leftovers")
+
+
+@command.command(short_help="Remove goldens, or what is left over beside them.")
+@click.argument("names", metavar="[NAME]...", nargs=-1)
+@click.option("--leftovers", is_flag=True, help="Remove what killed commands left, and texts without a recording.")
+@_folder_option
+def remove(*, names: tuple[str, ...], leftovers: bool, folder: Path) -> None:
+    """Remove the goldens named, each with its text, as after a test was renamed.
+
+    Exit code: 0 removed, 2 there is no such golden: nothing is removed then.
+    """
+    from fireworld.recording.golden.remove import remove_goldens
+
+    if not names and not leftovers:
+        raise click.UsageError("Missing argument 'NAME', or --leftovers.")
+    gone = remove_goldens(folder, names, leftovers=leftovers)
+    for path in gone:
+        click.echo(f"removed {one_line(str(path))}")
+    if not gone:
+        click.echo("nothing is left over")
 
 
 @command.command(short_help="Record those anew that changed, with the reason.")

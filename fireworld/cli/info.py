@@ -142,6 +142,7 @@ def _show(log: Log, summary: dict[str, Any]) -> None:
 
     from fireworld.errors import one_line
     from fireworld.outcome import QUANTITIES
+    from fireworld.version import simulator_version
 
     header, steps = summary["header"], summary["steps"]
     span = f"{steps['n']}, from {steps['first']} to {steps['last']}" if steps["n"] else "none"
@@ -150,7 +151,7 @@ def _show(log: Log, summary: dict[str, Any]) -> None:
         "state": summary["damage"] or "complete",
         "scenario": f"{header['scenario']} ({header['scenario_digest'][:12]}), seed {header['seed']}",
         "policy": f"{header['policy']} ({header['policy_digest'][:12]})",
-        "fireworld": header["fireworld_version"],
+        "fireworld": simulator_version(header["fireworld_version"], header["simulator_digest"]),
         "forked from": header["forked_from"],
         "digest": summary["digest"],
         "steps": f"{span}, of at most {header['n_steps_max']}; {summary['ending']}",

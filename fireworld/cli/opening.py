@@ -25,6 +25,7 @@ def open_trainings(paths: Sequence[Path], *, doing: str) -> list[TrainingLog]:
         UsageError: there are more than two.
         LogError: one is a training and the other is not.
     """
+    _check_number(paths)
     from fireworld_recorder.source import noun_of
 
     are = [noun_of(path) == "training" for path in paths]
@@ -33,8 +34,6 @@ def open_trainings(paths: Sequence[Path], *, doing: str) -> list[TrainingLog]:
     from fireworld.errors import LogError, expected
     from fireworld.training.log.reader import open_training
 
-    if len(paths) > 2:
-        raise click.UsageError(f"Expected one or two recordings, got {len(paths)}.")
     if not all(are):
         other = paths[are.index(False)]
         raise LogError(expected(str(other), "", "the log of a training, as the other one", "no training"))
@@ -53,8 +52,7 @@ def open_one_or_two(paths: Sequence[Path], *, doing: str) -> list[Log]:
         UsageError: there are more than two.
         LogError: one is not a log.
     """
-    if len(paths) > 2:
-        raise click.UsageError(f"Expected one or two recordings, got {len(paths)}.")
+    _check_number(paths)
     from fireworld_recorder import reader
 
     logs = [reader.open_log(path, partial=True) for path in paths]
@@ -62,3 +60,8 @@ def open_one_or_two(paths: Sequence[Path], *, doing: str) -> list[Log]:
         if log.damage is not None:
             click.echo(f"{path}: {log.damage}; {doing} {len(log.steps)} committed steps", err=True)
     return logs
+
+
+def _check_number(paths: Sequence[Path]) -> None:
+    if len(paths) > 2:
+        raise click.UsageError(f"Expected one or two recordings, got {len(paths)}.")

@@ -39,7 +39,8 @@ def bars(*columns: str, quiet: bool = False) -> Iterator[Progress]:
 
     console = Console(stderr=True)
     made = [_column(column) for column in columns]
-    with Progress(*made, console=console, transient=True, disable=quiet or not console.is_terminal) as progress:
+    console.quiet = quiet or not console.is_terminal  # or Rich 14 writes an empty line
+    with Progress(*made, console=console, transient=True, disable=console.quiet) as progress:
         yield progress
 
 

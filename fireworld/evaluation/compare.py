@@ -13,12 +13,13 @@ from fireworld.errors import ScenarioError, expected
 from fireworld.evaluation.comparison import ComparedPolicy, Comparison, find_metric
 from fireworld.evaluation.comparison_runs import ComparisonRuns, RunnablePolicy, runnable
 from fireworld.evaluation.paired import compare_outcomes
-from fireworld.evaluation.results import open_results, simulator_version
+from fireworld.evaluation.results import open_results
 from fireworld.executors import AnyExecutor, in_processes, workers_for
 from fireworld.interrupt import gentle_interrupt
 from fireworld.policy.names import note_on_team
 from fireworld.scenario import Scenario, load_scenario
 from fireworld.simulation.built import BuiltScenario, CityCache
+from fireworld.version import simulator_version
 
 TESTS: Final = ("test-1", "test-2", "test-3")
 N_SEEDS: Final = 100

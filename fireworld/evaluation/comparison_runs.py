@@ -12,7 +12,7 @@ from threading import Event
 from typing import Any, Final
 
 from fireworld.errors import PolicyError
-from fireworld.evaluation.results import Result, Results, RunKey, simulator_version
+from fireworld.evaluation.results import Result, Results, RunKey
 from fireworld.evaluation.runs import Outcomes, Row, row_of, run_compiled, run_step_by_step
 from fireworld.executors import AnyExecutor, Workers, n_cores, processes, threads, workers_for
 from fireworld.interrupt import Interrupted
@@ -21,6 +21,7 @@ from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.names import NamedPolicy, find_policy
 from fireworld.scenario import Scenario
 from fireworld.simulation.built import BuiltScenario, build_scenario
+from fireworld.version import simulator_version
 
 SAVE_EVERY_RUNS: Final = 100
 RUNS_WORTH_A_PROCESS: Final = 8  # a process takes about as long to start as these

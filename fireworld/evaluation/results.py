@@ -6,17 +6,14 @@ of the simulator; runs that agree in all four have the same outcome.
 
 from __future__ import annotations
 
-import hashlib
 import io
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
 from fireworld.errors import OutputError, expected
 from fireworld.evaluation.runs import KINDS, Row
 from fireworld.files import write_file
-from fireworld.version import __version__
 
 FORMAT: Final = "fireworld-results/1"
 KEYS: Final[dict[str, type]] = {
@@ -27,9 +24,6 @@ KEYS: Final[dict[str, type]] = {
 """The first columns: which run it is. `outcome.COLUMNS` follow: how it came out."""
 N_FIRST: Final = 14
 """Columns of the first version, none of which may be empty; a later one is, in a row that is older."""
-_SIMULATOR: Final = (
-    "city", "draws.py", "kernels", "parameters.py", "planning", "policy", "rewards.py", "scenario", "simulation"
-)  # fmt: skip
 
 
 @dataclass(frozen=True, order=True)
@@ -99,19 +93,6 @@ def open_results(path: Path | None) -> Results:
             raise OutputError(f"{path}: cannot be written: no folder {path.parent}")
         return Results(path)
     return Results(path, read_results(path))
-
-
-@lru_cache(maxsize=1)
-def simulator_version() -> str:
-    """Return the version with a digest of the sources of all that computes a run: "0.1.0+4a6f0c1d2e3b"."""
-    folder = Path(__file__).parents[1]
-    content = hashlib.sha256()
-    for name in _SIMULATOR:
-        place = folder / name
-        for path in sorted(place.rglob("*")) if place.is_dir() else [place]:
-            if path.suffix in {".py", ".npy"}:
-                content.update(path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
-    return f"{__version__}+{content.hexdigest()[:12]}"
 
 
 def read_results(path: Path) -> dict[RunKey, Result]:

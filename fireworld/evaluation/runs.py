@@ -11,12 +11,11 @@ from typing import Any, Final, get_type_hints
 
 import numpy as np
 
-from fireworld.errors import PolicyError, expected
 from fireworld.executors import Workers
 from fireworld.interrupt import Interrupted
 from fireworld.kernels.arrays import Array
 from fireworld.outcome import COLUMNS, Outcome
-from fireworld.policy.asking import begin, name_of
+from fireworld.policy.asking import begin, changed_its_world
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.protocol import Decision, Observation, Policy
 from fireworld.simulation.built import BuiltScenario
@@ -84,8 +83,7 @@ def run_step_by_step(built: BuiltScenario, policy: Policy, *, seed: int) -> Outc
     while not (again.terminated or again.truncated):
         again.step(decided)
     if row_of(again.outcome) != row_of(world.outcome) or _checksum(built) != before:
-        wanted = "decisions that lead to its outcome by themselves"
-        raise PolicyError(expected(f"policy {name_of(policy)}", f"seed {seed}", wanted, "a world that it has changed"))
+        raise changed_its_world(policy, seed)
     return world.outcome
 
 

@@ -90,7 +90,7 @@ def _shown(observation: Observation) -> Observation:
     return replace(observation, city=city, world=world, known_targets=read_only(observation.known_targets))
 
 
-def _is_ours(policy: Policy) -> bool:
+def is_ours(policy: Policy) -> bool:
     """Return whether a policy is fireworld's own: it changes nothing, and kernels want arrays as they are."""
     return type(policy).__module__.startswith("fireworld.") and not isinstance(policy, Adapted)
 
@@ -127,12 +127,12 @@ def begin(policy: Policy, city: CityArrays, *, n_brigades: int, seed: int) -> No
     """Let a policy prepare for a run; raise PolicyError if its own `begin` fails."""
     asked = complete(policy)
     with users_code(policy, "begin"):
-        asked.begin(city if _is_ours(asked) else read_only(city), n_brigades, seed)
+        asked.begin(city if is_ours(asked) else read_only(city), n_brigades, seed)
 
 
 def ask(policy: Policy, observation: Observation) -> Decision:
     """Return a policy's decision, checked and in plain Python values; PolicyError if it fails or makes no sense."""
-    if _is_ours(policy):
+    if is_ours(policy):
         return _checked(policy.decide(observation), policy, observation)
     try:
         with PRINTS_ASIDE:
@@ -170,6 +170,12 @@ def users_code(what: object, moment: str) -> Iterator[None]:
         raise
     except BaseException as error:
         raise _failure(what, moment, error) from error
+
+
+def changed_its_world(policy: object, seed: int) -> PolicyError:
+    """Return the error of a policy whose decisions, in a world that it has never seen, lead elsewhere."""
+    wanted = "decisions that lead to its outcome by themselves"
+    return PolicyError(expected(f"policy {name_of(policy)}", f"seed {seed}", wanted, "a world that it has changed"))
 
 
 def name_of(policy: object) -> str:
@@ -241,6 +247,8 @@ def _action_index(action: Any) -> int | None:
     """Return the index of an action given by its name or index; None if there is no such action."""
     if isinstance(action, str):
         return ACTION_NAMES.index(action) if action in ACTION_NAMES else None
+    if isinstance(action, np.bool_):  # older versions of numpy take it for an index
+        return None
     try:
         index = operator.index(action)
     except TypeError:

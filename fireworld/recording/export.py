@@ -49,9 +49,9 @@ def export(
         raise OutputError("export: pyarrow is not installed; try pip install 'fireworld[archive]'")
     if is_training(log):
         from fireworld.training.log.export import export_training
-        from fireworld.training.log.reader import TrainingLog, open_training
+        from fireworld.training.log.reader import opened
 
-        training = log if isinstance(log, TrainingLog) else open_training(log, partial=True)
+        training = opened(log, partial=True)
         return export_training(training, Path(folder), tables=tables, force=force, on_part=lambda: on_step(None))
     for name in tables or ():
         find_table(name)

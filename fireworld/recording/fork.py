@@ -35,7 +35,7 @@ from fireworld.simulation.observer import Observer
 from fireworld.simulation.prepared_run import PreparedRun
 from fireworld.simulation.world import World
 from fireworld.training.log.episode_run import LEARNING_ATTACHMENT
-from fireworld.version import __version__
+from fireworld.version import __version__, simulator_digest
 
 FORK_ATTACHMENT: Final = "fork.json"
 OF_POLICY: Final = (TEAM_ATTACHMENT, LEARNING_ATTACHMENT)
@@ -280,6 +280,7 @@ def _header(run: StoredRun, change: ForkChange, step: int) -> RunHeader:
         policy=named.name,
         policy_digest=named.digest,
         fireworld_version=__version__,
+        simulator_digest=simulator_digest(),
         forked_from=f"{run.digest}:{step}",
         attachments=attachments
         | dict(named.attachments)

@@ -16,7 +16,7 @@ from fireworld.simulation.city_arrays import city_arrays
 from fireworld.simulation.observer import city_record
 from fireworld.simulation.placement import Placement, attachments, place, scenario_plan
 from fireworld.simulation.world import Start, World, prepare_start
-from fireworld.version import __version__
+from fireworld.version import __version__, simulator_digest
 
 
 @dataclass(frozen=True)
@@ -64,6 +64,7 @@ class BuiltScenario:
             policy=policy,
             policy_digest=policy_digest,
             fireworld_version=__version__,
+            simulator_digest=simulator_digest(),
             n_steps_max=n_steps_max,
             attachments=attachments(self.scenario),
         )

@@ -19,6 +19,9 @@ NAMED: Final = (*ALWAYS, CityRecord)
 """Topics whose numbers all have names; to others later versions may add some."""
 BUILDING: Final = frozenset({"link_building", "refuge_building", "civilian_building"})
 """Fields that hold indices of buildings, -1 for none."""
+PLACES: Final = frozenset({"x_m", "y_m", "outline_x_m", "outline_y_m", "node_x_m", "node_y_m"})
+PLACE_MAX_M: Final = 1e8
+"""Farther away is nothing: more than twice around the earth."""
 
 
 def counts_of(city: CityRecord) -> dict[str, int]:
@@ -87,11 +90,18 @@ def check_field(kind: type[Any], item: Field, value: Any, counts: Mapping[str, i
     if not len(value):
         return
     if item.wire in _FLOATS:
-        # a sum is infinite or no number if one of them is, and takes half the time
-        if not math.isfinite(value.sum()) and not np.isfinite(value).all():
-            raise LogError(f"{kind.topic}: {item.name}: a value is no number")
+        _check_numbers(kind, item, value)
         return
     if item.names and kind in NAMED and not -1 <= int(value.min()) <= int(value.max()) < len(item.names):
         raise LogError(f"{kind.topic}: {item.name}: {int(value.max())} is none of {len(item.names)} names")
     if item.name in BUILDING and not -1 <= int(value.min()) <= int(value.max()) < counts["building"]:
         raise LogError(f"{kind.topic}: {item.name}: a building that there is not")
+
+
+def _check_numbers(kind: type[Any], item: Field, value: Any) -> None:
+    """Raise LogError if a column holds what is no number, or no place on earth."""
+    # a sum is infinite or no number if one of them is, and takes half the time
+    if not math.isfinite(value.sum()) and not np.isfinite(value).all():
+        raise LogError(f"{kind.topic}: {item.name}: a value is no number")
+    if item.name in PLACES and not -PLACE_MAX_M <= value.min() <= value.max() <= PLACE_MAX_M:
+        raise LogError(f"{kind.topic}: {item.name}: a place more than {PLACE_MAX_M:g} m away")

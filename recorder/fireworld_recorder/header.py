@@ -17,6 +17,8 @@ from fireworld_recorder.kind import NOUNS, RUN, LogKind
 PROFILE: Final = "fireworld"
 _ATTACHMENT: Final = "attachment:"
 _DIGEST_SHOWN: Final = 12
+_MAY_LACK: Final = ("simulator_digest",)
+"""What older logs do not have."""
 
 
 class ForeignError(LogError):
@@ -84,9 +86,12 @@ def from_metadata(metadata: Mapping[str, str], attachments: Mapping[str, Sequenc
 
 
 def header_differences(a: RunHeader, b: RunHeader) -> dict[str, tuple[str | int, str | int]]:
-    """Return what the runs were asked to do differently; attachments are covered by the digests."""
+    """Return what the runs were asked to do differently; attachments are covered by the digests.
+
+    Where one log does not know its simulator, nothing is said of the other's.
+    """
     pairs = {item.name: (getattr(a, item.name), getattr(b, item.name)) for item in _fields(RUN)}
-    return {name: pair for name, pair in pairs.items() if pair[0] != pair[1]}
+    return {name: pair for name, pair in pairs.items() if pair[0] != pair[1] and not (name in _MAY_LACK and "" in pair)}
 
 
 def check_same_scenario(a: RunHeader, b: RunHeader, *, names: tuple[str, str]) -> None:

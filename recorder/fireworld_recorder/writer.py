@@ -74,7 +74,7 @@ class StepFile:
     ) -> None:
         self.path, self.kind = path, kind
         self.partial = path.with_name(path.name + (scratch_suffix or PARTIAL_SUFFIX))
-        self._folder = Path.cwd()  # a policy may change it
+        self._final, self._scratch = path.absolute(), self.partial.absolute()  # a policy may change the current folder
         self.n_commits = 0
         self._force = force
         self._keep_partial = not scratch_suffix
@@ -124,16 +124,21 @@ class StepFile:
             self._writer.finish()
             os.fsync(self._file.fileno())
             self._file.close()
-            check_output(self._folder / self.path, force=self._force)
-            (self._folder / self.partial).replace(self._folder / self.path)
+            check_output(self._final, force=self._force)
+            self._scratch.replace(self._final)
             self._open = False
 
     def keep_partial(self) -> None:
-        """From now on this is the partial log of its path, and is kept: what it took the place of was copied."""
+        """From now on this is the partial log of its path, and is kept: what it took the place of was copied.
+
+        Raises:
+            OutputError: another process is writing the partial log.
+        """
         partial = self.path.with_name(self.path.name + PARTIAL_SUFFIX)
-        with self._guard():
-            (self._folder / self.partial).replace(self._folder / partial)
-        self.partial, self._keep_partial = partial, True
+        place = self._final.with_name(partial.name)
+        with self._guard(), _nobody_writes(place):
+            self._scratch.replace(place)
+        self.partial, self._scratch, self._keep_partial = partial, place, True
 
     def abort(self) -> None:
         """Stop here; the partial file stays if it holds a step."""
@@ -143,7 +148,7 @@ class StepFile:
         with contextlib.suppress(OSError):  # a full disk complains again; what it could not hold is lost anyway
             self._file.close()
         if not self._holds_steps:
-            (self._folder / self.partial).unlink(missing_ok=True)
+            self._scratch.unlink(missing_ok=True)
 
     def __enter__(self) -> Self:
         return self
@@ -192,16 +197,30 @@ def _begin_file(path: Path, *, replace: bool) -> IO[bytes]:
     Raises:
         OutputError: it is no regular file, or another process is writing it.
     """
-    if replace and (path.exists() or path.is_symlink()):
-        if path.is_symlink() or not path.is_file():
-            raise OutputError(expected(str(path), "", "a regular file, or none", "a link or a device"))
-        with path.open("rb") as old:
-            if not _lock(old):
-                raise OutputError(f"{path}: another process is writing it; try another name, or wait for it")
-            path.unlink()
+    if replace:
+        with _nobody_writes(path):
+            path.unlink(missing_ok=True)
     file = path.open("xb")
     _lock(file)
     return file
+
+
+@contextlib.contextmanager
+def _nobody_writes(path: Path) -> Iterator[None]:
+    """Keep a file from other writers while it is replaced; there may be none.
+
+    Raises:
+        OutputError: it is no regular file, or another process is writing it.
+    """
+    if path.is_symlink() or (path.exists() and not path.is_file()):
+        raise OutputError(expected(str(path), "", "a regular file, or none", "a link or a device"))
+    if not path.exists():
+        yield
+        return
+    with path.open("rb") as old:
+        if not _lock(old):
+            raise OutputError(f"{path}: another process is writing it; try another name, or wait for it")
+        yield
 
 
 def _lock(file: IO[bytes]) -> bool:

@@ -9,8 +9,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from fireworld import version
 from fireworld.errors import OutputError
-from fireworld.evaluation import results as results_file
 from fireworld.evaluation.results import KEYS, Result, Results, RunKey, open_results, read_results
 from fireworld.outcome import COLUMNS
 from fireworld.policy.kernel import always
@@ -148,5 +148,5 @@ def test_the_version_follows_all_that_computes_a_run():
     needed |= graph.find_upstream_modules("fireworld.planning.planner")
     parts = {name.split(".")[1] for name in needed - {"fireworld"}}
     no_run = {"errors", "evaluation", "executors", "interrupt", "outcome", "records", "version"}
-    assert parts - no_run <= {name.removesuffix(".py") for name in results_file._SIMULATOR}
-    assert results_file.simulator_version().startswith("0.")
+    assert parts - no_run <= {name.removesuffix(".py") for name in version._SIMULATOR}
+    assert version.simulator_version().startswith("0.")

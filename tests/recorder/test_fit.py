@@ -7,6 +7,7 @@ import pytest
 from fireworld_recorder.reader import open_log
 from fireworld_recorder.writer import LogWriter
 
+import fireworld as fw
 from fireworld.errors import LogError
 from tests.recorder import synthetic
 
@@ -19,6 +20,7 @@ CHANGES = [
     ("brigades", "activity", lambda column: np.full(len(column), 17, dtype=np.uint8), "17 is none of 6 names"),
     ("civilians", "hp", lambda column: column[:0], "0 entries, where the city has"),
     ("events", "entity", lambda column: np.zeros(len(column) + 3, dtype=np.int32), "entries, where others have"),
+    ("brigades", "x_m", lambda column: np.full(len(column), -1e300), r"a place more than 1e\+08 m away"),
     ("score", "score", lambda _: float("inf"), "inf is no number"),
 ]
 
@@ -57,3 +59,33 @@ def test_a_city_that_does_not_fit_itself(tmp_path):
                 log.write(step)
         with pytest.raises(LogError, match=f"a.mcap: /city: {message}"):
             open_log(tmp_path / "a.mcap")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("field", "value"), [("action", 77), ("action", -9), ("target", 10**6), ("target", -7)])
+def test_choices_of_another_version_are_shown(tmp_path, fireworld, field, value):
+    """Later versions may add actions; a target that there is not is none."""
+    log = fw.run("quick", policy="chief", steps=6, record=tmp_path / "a.mcap")
+    path = tmp_path / "other.mcap"
+    with LogWriter(path, log.header, log.city) as writer:
+        for step in log:
+            column = np.array(getattr(step.decisions, field))
+            column[:1] = value
+            writer.write(dataclasses.replace(step, decisions=dataclasses.replace(step.decisions, **{field: column})))
+    for words in (
+        ("info", path),
+        ("diff", tmp_path / "a.mcap", path, "--html", tmp_path / "d.html"),
+        ("report", path, "-o", tmp_path / "r.html"),
+        ("report", tmp_path / "a.mcap", path, "-o", tmp_path / "two.html"),
+        ("render", path, "-o", tmp_path / "p.png"),
+        ("view", path, "--save", tmp_path / "v.rrd"),
+        ("export", path, "--parquet", tmp_path / "tables"),
+        ("verify", path),
+        ("explain", tmp_path / "a.mcap", path),
+        ("fork", path, "--at", 5, "--policy", "chief"),
+    ):
+        done = fireworld(*words)
+        assert "internal error" not in done.err, words
+        assert done.code == (1 if words[0] in {"diff", "verify"} else done.code), (words, done)
+    assert (tmp_path / "v.rrd").exists()
+    assert (tmp_path / "p.png").exists()

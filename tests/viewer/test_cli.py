@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner, Result
+from fireworld_recorder import source
 from fireworld_recorder.diff import compare
 from fireworld_viewer.rerun_view import app
 
@@ -49,6 +50,7 @@ def logs(small: MemoryRecording, slower: MemoryRecording, monkeypatch: pytest.Mo
         return known[path.name]
 
     monkeypatch.setattr(reader, "open_log", open_log)
+    monkeypatch.setattr(source, "noun_of", lambda _: "run")
     return SimpleNamespace(small=small, slower=slower)
 
 

@@ -61,6 +61,12 @@ ACTION_RGB: Final[tuple[Rgb, ...]] = (
 """By index into records.ACTION_NAMES: every eye can distinguish them."""
 NO_CHOICE_RGB: Final[Rgb] = (70, 74, 80)
 
+
+def action_rgb(action: int) -> Rgb:
+    """Return the color of an action; of one that only a later version knows, that of no choice."""
+    return ACTION_RGB[action] if action < len(ACTION_RGB) else NO_CHOICE_RGB
+
+
 MARK_RGB: Final[Rgb] = (255, 196, 0)
 
 AIR_RGB: Final[tuple[Rgb, ...]] = ((96, 20, 150), (232, 64, 160), (255, 236, 246))

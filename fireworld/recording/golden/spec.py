@@ -19,7 +19,7 @@ from fireworld.records import RunHeader
 from fireworld.scenario import load_scenario, scenario_names
 from fireworld.simulation.built import CityCache
 from fireworld.simulation.prepared_run import PreparedRun, prepare_run
-from fireworld.version import __version__
+from fireworld.version import __version__, simulator_digest
 
 SPEC_ATTACHMENT: Final = "golden.json"
 """Name of the attachment of a golden recording that holds its spec."""
@@ -140,7 +140,9 @@ def _prepare_recorded(spec: GoldenSpec, recorded: RunHeader | None) -> PreparedR
     named = refind_policy(recorded)
     built = build_recorded(recorded)
     world = built.world(seed=spec.seed, n_steps_max=spec.steps)
-    header = replace(recorded, policy_digest=named.digest, fireworld_version=__version__)
+    header = replace(
+        recorded, policy_digest=named.digest, fireworld_version=__version__, simulator_digest=simulator_digest()
+    )
     return PreparedRun(header=header, city=built.city_record(), start=world, policy=named.policy)
 
 

@@ -24,7 +24,7 @@ from fireworld.training.log.records import TrainingHeader
 from fireworld.training.log.verify import TrainedAgain
 from fireworld.training.log.writer import TrainingWriter, header_of
 from fireworld.training.methods import find_method
-from fireworld.version import __version__
+from fireworld.version import __version__, simulator_digest
 
 
 class TrainingSpec(msgspec.Struct, frozen=True, kw_only=True):
@@ -109,7 +109,7 @@ def prepare_training(
     if not spec.curriculum:
         if recorded is None:
             raise LogError(expected(SPEC_ATTACHMENT, "curriculum", "a name or a file", "none"))
-        header = replace(recorded.header, fireworld_version=__version__)
+        header = replace(recorded.header, fireworld_version=__version__, simulator_digest=simulator_digest())
         return TrainedAgain(recorded.trainer, header, workers, n_parts=None if recorded.done else len(recorded))
     shipped = spec.curriculum in {*curriculum_names(), *scenario_names()}
     curriculum = find_curriculum(spec.curriculum if shipped else path_to(folder, spec.curriculum))

@@ -13,12 +13,12 @@ from fireworld_recorder.reader import open_log
 from fireworld.errors import FireworldError, LogError, OutputError, expected
 from fireworld.files import write_file
 from fireworld.interrupt import gentle_interrupt
+from fireworld.recording.golden.again import run_again
 from fireworld.recording.golden.check import FOLDER, GoldenResult, check_goldens, compare_golden
 from fireworld.recording.golden.spec import GoldenSpec, make_spec, prepare_golden, spec_of
 from fireworld.recording.golden.store import SUFFIX, make_folder, store_golden, store_text
 from fireworld.recording.golden.training import TrainingSpec, make_training_spec, prepare_training, training_spec_of
 from fireworld.recording.inputs import is_training
-from fireworld.recording.record import run_prepared
 from fireworld.recording.run import Run
 from fireworld.training.log.reader import open_training
 from fireworld.training.log.verify import TrainedAgain
@@ -68,7 +68,7 @@ def add_golden(
     """
     path = _free_path(folder, name if name is not None else _default_name(scenario, policy, seed))
     spec = make_spec(folder, scenario=scenario, policy=policy, seed=seed, steps=steps, settings=settings)
-    fresh = run_prepared(prepare_golden(spec, folder))
+    fresh = run_again(prepare_golden(spec, folder))
     make_folder(folder)
     with gentle_interrupt():
         store_golden(path, fresh)
@@ -202,6 +202,13 @@ def _default_name(scenario: str | Path, policy: str, seed: int) -> str:
 
 
 def _reasons(path: Path, reason: str, changed: Sequence[GoldenResult]) -> str:
-    """Return the list of reasons with one more entry: the reason, and where each golden first differs."""
+    """Return the list of reasons with one more entry: the reason, and where each golden first differs.
+
+    Where the last entry has this reason it is the same update, which was killed: what it lacks is added to it.
+    """
     before = path.read_text(encoding="utf-8") if path.is_file() else REASONS_TITLE
-    return before + "".join([f"\n* {reason}\n", *(f"  * {result.name}: {result.sentence}\n" for result in changed)])
+    head, lines = f"\n* {reason}\n", [f"  * {result.name}: {result.sentence}\n" for result in changed]
+    last = before.rpartition("\n* ")[2]
+    if not f"\n* {last}".startswith(head):
+        return before + head + "".join(lines)
+    return before + "".join(line for line in lines if line not in last.splitlines(keepends=True))

@@ -36,7 +36,16 @@ td.text { overflow-wrap: anywhere; }
 _CURVES: Final = ("score", "n_burning", "n_burnt_out")
 _CURVES_CAPTION: Final = "Score, burning and burnt-out buildings of both, and buildings that differ."
 _CAPTIONS: Final = {"a": "A", "b": "B", "difference": "What differs between the two maps, and out of sight"}
-_HEADER: Final = ("scenario", "scenario_digest", "seed", "policy", "policy_digest", "fireworld_version", "forked_from")
+_HEADER: Final = (
+    "scenario",
+    "scenario_digest",
+    "seed",
+    "policy",
+    "policy_digest",
+    "fireworld_version",
+    "simulator_digest",
+    "forked_from",
+)
 
 
 def difference_page(compared: Difference) -> str:

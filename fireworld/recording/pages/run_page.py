@@ -24,6 +24,7 @@ from fireworld.html_page import compared_row, html_figure, html_page, html_table
 from fireworld.outcome import QUANTITIES
 from fireworld.recording.inputs import AnyRun, open_one_or_two, run_name
 from fireworld.records import ACTION_NAMES, EVENT_KINDS, StoredRun
+from fireworld.version import simulator_version
 
 _STYLE: Final = """
 pre { background: #f0ede6; padding: .7rem 1rem; overflow-x: auto; font-size: 13px; }
@@ -208,7 +209,7 @@ def _repetition(log: StoredRun, name: str) -> Iterator[str]:
         "seed": str(header.seed),
         "forked from": header.forked_from,
         "digest of the run": log.digest,
-        "recorded by": f"fireworld {header.fireworld_version}",
+        "recorded by": f"fireworld {simulator_version(header.fireworld_version, header.simulator_digest)}",
         "files in the recording": ", ".join(f"{file} ({len(data)} bytes)" for file, data in header.attachments.items()),
     }
     yield f"<h3>{escape(name)}</h3>"

@@ -28,7 +28,7 @@ from fireworld.records import CityRecord, RunHeader, StepRecord
 from fireworld.simulation.built import BuiltScenario
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.state import fresh_learner
-from fireworld.training.log.reader import TrainingLog, open_training
+from fireworld.training.log.reader import AnyTraining, TrainingLog, opened
 from fireworld.training.log.records import TERM_NAMES, Episode
 from fireworld.training.method import COUNT_MAX, Trainer
 from fireworld.training.methods.sarsa import RULES, Sarsa, SarsaTrainer
@@ -162,7 +162,7 @@ def episode_run(trainer: SarsaTrainer, episode: Episode, tables: Array, visits: 
 
 
 def replay_episode(
-    log: str | os.PathLike[str] | TrainingLog,
+    log: AnyTraining,
     scenario: str | int,
     episode: int,
     output: str | os.PathLike[str],
@@ -185,12 +185,12 @@ def replay_episode(
         LogError: there is no such episode, or this fireworld computes another one.
         OutputError: the output cannot be written.
     """
-    opened = log if isinstance(log, TrainingLog) else open_training(log, partial=True)
-    return _replay(opened, opened.position(scenario, episode), path_of("output", output), force=force)
+    training = opened(log, partial=True)
+    return _replay(training, training.position(scenario, episode), path_of("output", output), force=force)
 
 
 def replay_every(
-    log: str | os.PathLike[str] | TrainingLog,
+    log: AnyTraining,
     every: int,
     folder: str | os.PathLike[str],
     *,
@@ -215,32 +215,29 @@ def replay_every(
         LogError: there are no such episodes, or this fireworld computes another one.
         OutputError: one cannot be written; those before are there.
     """
-    opened = log if isinstance(log, TrainingLog) else open_training(log, partial=True)
+    training = opened(log, partial=True)
     every, place = whole_number("every", every, least=1, most=COUNT_MAX), path_of("folder", folder)
     if not place.is_dir():
         raise OutputError(expected(str(place), "", "an existing folder", "none", "make it first"))
-    names = [one.name for one in opened.scenarios]
-    opened.position(scenario if scenario is not None else opened.lines[0].scenario if len(opened) else 0, -1)
+    names = [one.name for one in training.scenarios]
+    training.position(scenario if scenario is not None else training.lines[0].scenario if len(training) else 0, -1)
     chosen = {
         number: place / episode_file(names[line.scenario], line.episode)
-        for number, line in enumerate(opened.lines)
+        for number, line in enumerate(training.lines)
         if line.episode % every == 0 and scenario in (None, names[line.scenario])
     }
     for path in chosen.values():
         check_output(path, force=force)
     written = {}
     for number, path in chosen.items():
-        written[path] = _replay(opened, number, path, force=force)
+        written[path] = _replay(training, number, path, force=force)
         on_written()
     return written
 
 
 def _replay(log: TrainingLog, number: int, output: Path, *, force: bool) -> str:
     found = log.episode_at(number)
-    trainer = log.trainer()
-    if not isinstance(trainer, SarsaTrainer):
-        raise LogError(expected(str(log.path), "method", "one that learns in episodes", log.method.name))
-    run = episode_run(trainer, found.record, found.tables, found.visits)
+    run = episode_run(log.learner(), found.record, found.tables, found.visits)
     return _write_run(run, output, found.record, force=force, source=str(log.path))
 
 

@@ -17,9 +17,9 @@ from fireworld.policy.teams.ranking_words import WEIGHTS
 from fireworld.policy.teams.table_words import first_state
 from fireworld.records import ACTIONS, CHOICES, Array
 from fireworld.rewards import TERMS
-from fireworld.training.log.reader import LearnedEpisode, Part, TrainingLog, learned
+from fireworld.training.log.learned import LearnedEpisode
+from fireworld.training.log.reader import Part, TrainingLog
 from fireworld.training.log.records import Episode, Tables, Tried
-from fireworld.training.methods.sarsa import SarsaTrainer
 
 SUFFIX: Final = ".parquet"
 ROWS_PER_GROUP: Final = 1 << 17
@@ -85,13 +85,7 @@ def _episode_rows(
         values |= {"tables_digest": episode.tables_digest.hex()}
         yield "episodes", {key: np.array([value]) for key, value in {**values, **place}.items()}
     if "steps" in names:
-        if not isinstance(trainer, SarsaTrainer):
-            raise LogError(expected(str(log.path), "method", "one that learns in episodes", log.method.name))
-        before = trainer.progress.tables, trainer.progress.visits.copy()
-        found = learned(trainer, episode, log.scenarios[episode.scenario])
-        trainer.progress.tables, trainer.progress.visits = before
-        yield "steps", _step_rows(place, found)
-        log.follow(trainer, part, number)
+        yield "steps", _step_rows(place, log.learn(trainer, part, number))
     if "tables" in names and Tables in part:
         yield "tables", _table_rows(place, part[Tables])
 

@@ -15,9 +15,8 @@ from fireworld.policy.teams.table_words import first_state
 from fireworld.policy.words import N_STATES, describe_state
 from fireworld.records import ACTIONS, CHOICES, Array
 from fireworld.shown import SHOWN_MAX, Block, Shown, TextTable
-from fireworld.training.log.reader import LearnedEpisode, TrainingLog, learned
-from fireworld.training.log.records import Episode
-from fireworld.training.methods.sarsa import SarsaTrainer
+from fireworld.training.log.learned import LearnedEpisode
+from fireworld.training.log.reader import TrainingLog
 
 MOVES_SHOWN: Final = 10
 
@@ -195,23 +194,17 @@ def state_histories(
     Raises:
         LogError: the log changed since it was opened, or its method learns no values of states.
     """
-    trainer = log.trainer()
-    if not isinstance(trainer, SarsaTrainer):
-        raise LogError(expected(str(log.path), "method", "one that learns values of states", log.method.name))
+    trainer = log.learner()
     for state in states:
         if not 0 <= state < N_STATES:
             raise LogError(expected("state", "", f"a number from 0 to {N_STATES - 1}", state))
     found = [_Gathering(state, n_moves) for state in states]
     n_states = N_STATES
     for number, part in enumerate(log.parts()):
-        record: Episode = part[Episode]
-        before = trainer.progress.tables, trainer.progress.visits.copy()
-        episode = learned(trainer, record, log.scenarios[record.scenario])
+        episode = log.learn(trainer, part, number)
         n_states = episode.tables.shape[1]
         for one in found:
             one.add(number, episode, trainer.progress.visits)
-        trainer.progress.tables, trainer.progress.visits = before
-        log.follow(trainer, part, number)
         on_part()
     return [one.history(log.path.name, n_states) for one in found]
 

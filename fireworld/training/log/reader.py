@@ -6,10 +6,10 @@ import json
 import os
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from fireworld_recorder.codec import decode
@@ -19,11 +19,11 @@ from fireworld_recorder.scan import TopicSize, scan
 from fireworld.arguments import path_of
 from fireworld.errors import FireworldError, LogError, OutputError, expected, one_line
 from fireworld.policy.teams.team import Team
-from fireworld.records import Array
 from fireworld.scenario import Scenario, parse_scenario
 from fireworld.shown import SHOWN_MAX, Block, Shown
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import Curriculum, CurriculumStage
+from fireworld.training.log.learned import LearnedEpisode, learned
 from fireworld.training.log.records import TRAINING, Episode, PartCommit, Plan, TrainingHeader
 from fireworld.training.log.writer import CITY_FOLDER, CURRICULUM_ATTACHMENT, METHOD_ATTACHMENT
 from fireworld.training.method import Method, Report, Trainer
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
 Part = Mapping[type[Any], Any]
 """The records of a part by type."""
+AnyTraining: TypeAlias = "str | os.PathLike[str] | TrainingLog"
+"""The path of a training log, or one that is open."""
 
 
 def open_training(path: str | os.PathLike[str], *, partial: bool = False) -> TrainingLog:
@@ -55,6 +57,11 @@ def open_training(path: str | os.PathLike[str], *, partial: bool = False) -> Tra
     if log.damage is not None and not partial:
         raise LogError(f"{path}: {log.damage}; continue the training with --resume, or try `fireworld recover {path}`")
     return log
+
+
+def opened(given: AnyTraining, *, partial: bool = False) -> TrainingLog:
+    """Return a training log; open it, as `open_training` does, if its path is given."""
+    return given if isinstance(given, TrainingLog) else open_training(given, partial=partial)
 
 
 class TrainingLog(Shown):
@@ -126,6 +133,17 @@ class TrainingLog(Shown):
         """Return a trainer of this training, before its first part."""
         return self.method.trainer(self.curriculum, seed=self.header.seed, cities=self._cities)
 
+    def learner(self) -> SarsaTrainer:
+        """Return a trainer that learns values in episodes, before its first part.
+
+        Raises:
+            LogError: the method of the training does something else.
+        """
+        trainer = self.trainer()
+        if not isinstance(trainer, SarsaTrainer):
+            raise LogError(expected(str(self.path), "method", "one that learns in episodes", self.method.name))
+        return trainer
+
     def trainer_before(self, number: int) -> Trainer[Any, Any]:
         """Return a trainer that stands before a part; `len(log)` is behind the last.
 
@@ -148,6 +166,18 @@ class TrainingLog(Shown):
         except LogError as error:
             raise LogError(f"{self.path}: part {number}: {error}") from None
         return report
+
+    def learn(self, trainer: SarsaTrainer, part: Part, number: int) -> LearnedEpisode:
+        """Let a trainer go through a part of this log that is an episode; return what was learned in it."""
+        episode: Episode = part[Episode]
+        before = trainer.progress.tables, trainer.progress.visits.copy()
+        try:
+            found = learned(trainer, episode, self.scenarios[episode.scenario])
+        except LogError as error:
+            raise LogError(f"{self.path}: part {number}: {error}") from None
+        trainer.progress.tables, trainer.progress.visits = before
+        self.follow(trainer, part, number)
+        return found
 
     def reports(self) -> Iterator[tuple[Trainer[Any, Any], Report]]:
         """Yield the report of every part, with the trainer as it stands after it: the same object each time."""
@@ -241,8 +271,7 @@ class TrainingLog(Shown):
         Raises:
             LogError: there is no such episode, or the method has none.
         """
-        if not issubclass(self._topics[0], Episode):
-            raise LogError(expected(str(self.path), "method", "one that learns in episodes", self.method.name))
+        self.learner()
         names = [one.name for one in self.scenarios]
         if isinstance(scenario, str) and scenario not in names:
             raise LogError(expected(str(self.path), "scenario", f"one of {', '.join(names)}", scenario))
@@ -267,10 +296,7 @@ class TrainingLog(Shown):
         part = next(self.parts(number), None)
         if part is None or Episode not in part or not isinstance(trainer, SarsaTrainer):
             raise LogError(expected(str(self.path), "part", "an episode", number))
-        try:
-            return learned(trainer, part[Episode], self.scenarios[part[Episode].scenario])
-        except LogError as error:
-            raise LogError(f"{self.path}: part {number}: {error}") from None
+        return self.learn(trainer, part, number)
 
     def describe(self, *, limit: int = SHOWN_MAX) -> Iterator[Block]:
         """Yield what there is to see of the training: its header, then a table of its scenarios or generations."""
@@ -282,68 +308,6 @@ class TrainingLog(Shown):
         header = self.header
         what = f"{header.method} in {header.curriculum}, seed {header.seed}"
         return one_line(f"<TrainingLog {what}: {len(self)} {header.unit}s, {self.state}, digest {self.digest[:12]}>")
-
-
-@dataclass(frozen=True)
-class LearnedEpisode:
-    """An episode of a training with all that was learned in it; b brigades, k choices of each.
-
-    There is a choice for every step, and where the episode was truncated one more: that which would come next.
-
-    Attributes:
-        scenario: in which it took place.
-        record: as it is recorded.
-        tables: (tables, states, 4) before it.
-        visits: the same shape: how often each value was learned before it.
-        state: (b, k) what each brigade saw, -1 where it did not look.
-        action: (b, k) what it did.
-        choice: (b, k) how it came to that, a position in `fireworld.records.CHOICES`.
-        reward: (terms, steps) of the team, by term.
-        value_before: (b, steps + 1) the value that was updated in each step: that of the choice before; nan where there
-            was no update. The last column has the updates that end the episode.
-        td_error: (b, steps + 1) the error of the update.
-        value_after: (b, steps + 1).
-        tables_after: as `tables`.
-    """
-
-    scenario: Scenario
-    record: Episode
-    tables: Array
-    visits: Array
-    state: Array
-    action: Array
-    choice: Array
-    reward: Array
-    value_before: Array
-    td_error: Array
-    value_after: Array
-    tables_after: Array
-
-
-def learned(trainer: SarsaTrainer, record: Episode, scenario: Scenario) -> LearnedEpisode:
-    """Let a trainer that stands before an episode learn it, and return all about it.
-
-    Raises:
-        LogError: what is recorded of it cannot be.
-    """
-    before, visits = trainer.progress.tables, trainer.progress.visits.copy()
-    trace = record.trace(scenario.brigades.n)
-    updates = trainer.learn_from(record)
-    n_rows = record.n_steps + (0 if record.terminated else 1)
-    return LearnedEpisode(
-        scenario=scenario,
-        record=record,
-        tables=before,
-        visits=visits,
-        state=trace.state[:, :n_rows],
-        action=trace.action[:, :n_rows],
-        choice=trace.choice[:, :n_rows],
-        reward=trace.reward,
-        value_before=updates[0],
-        td_error=updates[1],
-        value_after=updates[2],
-        tables_after=trainer.progress.tables,
-    )
 
 
 def _setting(header: TrainingHeader) -> tuple[Method, Curriculum, CityCache]:

@@ -39,6 +39,8 @@ class TrainingHeader:
     fireworld_version: str
     unit: str
     """What a part of the training is: an episode, a generation."""
+    simulator_digest: str = ""
+    """Of the sources of all that computes a run, "" where nobody wrote it down."""
     attachments: Mapping[str, bytes] = field(default_factory=dict)
     """curriculum.json, method.json, scenarios/NUMBER-NAME.yaml of all that is learned in, cities/SHA256.json."""
 
@@ -94,13 +96,18 @@ class Episode:
         22, "double", f"the team's reward, term by term through all steps: {', '.join(TERM_NAMES)}", per="step"
     )
 
+    @property
+    def n_choices(self) -> int:
+        """How many choices of each brigade are recorded."""
+        return n_choices(self.n_steps, terminated=self.terminated)
+
     def trace(self, n_brigades: int) -> Trace:
         """Return the columns as the kernels have them.
 
         Raises:
             LogError: they are not of that many brigades and of this number of steps.
         """
-        n, n_rows = self.n_steps, self.n_steps + (0 if self.terminated else 1)
+        n, n_rows = self.n_steps, self.n_choices
         fits = n >= 1 and len(self.reward) == n * len(TERM_NAMES)
         if not fits or any(len(one) != n_brigades * n_rows for one in (self.state, self.action, self.choice)):
             raise LogError(f"episode {self.episode}: its columns are not those of {n_brigades} brigades and {n} steps")
@@ -118,9 +125,14 @@ class Episode:
         return trace
 
 
+def n_choices(n_steps: int, *, terminated: bool) -> int:
+    """Return how many choices a brigade makes in an episode; where it is truncated, the next one is made too."""
+    return n_steps + (0 if terminated else 1)
+
+
 def trace_columns(trace: Trace, n_steps: int, *, terminated: bool) -> dict[str, Array]:
     """Return a trace as the columns of an episode."""
-    n_rows = n_steps + (0 if terminated else 1)
+    n_rows = n_choices(n_steps, terminated=terminated)
     columns = {name: getattr(trace, name)[:, :n_rows].ravel() for name in ("state", "action", "choice")}
     return {**columns, "reward": trace.reward[:, :n_steps].ravel()}
 

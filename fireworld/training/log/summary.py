@@ -9,6 +9,7 @@ from typing import Any
 from fireworld.shown import SHOWN_MAX, Block, TextTable
 from fireworld.training.log.reader import TrainingLog
 from fireworld.training.log.records import FORMAT, Episode
+from fireworld.version import simulator_version
 
 
 def training_summary(log: TrainingLog) -> dict[str, Any]:
@@ -28,6 +29,7 @@ def training_summary(log: TrainingLog) -> dict[str, Any]:
         "curriculum": {"name": header.curriculum, "digest": header.curriculum_digest},
         "seed": header.seed,
         "fireworld_version": header.fireworld_version,
+        "simulator_digest": header.simulator_digest,
         "unit": header.unit,
         "n_parts": len(log),
         "done": log.done,
@@ -71,7 +73,7 @@ def describe_training(log: TrainingLog, *, limit: int = SHOWN_MAX) -> Iterator[B
         or ("complete" if log.done else "complete as far as it goes: the training is not done"),
         "method": f"{found['method']['name']}: {method}",
         "curriculum": f"{found['curriculum']['name']} ({found['curriculum']['digest'][:12]}), seed {found['seed']}",
-        "fireworld": found["fireworld_version"],
+        "fireworld": simulator_version(found["fireworld_version"], found["simulator_digest"]),
         "digest": found["digest"],
         "team": found["team_digest"] or "none",
         log.header.unit + "s": f"{len(log):,}",

@@ -12,10 +12,12 @@ from fireworld.errors import LogError, TrainingError, expected
 from fireworld.executors import Workers, threads
 from fireworld.policy.teams.team import Team, read_team
 from fireworld.scenario import Scenario
-from fireworld.training.log.difference import AnyTraining, TrainingDifference, compare_trainings
-from fireworld.training.log.reader import Part, TrainingLog, open_training
+from fireworld.training.log.difference import TrainingDifference, compare_trainings
+from fireworld.training.log.reader import AnyTraining, Part, TrainingLog, opened
 from fireworld.training.log.records import TrainingHeader
 from fireworld.training.method import Method, Report, Trainer
+from fireworld.verified import Verified, trust_of
+from fireworld.version import simulator_version
 
 
 class TrainedAgain:
@@ -63,37 +65,22 @@ class TrainedAgain:
             yield {type(record): record for record in trainer.records()}
 
 
-@dataclass(frozen=True, repr=False)
-class TrainingVerification:
-    """Whether a recorded training is still what this fireworld learns; true if it is.
+@dataclass(frozen=True, repr=False, kw_only=True)
+class TrainingVerification(Verified):
+    """Whether a recorded training is still what this fireworld learns; true if it is."""
 
-    Attributes:
-        name: the log's file.
-        digest: of the training.
-        team_digest: of the team at its end.
-        n_parts: episodes or generations in the log.
-        unit: what a part is.
-        difference: how the training differs when it is repeated, the log's values as `a`; None if it does not.
-    """
-
-    name: str
-    digest: str
     team_digest: str
+    """Of the team at its end."""
     n_parts: int
+    """Episodes or generations in the log."""
     unit: str
-    difference: TrainingDifference | None
-
-    @property
-    def same(self) -> bool:
-        """Whether every part comes out as it is recorded."""
-        return self.difference is None
-
-    def __bool__(self) -> bool:
-        return self.same
+    """What a part is."""
+    difference: TrainingDifference | None = None
+    """How the training differs when it is repeated, the log's values as `a`; None if it does not."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as plain values, as `fireworld verify --json` writes it."""
-        known = {"same": self.same, "digest": self.digest, "team_digest": self.team_digest, "unit": self.unit}
+        known = {**self.known(), "digest": self.digest, "team_digest": self.team_digest, "unit": self.unit}
         return {**known, "n_parts": self.n_parts, **({} if self.difference is None else self.difference.to_dict())}
 
     def __repr__(self) -> str:
@@ -124,6 +111,7 @@ def verify_training(
     log: AnyTraining,
     *,
     team: Path | str | None = None,
+    trust: str | None = None,
     jobs: int | None = None,
     on_part: Callable[[], object] = lambda: None,
 ) -> TrainingVerification:
@@ -132,25 +120,32 @@ def verify_training(
     Args:
         log: the path of a training log, or one that is open.
         team: the team file that came of it, to be compared too.
+        trust: the digest that the log should have, or at least its first 12 digits, from a source you trust.
         jobs: fights at a time, where the method has many at once; None: as many as there are cores.
         on_part: called after each part.
 
     Raises:
         LogError: the log cannot be read.
         TrainingError: the team is not that of the log.
+        ArgumentError: what is trusted is no digest.
     """
-    opened = log if isinstance(log, TrainingLog) else open_training(log)
-    if not len(opened):
-        raise LogError(f"{opened.path}: it holds no {opened.header.unit}s; there is nothing to verify")
-    digest = opened.team().digest if team is None else check_team(opened, read_team(Path(team))[0], source=str(team))
-    n_parts = None if opened.done else len(opened)
-    again = TrainedAgain(opened.trainer, opened.header, threads(jobs), n_parts=n_parts)
-    difference = compare_trainings(opened, again, names=(str(opened.path), "again"), on_part=on_part)
+    trusted = trust_of(trust)
+    training = opened(log)
+    if not len(training):
+        raise LogError(f"{training.path}: it holds no {training.header.unit}s; there is nothing to verify")
+    digest = (
+        training.team().digest if team is None else check_team(training, read_team(Path(team))[0], source=str(team))
+    )
+    n_parts = None if training.done else len(training)
+    again = TrainedAgain(training.trainer, training.header, threads(jobs), n_parts=n_parts)
+    difference = compare_trainings(training, again, names=(str(training.path), "again"), on_part=on_part)
     return TrainingVerification(
-        name=str(opened.path),
-        digest=opened.digest,
+        name=str(training.path),
+        digest=training.digest,
+        recorded_by=simulator_version(training.header.fireworld_version, training.header.simulator_digest),
+        trust=trusted,
         team_digest=digest,
-        n_parts=len(opened),
-        unit=opened.header.unit,
+        n_parts=len(training),
+        unit=training.header.unit,
         difference=None if difference.same else difference,
     )

@@ -20,7 +20,7 @@ from fireworld.errors import TrainingError, expected
 from fireworld.simulation.placement import CITY_ATTACHMENT, attachments
 from fireworld.training.log.records import TRAINING, PartCommit, Plan, TrainingHeader, channels_of
 from fireworld.training.method import Trainer
-from fireworld.version import __version__
+from fireworld.version import __version__, simulator_digest
 
 CURRICULUM_ATTACHMENT = "curriculum.json"
 METHOD_ATTACHMENT = "method.json"
@@ -56,6 +56,7 @@ def header_of(trainer: Trainer[Any, Any]) -> TrainingHeader:
         curriculum_digest=curriculum.digest,
         seed=trainer.seed,
         fireworld_version=__version__,
+        simulator_digest=simulator_digest(),
         unit=trainer.unit,
         attachments=files,
     )

@@ -7,6 +7,7 @@ import json
 import signal
 import subprocess
 import sys
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -19,6 +20,7 @@ from fireworld.policy.words import N_STATES
 from fireworld.recording.golden import check, store
 from fireworld.recording.golden.check import find_goldens
 from fireworld.recording.golden.store import store_text, text_path
+from fireworld.recording.golden.update import update_goldens
 from tests import command_line
 
 MINE = ("add", "quick", "--policy", "mine:Policy", "--steps", 8)
@@ -207,7 +209,7 @@ def test_check_interrupted(kept, golden, monkeypatch):
     def interrupted(run):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(check, "run_prepared", interrupted)
+    monkeypatch.setattr(check, "run_again", interrupted)
     before = contents(kept)
     assert golden("check").code == 130
     assert golden("update", "--reason", "None.").code == 130
@@ -368,3 +370,72 @@ def test_a_policy_in_a_file_of_code(here, golden, monkeypatch):
     (here / "elsewhere").mkdir()
     monkeypatch.chdir(here / "elsewhere")
     assert golden("check", "../kept").code == 0
+
+
+CHEAT = """
+from fireworld.policy.protocol import Action, Decision
+
+class Policy:
+    def decide(self, observation):
+        observation.world.fire.energy.base[:] = 0.0
+        return Decision(Action.EASIEST)
+"""
+
+
+def test_a_policy_that_changes_its_world_makes_no_golden(kept, golden, write_policy):
+    before = contents(kept)
+    write_policy(CHEAT)
+    wanted = "policy mine:Policy: seed {}: expected decisions that lead to its outcome by themselves"
+    done = golden("check", "--junit", "junit.xml")
+    assert done.code == 2
+    assert wanted.format(1) in done.out
+    assert "<error " in Path("junit.xml").read_text()
+    done = golden("update", "--reason", "None.")
+    assert (done.code, contents(kept)) == (2, before)
+    done = golden("add", "quick", "--policy", "mine:Policy", "--seed", 3, "--name", "cheat")
+    assert (done.code, contents(kept)) == (2, before)
+    assert wanted.format(3) in done.err
+
+
+def test_an_update_that_was_killed_is_finished_by_another(kept, golden, change_policy, monkeypatch):
+    """The reason is there once, whatever of the goldens was written."""
+    change_policy("EASIEST")
+
+    def killed(*_):
+        raise SystemExit(9)
+
+    for moment in ("store_recording", "store_text"):
+        with monkeypatch.context() as patched:
+            patched.setattr(store, moment, killed)
+            with pytest.raises(SystemExit):
+                update_goldens(kept, reason="Easier.")
+    assert golden("update", "--reason", "Easier.").code == 0
+    assert golden("check").code == 0
+    text = (kept / "REASONS.md").read_text()
+    assert text.count("* Easier.") == 1
+    assert text.count("  * quick-mine-Policy: ") == 1
+
+
+def test_goldens_are_listed_and_removed(kept, golden):
+    (kept / "gone.txt").write_bytes((kept / "quick-easiest.txt").read_bytes())
+    (kept / "notes.txt").write_text("not of a golden\n")
+    (kept / "new.mcap.partial").write_bytes(b"")
+    (kept / "bad.mcap").write_bytes(b"no log")
+    done = golden("list")
+    assert done.code == 0
+    assert [line.split()[:4] for line in done.out.splitlines()[2:5]] == [
+        ["bad", "-", "-", "0"],
+        ["quick-easiest", "quick", "easiest", "1"],
+        ["quick-mine-Policy", "quick", "mine:Policy", "1"],
+    ]
+    assert "bad.mcap" in done.out
+    assert done.out.count(": left over; fireworld golden remove --leftovers") == 2
+    found = json.loads(golden("list", "--json").out)
+    assert [Path(path).name for path in found["leftovers"]] == ["gone.txt", "new.mcap.partial"]
+    assert [len(one["digest"]) for one in found["goldens"]] == [0, 64, 64]
+    done = golden("remove", "bad", "quick-easy")
+    assert (done.code, "try quick-easiest" in done.err) == (2, True)
+    assert golden("remove").code == 2
+    assert golden("remove", "bad", "quick-easiest", "--leftovers").code == 0
+    assert sorted(contents(kept)) == ["notes.txt", "quick-mine-Policy.mcap", "quick-mine-Policy.txt"]
+    assert golden("remove", "--leftovers").out == "nothing is left over\n"

@@ -293,3 +293,33 @@ def test_it_imports_nothing_before_a_test_asks():
 def test_pytest_finds_it(pytestconfig):
     """Installed with fireworld, not only imported by these tests."""
     assert pytestconfig.pluginmanager.get_plugin("fireworld").__name__ == "fireworld.pytest_plugin"
+
+
+def test_a_policy_that_changes_its_world_fails_and_is_not_stored(project):
+    project.makepyfile(test_mine=ONE)
+    line = "        return Decision(Action.NEAREST_TO_ME)"
+    assert line in POLICY
+    project.makepyfile(mine=POLICY.replace(line, f"        observation.world.fire.energy.base[:] = 0.0\n{line}"))
+    out = run(project, UPDATE, outcome={"failed": 1})
+    out.fnmatch_lines(["*policy mine:Policy: seed 3: expected decisions that lead to its outcome by themselves, *"])
+    assert not (project.path / "recordings").exists()
+
+
+def test_recordings_of_renamed_tests_are_listed_and_removed(project):
+    project.makepyfile(test_mine=ONE, test_other=ONE.replace("test_policy", "test_else"))
+    run(project, UPDATE, outcome={"passed": 2})
+    other = 'def test_other(recording):\n    recording(scenario="quick", policy="mine:Policy", steps=3)\n'
+    project.makepyfile(test_mine=other)
+    run(project, UPDATE, "test_mine.py::test_other", outcome={"passed": 1})
+    out = run(project, "test_mine.py", outcome={"passed": 1})
+    out.fnmatch_lines(["*fireworld: 1 recordings that no test uses; --fireworld-update removes them*"])
+    out.fnmatch_lines(["recordings/test_mine-test_policy.mcap"])
+    for words in (["test_mine.py::test_other"], ["test_mine.py", "-k", "test_other"], ["test_mine.py", "-x"]):
+        out = run(project, *words, UPDATE, outcome={"passed": 1})
+        out.no_fnmatch_line("*no test uses*")
+    out = run(project, "test_mine.py", UPDATE, outcome={"passed": 1})
+    out.fnmatch_lines(["*fireworld: 1 recordings removed, which no test uses*"])
+    left = sorted(path.name for path in (project.path / "recordings").iterdir())
+    assert left == [
+        f"{name}{end}" for name in ("test_mine-test_other", "test_other-test_else") for end in (".mcap", ".txt")
+    ]

@@ -90,7 +90,7 @@ def test_what_does_not_fit(log, make_log, log_path, fireworld):
     assert (done.code, done.out, done.err) == (2, "", wanted)
     with pytest.raises(LogError, match="state: expected a number from 0 to 4319, got 4320"):
         state_history(log, 4320)
-    with pytest.raises(LogError, match="expected one that learns values of states, got 'search'"):
+    with pytest.raises(LogError, match="expected one that learns in episodes, got 'search'"):
         state_history(open_training(make_log("search")), 3)
     done = fireworld("policy", "show", log_path.with_suffix(".npz"), "--log", log_path)
     assert (done.code, "--log needs a STATE" in done.err) == (2, True)

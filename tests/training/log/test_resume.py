@@ -1,6 +1,7 @@
 """A training that was cut off at any byte continues, and its log becomes the same, byte for byte."""
 
 import contextlib
+import fcntl
 import random
 import signal
 import subprocess
@@ -108,6 +109,20 @@ def test_damage_in_the_middle_costs_what_comes_after_it(curriculum, make_log, tm
     path = cut(bytes(whole), tmp_path, len(whole))
     train(curriculum, set=SHORT, record=path, resume=True)
     assert path.read_bytes() == make_log().read_bytes()
+
+
+def test_a_log_that_is_still_written_is_not_continued(curriculum, make_log, tmp_path):
+    whole = make_log().read_bytes()
+    path = cut(whole, tmp_path, len(whole) // 2)
+    partial = path.with_name(path.name + PARTIAL_SUFFIX)
+    with partial.open("rb") as other:
+        fcntl.flock(other, fcntl.LOCK_EX)
+        with pytest.raises(OutputError, match=r"t\.mcap\.partial: another process is writing it"):
+            train(curriculum, set=SHORT, record=path, resume=True)
+    assert [one.name for one in tmp_path.glob("t.*")] == [partial.name]
+    assert partial.read_bytes() == whole[: len(whole) // 2]
+    train(curriculum, set=SHORT, record=path, resume=True)
+    assert path.read_bytes() == whole
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from fireworld.records import ACTIVITIES, CityRecord, StepRecord
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import city_box_m
 from fireworld_viewer.pictures.figure_files import INK
+from fireworld_viewer.story.series import existing
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -62,7 +63,7 @@ def state_of(city: CityRecord, record: StepRecord) -> MapState:
     """Return what a map shows of a step."""
     brigades, n = record.brigades, len(record.brigades.x_m)
     target = np.full(n, -1, dtype=np.int64)
-    target[: len(record.decisions.target)] = record.decisions.target
+    target[: len(record.decisions.target)] = existing(record.decisions.target, city)
     full = np.maximum(np.asarray(city.brigade_tank_litres, dtype=np.float64), 1.0)
     return MapState(
         fieryness=record.buildings.fieryness,

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from fireworld.records import ACTION_NAMES, ACTIVITIES, Array, Recording
+from fireworld.records import ACTIVITIES, Array, Recording
 from fireworld_viewer import colors
 from fireworld_viewer.pictures.city_map import hexadecimal
 from fireworld_viewer.pictures.figure_files import INK, PAIR_COLORS, label_text, new_figure, open_frame
-from fireworld_viewer.story.series import LABELS, per_brigade, series
+from fireworld_viewer.story.series import LABELS, action_name, chosen_actions, series
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -151,17 +151,16 @@ def draw_timeline(recordings: Sequence[Recording]) -> Figure:
 
 def _tables(recording: Recording) -> tuple[Array, Array]:
     """Return what was chosen and what was done, (k, n_brigades) each; -1 is no choice."""
-    action = per_brigade(recording, "action", missing=-1)
-    return action, np.asarray(recording.column("/brigades", "activity"), dtype=np.int64)
+    return chosen_actions(recording), np.asarray(recording.column("/brigades", "activity"), dtype=np.int64)
 
 
 def _draw_bands(axes: Axes, recording: Recording, span: tuple[int, int]) -> None:
     n, steps = len(recording.city.brigade_tank_litres), np.asarray(recording.steps)
-    palettes = colors.ACTION_RGB, colors.ACTIVITY_RGB
-    for table, palette, (top, height) in zip(_tables(recording), palettes, _BANDS, strict=True):
+    palettes: Sequence[Callable[[int], colors.Rgb]] = colors.action_rgb, colors.ACTIVITY_RGB.__getitem__
+    for table, color, (top, height) in zip(_tables(recording), palettes, _BANDS, strict=True):
         for brigade in range(n):
             for start, end, code in _bands(steps, table[:, brigade]):
-                style: dict[str, Any] = {"facecolors": hexadecimal(palette[code]), "edgecolors": "none", "linewidth": 0}
+                style: dict[str, Any] = {"facecolors": hexadecimal(color(code)), "edgecolors": "none", "linewidth": 0}
                 axes.broken_barh([(start, end - start)], (brigade + top, height), **style)
     axes.set_xlim(span[0] - 0.5, span[1] + 0.5)
     axes.set_ylim(max(n, 1) - 0.5, -0.5)
@@ -184,12 +183,15 @@ def _draw_codes(figure: Figure, recordings: Sequence[Recording], total: float) -
     """Name the actions and the activities that occur."""
     from matplotlib.patches import Patch
 
-    kinds = (("chose:", ACTION_NAMES, colors.ACTION_RGB), ("did:", ACTIVITIES, colors.ACTIVITY_RGB))
-    for row, (heading, names, palette) in enumerate(kinds):
+    kinds: Sequence[tuple[str, Callable[[int], str], Callable[[int], colors.Rgb]]] = (
+        ("chose:", action_name, colors.action_rgb),
+        ("did:", ACTIVITIES.__getitem__, colors.ACTIVITY_RGB.__getitem__),
+    )
+    for row, (heading, name, color) in enumerate(kinds):
         occurring = {int(code) for one in recordings for code in np.unique(_tables(one)[row]) if code >= 0}
         look: dict[str, Any] = {"edgecolor": INK, "linewidth": 0.4}
         handles = [
-            Patch(facecolor=hexadecimal(palette[code]), label=names[code].replace("-", " "), **look)
+            Patch(facecolor=hexadecimal(color(code)), label=name(code).replace("-", " "), **look)
             for code in sorted(occurring)
         ]
         height = (0.57 - 0.3 * row) / total

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
@@ -181,8 +182,12 @@ def labels_on(cells: Iterable[MapCell]) -> list[str]:
 
 
 def _even(inches: float, dpi: int) -> float:
-    """Return inches that are an even number of pixels, as films want it."""
-    return 2 * round(inches * dpi / 2) / dpi
+    """Return inches that are an even number of pixels, as films want it, also for who rounds them down."""
+    pixels = 2 * round(inches * dpi / 2)
+    fitting = pixels / dpi
+    while fitting * dpi < pixels:
+        fitting = math.nextafter(fitting, math.inf)
+    return fitting
 
 
 def mark(face: str, shape: Any = "s", size: float = 9.0, *, edge: str = INK, label: str = "") -> Line2D:

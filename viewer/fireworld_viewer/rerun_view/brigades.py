@@ -12,7 +12,7 @@ from fireworld.records import ACTION_NAMES, ACTIONS, ACTIVITIES, Recording
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import CityMesh
 from fireworld_viewer.rerun_view.layers import Layers, number_columns
-from fireworld_viewer.story.series import choices_of, per_brigade
+from fireworld_viewer.story.series import action_name, choices_of, chosen_actions, chosen_targets
 
 _DRIVING: Final = ACTIVITIES.index("driving")
 _BALL_RADIUS_M: Final = 4.0
@@ -69,7 +69,7 @@ def log_brigades(layers: Layers, recording: Recording) -> None:
 def log_water(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
     """Draw a jet from each brigade that sprays, and a thin arc from each that drives, to the target."""
     activity, sprayed = (recording.column("/brigades", name) for name in ("activity", "sprayed_litres"))
-    target = per_brigade(recording, "target", missing=-1)
+    target = chosen_targets(recording)
     position = positions_m(recording)
     for path, shown, radius_m, rgb, rise_m in (
         ("team/water", (target >= 0) & (sprayed > 0), 0.8, colors.WATER_RGB, 14.0),
@@ -82,8 +82,9 @@ def log_water(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
 def log_states(layers: Layers, recording: Recording) -> None:
     """Send two timelines for each brigade: its activity, and the action that it chose."""
     activity = recording.column("/brigades", "activity")
-    action = per_brigade(recording, "action", missing=-1)  # -1 is the last of the names: refilling, dead, or no fire
-    actions, rgb = (*ACTION_NAMES, "no choice"), (*colors.ACTION_RGB, colors.NO_CHOICE_RGB)
+    action = chosen_actions(recording)  # -1 is the last of the names: refilling, dead, or no fire
+    codes = range(max(len(ACTION_NAMES), int(action.max(initial=-1)) + 1))
+    actions, rgb = [*map(action_name, codes), "no choice"], [*map(colors.action_rgb, codes), colors.NO_CHOICE_RGB]
     for brigade in range(activity.shape[1]):
         layers.states(f"activity/brigade_{brigade}", activity[:, brigade], ACTIVITIES, colors.ACTIVITY_RGB)
         layers.states(f"action/brigade_{brigade}", action[:, brigade], actions, rgb)

@@ -8,9 +8,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fireworld.records import ACTION_NAMES, ACTIONS, EVENT_KINDS, LEVELS, VOLUMES, Recording
+from fireworld.records import ACTIONS, EVENT_KINDS, LEVELS, VOLUMES, Recording
 from fireworld_viewer import colors
-from fireworld_viewer.story.series import ChoiceTables, per_brigade
+from fireworld_viewer.story.series import ChoiceTables, action_name, per_brigade
 
 
 class LogLine(NamedTuple):
@@ -77,7 +77,7 @@ def decision_lines(recording: Recording, choices: ChoiceTables, new: NDArray[np.
             aim = f" → building {building_id[target]}" if target >= 0 else ""
             exploring = " (exploring)" if choices.explored[row, brigade] else ""
             state = state_words({name: int(table[row, brigade]) for name, table in observed.items()})
-            parts = [f"{ACTION_NAMES[action]}{aim}{exploring}", value_words(choices, row, brigade), state]
+            parts = [f"{action_name(action)}{aim}{exploring}", value_words(choices, row, brigade), state]
         text = f"brigade {brigade}: {', '.join(part for part in parts if part)}"
         yield LogLine(steps[row], "INFO", text, colors.BRIGADE_RGB[brigade % len(colors.BRIGADE_RGB)])
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fireworld.outcome import QUANTITIES
-from fireworld.records import ACTION_NAMES, ACTIONS, EVENT_KINDS, Array, Recording
+from fireworld.records import ACTION_NAMES, ACTIONS, EVENT_KINDS, Array, CityRecord, Recording
 
 REWARD_TERMS: Final = ("rewards.water_damaged", "rewards.burning", "rewards.burnt_out", "rewards.civilians")
 
@@ -45,7 +45,7 @@ class ChoiceTables:
 
 def choices_of(recording: Recording) -> ChoiceTables:
     """Read the choices of all steps of a recording."""
-    action = per_brigade(recording, "action", missing=-1)
+    action = chosen_actions(recording)
     k, n = action.shape
     values = np.full((k, n, len(ACTIONS)), np.nan)
     for row, recorded in zip(values, recording.ragged("/decisions", "q_values"), strict=True):
@@ -61,12 +61,33 @@ def choices_of(recording: Recording) -> ChoiceTables:
     of_action[known] = values[known, action[known]]
     return ChoiceTables(
         action=action,
-        target=per_brigade(recording, "target", missing=-1),
+        target=chosen_targets(recording),
         explored=per_brigade(recording, "explored", missing=False),
         action_values=values,
         value=np.where(ranked, target_value, of_action),
         ranked=ranked,
     )
+
+
+def chosen_actions(recording: Recording) -> NDArray[np.int64]:
+    """Return the actions of all steps, (k, n_brigades): indices of names, which later versions may add to; -1 none."""
+    actions: NDArray[np.int64] = np.maximum(per_brigade(recording, "action", missing=-1), -1)
+    return actions
+
+
+def chosen_targets(recording: Recording) -> NDArray[np.int64]:
+    """Return the targets of all steps, (k, n_brigades): indices of buildings; -1 none, or one that there is not."""
+    return existing(per_brigade(recording, "target", missing=-1), recording.city)
+
+
+def existing(buildings: NDArray[Any], city: CityRecord) -> NDArray[Any]:
+    """Return indices of buildings; -1 for those that are none of this city."""
+    return np.where((buildings >= 0) & (buildings < len(city.building_id)), buildings, -1)
+
+
+def action_name(action: int) -> str:
+    """Return the name of an action, its number where only a later version knows it."""
+    return ACTION_NAMES[action] if action < len(ACTION_NAMES) else f"action {action}"
 
 
 def per_brigade(recording: Recording, name: str, *, missing: float, topic: str = "/decisions") -> NDArray[Any]:

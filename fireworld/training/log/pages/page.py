@@ -23,10 +23,10 @@ from fireworld.records import Array
 from fireworld.scenario import scenario_names
 from fireworld.training.curriculum import curriculum_names, find_curriculum
 from fireworld.training.log.course import Course, course_of, opening
-from fireworld.training.log.difference import AnyTraining
 from fireworld.training.log.pages.view import TABLES_HELP, names_of, open_trainings
-from fireworld.training.log.reader import TrainingLog
+from fireworld.training.log.reader import AnyTraining, TrainingLog
 from fireworld.training.log.records import Episode
+from fireworld.version import simulator_version
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -122,7 +122,9 @@ def _facts(logs: Sequence[TrainingLog], names: Sequence[str]) -> str:
         facts = {key: str(value) for key, value in log.method.as_dict().items()}
         facts |= {"curriculum": f"{log.header.curriculum} ({log.header.curriculum_digest[:12]})"}
         facts |= {"seed": str(log.header.seed), f"{log.header.unit}s": f"{len(log):,}"}
-        facts |= {"recorded by": f"fireworld {log.header.fireworld_version}"}
+        facts |= {
+            "recorded by": f"fireworld {simulator_version(log.header.fireworld_version, log.header.simulator_digest)}"
+        }
         facts |= {"ended": "yes" if log.done else "no", "digest": log.digest[:16], "team": log.team().digest[:16]}
         columns.append(facts)
     rows = [compared_row(escape(key), [column[key] for column in columns]) for key in columns[0]]

@@ -22,8 +22,7 @@ from fireworld_viewer.table_pixels import table_pixels
 from fireworld.errors import LogError, expected
 from fireworld.records import ACTIONS
 from fireworld.training.log.course import TablePicture, opening, table_picture
-from fireworld.training.log.difference import AnyTraining
-from fireworld.training.log.reader import TrainingLog, open_training
+from fireworld.training.log.reader import AnyTraining, TrainingLog, opened
 from fireworld.training.log.records import Episode, Tables
 from fireworld.training.method import Report, Trainer
 
@@ -115,14 +114,14 @@ def open_trainings(logs: AnyTraining | Sequence[AnyTraining]) -> list[TrainingLo
     given: list[Any] = list(logs) if isinstance(logs, list | tuple) else [logs]
     if not 1 <= len(given) <= 2:
         raise LogError(expected("trainings", "", "one or two", str(len(given))))
-    opened = [one if isinstance(one, TrainingLog) else open_training(one, partial=True) for one in given]
-    for one in opened:
+    trainings = [opened(one, partial=True) for one in given]
+    for one in trainings:
         if not len(one):
             raise LogError(f"{one.path}: it holds no {one.header.unit}s; there is nothing to show")
-        if one.method.name != opened[0].method.name:
-            wanted = f"{opened[0].method.name}, as in {opened[0].path}"
+        if one.method.name != trainings[0].method.name:
+            wanted = f"{trainings[0].method.name}, as in {trainings[0].path}"
             raise LogError(expected(str(one.path), "method", wanted, one.method.name))
-    return opened
+    return trainings
 
 
 def names_of(logs: Sequence[TrainingLog]) -> list[str]:

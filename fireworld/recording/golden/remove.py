@@ -1,0 +1,100 @@
+"""Goldens listed and removed, with what killed commands and renamed tests leave in their folder."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Collection, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from fireworld_recorder.reader import open_log
+from fireworld_recorder.writer import PARTIAL_SUFFIX
+
+from fireworld.errors import FireworldError, OutputError
+from fireworld.recording.golden.check import FOLDER, find_goldens
+from fireworld.recording.golden.store import SUFFIX, TEXT_SUFFIX, text_path
+from fireworld.recording.inputs import is_training
+from fireworld.training.log.reader import open_training
+
+
+@dataclass(frozen=True)
+class GoldenEntry:
+    """A golden as it lies in its folder; nothing of it is run."""
+
+    name: str
+    what: str
+    """The scenario, or the curriculum; "" where the recording cannot be read."""
+    by: str
+    """The policy, or the method."""
+    seed: int
+    n_bytes: int
+    digest: str
+    error: str = ""
+    """Why it cannot be read."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values."""
+        return asdict(self)
+
+
+def list_goldens(folder: Path = FOLDER) -> list[GoldenEntry]:
+    """Return the goldens of a folder, sorted by name; OutputError if there are none."""
+    return [_entry(path) for path in find_goldens(folder)]
+
+
+def _entry(path: Path) -> GoldenEntry:
+    n_bytes = path.stat().st_size
+    try:
+        if is_training(path):
+            training = open_training(path)
+            one = training.header
+            return GoldenEntry(path.stem, one.curriculum, one.method, one.seed, n_bytes, training.digest)
+        log = open_log(path)
+        return GoldenEntry(path.stem, log.header.scenario, log.header.policy, log.header.seed, n_bytes, log.digest)
+    except FireworldError as error:
+        return GoldenEntry(path.stem, "", "", 0, n_bytes, "", str(error))
+
+
+def leftovers_of(folder: Path = FOLDER) -> list[Path]:
+    """Return what is no golden but was made for one: partial recordings, scratch folders, texts of none."""
+    partial = [*folder.glob(f"*{SUFFIX}{PARTIAL_SUFFIX}"), *folder.glob(".fireworld-*/")]
+    texts = [
+        path
+        for path in folder.glob(f"*{TEXT_SUFFIX}")
+        if not path.with_suffix(SUFFIX).exists() and _is_golden_text(path)
+    ]
+    return sorted([*partial, *texts])
+
+
+def _is_golden_text(path: Path) -> bool:
+    lines = path.read_text(encoding="utf-8", errors="replace").splitlines() if path.is_file() else []
+    return bool(lines) and lines[-1].startswith("hash ")
+
+
+def remove_goldens(folder: Path = FOLDER, names: Collection[str] = (), *, leftovers: bool = False) -> list[Path]:
+    """Remove goldens, each with its text.
+
+    Args:
+        folder: of the goldens.
+        names: of those to remove.
+        leftovers: remove what `leftovers_of` finds, too.
+
+    Returns:
+        The files that are gone.
+
+    Raises:
+        OutputError: there is no such golden, nothing is removed then; or one cannot be removed.
+    """
+    paths: Sequence[Path] = find_goldens(folder, names) if names else ()
+    gone = [*(one for path in paths for one in (path, text_path(path)) if one.exists())]
+    gone += leftovers_of(folder) if leftovers else []
+    for path in gone:
+        try:
+            if path.is_dir():
+                shutil.rmtree(path)
+            else:
+                path.unlink()
+        except OSError as error:
+            raise OutputError(f"{path}: cannot be removed: {error.strerror or error}") from None
+    return gone
