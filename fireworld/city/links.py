@@ -38,7 +38,8 @@ def wall_table(footprints: Footprints, order: Int32Array, fire: FireParameters) 
     """Lay out the walls for the ray caster; a wall sends ceil(length * rate) rays.
 
     The rate is a number of single precision, as in the official program: at 0.002, which is a bit more then, a wall of
-    2 m sends 5 rays. Where walls of two buildings coincide, a ray meets the one whose building the official program visits first.
+    2 m sends 5 rays. Where walls of two buildings coincide, a ray meets the one whose building the official program
+    visits first.
     """
     walls = walls_of(footprints)
     visited = np.empty(len(order), dtype=np.int64)
