@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -32,7 +31,8 @@ class MapFiles:
     scenario_file: Path | None
     scenario_content: bytes
     config_folder: Path | None
-    config: Mapping[str, bytes] = field(default_factory=dict)
+    config: tuple[tuple[str, bytes], ...] = ()
+    """Names, relative to the folder, and contents of its *.cfg."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def find_files(given: Path, *, config: Path | None = None, scenario: Path | None
         scenario_file=scenario,
         scenario_content=_read(scenario, "a scenario.xml", MAP_BYTES_MAX) if scenario else b"",
         config_folder=configs,
-        config=_read_configs(configs) if configs else {},
+        config=_read_configs(configs) if configs else (),
     )
 
 
@@ -78,7 +78,7 @@ def import_files(files: MapFiles) -> Imported:
     """
     report = Report()
     gml = read_gml(files.map_content, where=str(files.map_file))
-    config = read_config(files.config, where=str(files.config_folder)) if files.config_folder else Config()
+    config = read_config(dict(files.config), where=str(files.config_folder)) if files.config_folder else Config()
     scenario = None
     if files.scenario_file is not None:
         scenario = read_scenario_xml(files.scenario_content, where=str(files.scenario_file))
@@ -123,12 +123,14 @@ def _configs(folder: Path, given: Path | None) -> Path | None:
     return next((one for one in candidates if one.is_dir() and any(one.glob("*.cfg"))), None)
 
 
-def _read_configs(folder: Path) -> dict[str, bytes]:
+def _read_configs(folder: Path) -> tuple[tuple[str, bytes], ...]:
     """Read all *.cfg of a folder and the folders in it, by their names relative to it."""
     paths = sorted(path for path in (*folder.glob("*.cfg"), *folder.glob("*/*.cfg")) if path.is_file())
     if len(paths) > N_CONFIGS_MAX:
         raise CityError(expected(str(folder), "", f"at most {N_CONFIGS_MAX} files *.cfg", len(paths)))
-    return {path.relative_to(folder).as_posix(): _read(path, "a configuration", CONFIG_BYTES_MAX) for path in paths}
+    return tuple(
+        (path.relative_to(folder).as_posix(), _read(path, "a configuration", CONFIG_BYTES_MAX)) for path in paths
+    )
 
 
 def _read(path: Path, what: str, most: int) -> bytes:
