@@ -10,8 +10,7 @@ from typing import Any, Never, TypeVar
 from fireworld.city.formats.official.keys import MILLIMETRES, PREFIX
 from fireworld.errors import TraceError, expected
 from fireworld.parameters import BrigadeParameters, FireParameters
-from fireworld.scenario.document import ANY_AMOUNT, BOUNDS
-from fireworld.scenario.explain import within
+from fireworld.scenario.bounds import bounded
 
 Section = TypeVar("Section", FireParameters, BrigadeParameters)
 
@@ -45,13 +44,10 @@ class Configuration:
 
     def _number(self, key: str, name: str, kind: str) -> int | float:
         """Read one parameter within the bounds that it has in a scenario."""
-        value = self.number(key) / MILLIMETRES.get(name, 1.0)
-        bounds = BOUNDS.get(name, ANY_AMOUNT)
-        if not within(value, bounds) or (kind == "int" and value != int(value)):
-            what = "a whole number" if kind == "int" else "a number"
-            least = f"at least {bounds.ge:g}" if bounds.ge is not None else f"above {bounds.gt:g}"
-            self._refuse(key, f"{what} {least} and at most {bounds.le:g}", self.values[PREFIX + key])
-        return int(value) if kind == "int" else value
+        value, wanted = bounded(name, kind, self.number(key) / MILLIMETRES.get(name, 1.0))
+        if value is None:
+            self._refuse(key, wanted, self.values[PREFIX + key])
+        return value
 
     def _refuse(self, key: str, wanted: str, got: object) -> Never:
         """Raise for one key."""
