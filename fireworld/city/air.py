@@ -43,7 +43,12 @@ def cover_cells(footprints: Footprints, cell_mm: int, *, where: str = "city") ->
         got = f"{int(n_cells.sum())}, {int(blocks[largest, 0])} by {int(blocks[largest, 1])} of them under this one"
         raise CityError(expected(where, key, wanted, got, "try larger air cells or smaller buildings"))
     samples = [_samples(int(origin[axis]), int(shape[axis]), cell_mm) for axis in (0, 1)]
-    ptr, x, y, percent = count_covers(footprints.outline_ptr, footprints.outline_mm, first, blocks, *samples)
+    flips = np.empty((SAMPLES, int(blocks[:, 0].max()) * SAMPLES + 1), dtype=np.uint8)
+    inside = np.empty(int(n_cells.max()), dtype=np.uint8)
+    ptr = np.empty(len(first) + 1, dtype=np.int32)
+    cell = np.empty((3, int(n_cells.sum())), dtype=np.int32)
+    outlines = footprints.outline_ptr, footprints.outline_mm
+    count_covers(*outlines, first, blocks, *samples, flips, inside, ptr, cell)
     n_covered = np.diff(ptr)
     if not n_covered.all():
         lost = int(footprints.building_id[int(np.argmin(n_covered))])
@@ -54,9 +59,9 @@ def cover_cells(footprints: Footprints, cell_mm: int, *, where: str = "city") ->
         cell_mm=cell_mm,
         shape=(int(shape[0]), int(shape[1])),
         ptr=ptr,
-        x=x.copy(),  # without the room left for cells that have no sample inside
-        y=y.copy(),
-        percent=percent.copy(),
+        x=cell[0, : ptr[-1]].copy(),  # without the room for cells that have no sample inside
+        y=cell[1, : ptr[-1]].copy(),
+        percent=cell[2, : ptr[-1]].copy(),
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fireworld.city.city import Footprints, Int32Array, Int64Array, Links
 from fireworld.city.outlines import bounding_boxes, numbered
-from fireworld.kernels.near import BoxGrid, near_pairs
+from fireworld.kernels.near import BoxGrid, fill_rows, find_upper
 
 SITE_GAP_MM: Final = 30_000
 """Outlines closer than this, strictly, make one fire site."""
@@ -20,11 +20,27 @@ def near_relation(footprints: Footprints, links: Links) -> Links:
 
     The relation is symmetric, as CSR, neighbours rising, all shares 1; no building is near itself.
     """
-    low, high = bounding_boxes(footprints)
-    grid = _box_grid(low, high)
-    linked = _either_way(links)
-    ptr, building = near_pairs(footprints.outline_ptr, footprints.outline_mm, low, high, grid, *linked, SITE_GAP_MM)
+    upper_ptr, upper = _upper_neighbours(footprints, links)
+    n = len(footprints.building_id)
+    n_related = np.diff(upper_ptr) + np.bincount(upper, minlength=n)
+    ptr = np.concatenate([[0], np.cumsum(n_related)]).astype(np.int32)
+    building = np.empty(2 * len(upper), dtype=np.int32)
+    fill_rows(upper_ptr, upper, ptr, ptr[:-1].copy(), building)
     return Links(ptr=ptr, building=building, share=np.ones(len(building), dtype=np.float32))
+
+
+def _upper_neighbours(footprints: Footprints, links: Links) -> tuple[Int64Array, Int32Array]:
+    """Return the near buildings with higher numbers of every building, as CSR, in any order."""
+    low, high = bounding_boxes(footprints)
+    n = len(low)
+    city = footprints.outline_ptr, footprints.outline_mm, low, high, _box_grid(low, high), *_either_way(links)
+    met, ptr = np.full(n, -1, dtype=np.int32), np.zeros(n + 1, dtype=np.int64)
+    upper, done = np.empty(8 * n, dtype=np.int32), 0
+    while True:
+        done = find_upper(done, *city, SITE_GAP_MM, met, ptr, upper)
+        if done == n:
+            return ptr, upper[: ptr[-1]]
+        upper = np.concatenate([upper, np.empty(len(upper), dtype=np.int32)])
 
 
 def _either_way(links: Links) -> tuple[Int64Array, Int32Array]:

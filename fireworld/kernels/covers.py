@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from fireworld.kernels.arrays import Array
-from fireworld.kernels.jit import inner, making_arrays
+from fireworld.kernels.jit import inner, kernel
 
 SAMPLES: Final = 10
 """Sample points along each side of a cell."""
@@ -71,10 +71,19 @@ def flip_band(corners: Array, sample_x: Array, sample_y: Array, step_mm: float, 
                 flips[row, sample] ^= 1
 
 
-@making_arrays
+@kernel
 def count_covers(
-    outline_ptr: Array, outline_mm: Array, first: Array, blocks: Array, sample_x: Array, sample_y: Array
-) -> tuple[Array, Array, Array, Array]:
+    outline_ptr: Array,
+    outline_mm: Array,
+    first: Array,
+    blocks: Array,
+    sample_x: Array,
+    sample_y: Array,
+    flips: Array,
+    samples: Array,
+    ptr: Array,
+    cell: Array,
+) -> None:
     """Count the sample points inside every building, cell by cell.
 
     Args:
@@ -84,44 +93,31 @@ def count_covers(
         blocks: (n, 2) cells along x and y of that box.
         sample_x: float64, x of all columns of samples of the grid, mm, rising, ten a cell.
         sample_y: float64, y of all rows.
-
-    Returns:
-        Of every building the cells with a sample inside, x outer and y inner: ptr (n+1,), x, y and the number of
-        samples, 1 to 100, all int32.
+        flips: (10, 10 * widest + 1) uint8, scratch for the columns of the widest box.
+        samples: (largest,) uint8, scratch for the cells of the largest box.
+        ptr: (n+1,) out: start of each building's cells.
+        cell: (3, at least cells of all boxes) out: of every building the cells with a sample inside, x outer and y
+            inner: x, y and the number of samples, 1 to 100.
     """
-    n = len(first)
-    n_cells, widest, largest = 0, 0, 0
-    for b in range(n):
-        cells = blocks[b, 0] * blocks[b, 1]
-        n_cells += cells
-        widest, largest = max(widest, blocks[b, 0]), max(largest, cells)
-    ptr = np.zeros(n + 1, dtype=np.int32)
-    cell_x, cell_y = np.empty(n_cells, dtype=np.int32), np.empty(n_cells, dtype=np.int32)
-    count = np.empty(n_cells, dtype=np.int32)
-    samples = np.empty(largest, dtype=np.uint8)  # inside, by cell of the current building
-    flips = np.empty((SAMPLES, widest * SAMPLES + 1), dtype=np.uint8)  # one to spare takes crossings at the end
     step_mm = (sample_x[SAMPLES - 1] - sample_x[0]) / (SAMPLES - 1)
-    end = 0
-    for b in range(n):
-        nx, ny = blocks[b, 0], blocks[b, 1]
-        width = nx * SAMPLES
+    end = np.int64(0)
+    ptr[0] = 0
+    for b in range(len(first)):
+        x0, y0, nx, ny = first[b, 0], first[b, 1], blocks[b, 0], blocks[b, 1]
         corners = outline_mm[outline_ptr[b] : outline_ptr[b + 1]]
-        columns = sample_x[first[b, 0] * SAMPLES : (first[b, 0] + nx) * SAMPLES]
-        for cell in range(nx * ny):
-            samples[cell] = 0
+        columns = sample_x[x0 * SAMPLES : (x0 + nx) * SAMPLES]
+        for k in range(nx * ny):
+            samples[k] = 0
         for y in range(ny):
-            row = (first[b, 1] + y) * SAMPLES
-            flip_band(corners, columns, sample_y[row : row + SAMPLES], step_mm, flips)
-            for k in range(SAMPLES):
+            rows = sample_y[(y0 + y) * SAMPLES : (y0 + y + 1) * SAMPLES]
+            flip_band(corners, columns, rows, step_mm, flips)
+            for row in range(SAMPLES):
                 inside = np.uint8(0)
-                for sample in range(width):
-                    inside ^= flips[k, sample]
+                for sample in range(nx * SAMPLES):
+                    inside ^= flips[row, sample]
                     samples[sample // SAMPLES * ny + y] += inside
-        for cell in range(nx * ny):
-            if samples[cell]:
-                cell_x[end] = first[b, 0] + cell // ny
-                cell_y[end] = first[b, 1] + cell % ny
-                count[end] = samples[cell]
+        for k in range(nx * ny):
+            if samples[k]:
+                cell[0, end], cell[1, end], cell[2, end] = x0 + k // ny, y0 + k % ny, samples[k]
                 end += 1
         ptr[b + 1] = end
-    return ptr, cell_x[:end], cell_y[:end], count[:end]

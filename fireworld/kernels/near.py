@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fireworld.kernels.arrays import Array
-from fireworld.kernels.jit import inner, making_arrays
+from fireworld.kernels.jit import inner, kernel
 
 
 class BoxGrid(NamedTuple):
@@ -112,12 +112,62 @@ def append_closer(
     return end
 
 
-@inner
-def fill_rows(upper_ptr: Array, upper: Array, ptr: Array, place: Array, related: Array) -> None:
-    """Turn the higher neighbours of every building, in any order, into rows with all neighbours, rising.
+@kernel
+def find_upper(
+    begin: int,
+    outline_ptr: Array,
+    outline_mm: Array,
+    low: Array,
+    high: Array,
+    grid: BoxGrid,
+    linked_ptr: Array,
+    linked: Array,
+    gap_mm: int,
+    met: Array,
+    upper_ptr: Array,
+    upper: Array,
+) -> int:
+    """List, building by building, those with higher numbers that it is linked with or closer to than a gap.
 
-    Of every row first the lower ones, which come rising as the rows are gone through; then, going through these, the
-    upper ones, rising too. `ptr` (n+1,) is the start of the rows in `related`, `place` (n,) a copy of its beginning.
+    Args:
+        begin: the first building; lists of those before it are kept.
+        outline_ptr: (n+1,) start of each building's corners.
+        outline_mm: (corners, 2).
+        low: (n, 2) lower left of each bounding box, int64.
+        high: (n, 2) upper right, int64.
+        grid: the bounding boxes by cells.
+        linked_ptr: (n+1,) start of the buildings that each one is linked with, in either direction.
+        linked: (links,) those buildings; some may be named twice.
+        gap_mm: strictly.
+        met: (n,) int32, scratch: the last building that each one was compared with, -1 at first.
+        upper_ptr: (n+1,) int64, out: start of each list.
+        upper: (any,) int32, out: the lists, each in any order.
+
+    Returns:
+        The building before which there was too little room in `upper` to go on; n where all is done.
+    """
+    n = len(low)
+    for a in range(begin, n):
+        end = upper_ptr[a]
+        if end + (n - a) > len(upper):
+            return a
+        for k in range(linked_ptr[a], linked_ptr[a + 1]):
+            b = linked[k]
+            if b > a and met[b] != a:
+                met[b] = a
+                upper[end] = b
+                end += 1
+        upper_ptr[a + 1] = append_closer(a, outline_ptr, outline_mm, low, high, grid, gap_mm, met, upper, end)
+    return n
+
+
+@kernel
+def fill_rows(upper_ptr: Array, upper: Array, ptr: Array, place: Array, related: Array) -> None:
+    """Turn the lists of higher neighbours into rows of all neighbours, rising.
+
+    Of every row first the lower ones, which come rising as the lists are gone through; then, going through these, the
+    upper ones, rising too. `ptr` (n+1,) is the start of the rows in `related`, `place` (n,) a copy of its beginning,
+    which becomes the end of each row.
     """
     for a in range(len(place)):
         for k in range(upper_ptr[a], upper_ptr[a + 1]):
@@ -129,61 +179,3 @@ def fill_rows(upper_ptr: Array, upper: Array, ptr: Array, place: Array, related:
             a = related[k]
             related[place[a]] = b
             place[a] += 1
-
-
-@making_arrays
-def near_pairs(
-    outline_ptr: Array,
-    outline_mm: Array,
-    low: Array,
-    high: Array,
-    grid: BoxGrid,
-    linked_ptr: Array,
-    linked: Array,
-    gap_mm: int,
-) -> tuple[Array, Array]:
-    """Find every pair of buildings that are linked, or whose outlines are closer than a gap.
-
-    Args:
-        outline_ptr: (n+1,) start of each building's corners.
-        outline_mm: (corners, 2).
-        low: (n, 2) lower left of each bounding box, int64.
-        high: (n, 2) upper right, int64.
-        grid: the bounding boxes by cells.
-        linked_ptr: (n+1,) start of the buildings that each one is linked with, in either direction.
-        linked: (links,) those buildings; some may be named twice.
-        gap_mm: strictly.
-
-    Returns:
-        The symmetrical relation as CSR, neighbours rising: ptr (n+1,) and building, both int32.
-    """
-    n = len(low)
-    upper_ptr = np.zeros(n + 1, dtype=np.int64)
-    upper = np.empty(4 * n, dtype=np.int32)  # of every building the related ones with higher numbers
-    met = np.full(n, -1, dtype=np.int32)  # the last building that this one was compared with
-    end = np.int64(0)
-    for a in range(n):
-        if end + n > len(upper):
-            longer = np.empty(2 * end + n, dtype=np.int32)
-            for k in range(end):  # an assignment of slices would compile much longer
-                longer[k] = upper[k]
-            upper = longer
-        for k in range(linked_ptr[a], linked_ptr[a + 1]):
-            b = linked[k]
-            if b > a and met[b] != a:
-                met[b] = a
-                upper[end] = b
-                end += 1
-        end = append_closer(a, outline_ptr, outline_mm, low, high, grid, gap_mm, met, upper, end)
-        upper_ptr[a + 1] = end
-
-    ptr = np.zeros(n + 1, dtype=np.int32)
-    for a in range(n):
-        ptr[a + 1] += upper_ptr[a + 1] - upper_ptr[a]
-        for k in range(upper_ptr[a], upper_ptr[a + 1]):
-            ptr[upper[k] + 1] += 1
-    for a in range(n):
-        ptr[a + 1] += ptr[a]
-    related = np.empty(2 * end, dtype=np.int32)
-    fill_rows(upper_ptr, upper, ptr, ptr[:-1].copy(), related)
-    return ptr, related

@@ -133,9 +133,12 @@ def count_hits(
     their own building are left out.
     """
     n = len(building_id)
+    n_rays = 0
+    for w in range(len(walls.x)):
+        n_rays += walls.n_rays[w]
     ptr = np.zeros(n + 1, dtype=np.int64)
-    neighbour = np.empty(n, dtype=np.int64)
-    n_hits = np.empty(n, dtype=np.int64)
+    neighbour = np.empty(n_rays, dtype=np.int64)
+    n_hits = np.empty(n_rays, dtype=np.int64)
     slot = np.full(n, -1, dtype=np.int64)  # where the current building's hits on another one are counted
     end = np.int64(0)
     ray = np.int64(0)
@@ -143,10 +146,6 @@ def count_hits(
         b = walls.building[w]
         if w > 0 and walls.building[w - 1] != b:
             ray = np.int64(0)
-        if end + walls.n_rays[w] > len(neighbour):
-            more = np.empty(end + walls.n_rays[w], dtype=np.int64)
-            neighbour = np.concatenate((neighbour, more))
-            n_hits = np.concatenate((n_hits, more))
         for _ in range(walls.n_rays[w]):
             px, py, rx, ry = random_ray(walls, w, hash_key(seed, RAY, ray, building_id[b]), range_mm)
             ray += 1
