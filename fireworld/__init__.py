@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from fireworld.maps.exporting import export_city as export_city
     from fireworld.maps.importing import ImportedCity as ImportedCity
     from fireworld.maps.importing import import_city as import_city
+    from fireworld.maps.osm import ImportedOsm as ImportedOsm
+    from fireworld.maps.osm import import_osm as import_osm
     from fireworld.outcome import Outcome as Outcome
     from fireworld.policy.names import policies as policies
     from fireworld.policy.protocol import Action as Action
@@ -63,6 +65,7 @@ _ROOMS = {
     "Explanation": "recording.explain",
     "FireworldError": "errors",
     "ImportedCity": "maps.importing",
+    "ImportedOsm": "maps.osm",
     "Observation": "policy.protocol",
     "Outcome": "outcome",
     "Policy": "policy.protocol",
@@ -80,6 +83,7 @@ _ROOMS = {
     "export_city": "maps.exporting",
     "fork": "recording.fork",
     "import_city": "maps.importing",
+    "import_osm": "maps.osm",
     "load_team": "policy.teams.team",
     "open_log": "recording.run",
     "open_training": "training.log.reader",

@@ -72,6 +72,8 @@ class Plan:
     """(n,) index of each building's type in `json_plan.BUILDING_TYPES`; None: refuges and plain buildings."""
     links: Links | None = None
     """Radiation links measured elsewhere; None: rays are sent."""
+    source_id: tuple[str, ...] = ()
+    """What each building is called in its source, n texts; empty where they have no such names."""
     source: Mapping[str, Any] | None = None
     """Where it comes from: anything that JSON can hold. Nothing is computed from it."""
     notes: tuple[str, ...] = ()

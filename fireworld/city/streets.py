@@ -23,7 +23,7 @@ def streets_of(street_map: StreetMap, centroid_mm: Int32Array) -> Streets:
     exact = np.sqrt((span * span).sum(axis=1).astype(np.float64))
     length = np.maximum(1, np.floor(exact + 0.5).astype(np.int64))
     distance, next_node = shortest_ways(node, street, length)
-    access_street, access_offset, access_mm = _access_points(node, street, length, centroid_mm.astype(np.int64))
+    access_street, access_offset, access_mm = access_points(node, street, length, centroid_mm.astype(np.int64))
     return Streets(
         node_mm=street_map.node_mm,
         street=street_map.street,
@@ -83,7 +83,7 @@ def _neighbours(m: int, street: Int64Array, length_mm: Int64Array) -> list[tuple
     return [(end[low:high], way[low:high]) for low, high in pairwise(bounds)]
 
 
-def _access_points(
+def access_points(
     node: Int64Array, street: Int64Array, length: Int64Array, centroid: Int64Array
 ) -> tuple[Int64Array, Int64Array, Int64Array]:
     """Find the point of any street nearest to each centroid; ties go to the lowest street.

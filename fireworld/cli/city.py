@@ -124,3 +124,6 @@ def _print_import(made: ImportedCity) -> None:
         click.echo(textwrap.fill(line, WIDTH, initial_indent="- ", subsequent_indent="  ", break_on_hyphens=False))
     for path in made.files:
         click.echo(f"wrote {path}")
+
+
+from fireworld.cli import city_osm  # noqa: E402, F401 - it adds its command to the group above
