@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from fireworld.cli.city_osm import osm
+
 if TYPE_CHECKING:
     from fireworld.maps.importing import ImportedCity
 
@@ -28,7 +30,12 @@ def command() -> None:
     fireworld city show sakae.json -o sakae.png
     fireworld run sakae.yaml --record sakae.mcap
     fireworld render sakae.mcap -o sakae.gif
+
+    `fireworld city osm` does the same for an extract of OpenStreetMap.
     """
+
+
+command.add_command(osm)
 
 
 @command.command("import")
@@ -121,9 +128,42 @@ def _print_import(made: ImportedCity) -> None:
     rest = f"{found['n_refuges']} refuges, {found['n_hydrants']} hydrants, {found['n_entrances']} entrances"
     click.echo(f"{found['n_roads']} roads, {rest}")
     for line in made.report.lines:
-        click.echo(textwrap.fill(line, WIDTH, initial_indent="- ", subsequent_indent="  ", break_on_hyphens=False))
+        _print_item(line)
     for path in made.files:
         click.echo(f"wrote {path}")
 
 
-from fireworld.cli import city_osm  # noqa: E402, F401 - it adds its command to the group above
+@command.command()
+@click.argument("city", metavar="CITY")
+@click.option("-o", "--output", metavar="DIR", required=True, type=click.Path(path_type=Path), help="Folder to make.")
+@force_option
+@json_option
+def export(*, city: str, output: Path, force: bool, as_json: bool) -> None:
+    """Write CITY as a map of the RoboCup Rescue simulation: map.gml, scenario.xml, *.cfg.
+
+    CITY is a city file, the folder of a map, or a scenario (by name or file): then its fires, civilians, brigades and
+    parameters are written, too. A city without roads gets roads along its streets, with an entrance to every building.
+    What was written is read again as the official reader does; what it reads otherwise is listed.
+
+    \b
+    fireworld city export default -o default-map
+    fireworld city export kobe.json -o kobe
+
+    Exit code: 0 exported, 2 could not export (nothing is written).
+    """
+    from fireworld.maps.exporting import export_city
+
+    made = export_city(city, output, force=force)
+    if as_json:
+        n_buildings = len(made.plan.footprints.building_id)
+        found = {"folder": str(output), "n_buildings": n_buildings, "differences": list(made.differences)}
+        click.echo(json.dumps(found, indent=2))
+        return
+    for line in made.differences:
+        _print_item(line)
+    click.echo(f"wrote {output}: {len(made.plan.footprints.building_id)} buildings")
+
+
+def _print_item(line: str) -> None:
+    """Write a line of a list."""
+    click.echo(textwrap.fill(line, WIDTH, initial_indent="- ", subsequent_indent="  ", break_on_hyphens=False))

@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fireworld.cli.city import command, force_option, json_option
-
 if TYPE_CHECKING:
     from fireworld.maps.osm import ImportedOsm
 
@@ -18,7 +16,7 @@ WIDTH = 80
 _COUNT_WIDTH = 5
 
 
-@command.command("osm")
+@click.command("osm")
 @click.argument("extract", metavar="FILE", type=click.Path(path_type=Path))
 @click.option("--around", metavar="LAT,LON", help="Middle of the city.  [default: the middle of the extract]")
 @click.option("--radius", metavar="M", type=float, help="Take the buildings so near to the middle.")
@@ -36,8 +34,8 @@ _COUNT_WIDTH = 5
     "--write-scenario", metavar="F.yaml", type=click.Path(path_type=Path), help="Scenario file to write, too."
 )
 @click.option("--fires", metavar="ID,...", help="Buildings that burn in it.  [default: two in the middle]")
-@force_option
-@json_option
+@click.option("--force", is_flag=True, help="Replace existing files.")
+@click.option("--json", "as_json", is_flag=True, help="Write JSON.")
 def osm(
     *,
     extract: Path,

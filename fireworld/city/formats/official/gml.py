@@ -10,7 +10,7 @@ from collections.abc import Container, Iterable
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
-from fireworld.city.formats.json_plan import BUILDINGS_MAX, FLOORS_MAX, ID_MAX
+from fireworld.city.formats.json_plan import BUILDINGS_MAX, COORDINATE_MAX_MM, FLOORS_MAX, ID_MAX
 from fireworld.city.formats.official.xml_stream import Attributes, XmlStream
 from fireworld.errors import CityError, expected
 
@@ -18,6 +18,9 @@ MAP: Final = "urn:roborescue:map:gml"
 GML: Final = "http://www.opengis.net/gml"
 XLINK: Final = "http://www.w3.org/1999/xlink"
 ROOT: Final = f"{MAP} map"
+FIREWORLD: Final = "urn:fireworld:map"
+CENTROID: Final = f"{FIREWORLD} centroid"
+"""Of a road, in mm, where no corners make it: written by `fireworld city export`, nobody else reads it."""
 GML_ID: Final = f"{GML} id"
 HREF: Final = f"{XLINK} href"
 UNKNOWN_SHOWN_MAX: Final = 5
@@ -42,6 +45,7 @@ class Area:
     floors: int = 1
     code: int = 0
     edges: list[DirectedEdge] = field(default_factory=list)
+    centroid_mm: tuple[int, int] | None = None
 
 
 @dataclass
@@ -180,6 +184,13 @@ class _Reader:
 
     def _road(self, attributes: Attributes) -> None:
         self._area = Area(self._area_id("road", attributes))
+        if CENTROID in attributes:
+            x, _, y = attributes[CENTROID].partition(" ")
+            what = f"road {self._area.area_id}"
+            self._area.centroid_mm = (
+                self.stream.whole(what, "centroid", x, high=COORDINATE_MAX_MM),
+                self.stream.whole(what, "centroid", y, high=COORDINATE_MAX_MM),
+            )
         self.found.roads.append(self._area)
 
     def _space(self, attributes: Attributes) -> None:

@@ -15,6 +15,7 @@ from fireworld.city.formats.official.cfg import Config
 from fireworld.city.formats.official.floors import floors_and_codes
 from fireworld.city.formats.official.gml import Area, GmlMap, Point
 from fireworld.city.formats.official.keys import INFLAMMABLE_KEYS, PREFIX
+from fireworld.city.formats.official.measuring import exact_measures
 from fireworld.city.formats.official.order import map_order, world_order
 from fireworld.city.formats.official.passages import Outlined, find_passages
 from fireworld.city.formats.official.report import Report
@@ -107,8 +108,7 @@ def _origin(gml: GmlMap) -> Point:
 def _measure(gml: GmlMap, area: Area, origin: Point) -> Measured:
     """Turn an area into whole millimetres and square metres.
 
-    Area and centroid follow from the corners as they are before they are cut to whole millimetres: the shoelace sums,
-    in double precision, in the order of the corners.
+    Area and centroid follow from the corners as they are before they are cut to whole millimetres.
     """
     node, edge = gml.node, gml.edge
     low_x, low_y = origin
@@ -119,22 +119,12 @@ def _measure(gml: GmlMap, area: Area, origin: Point) -> Measured:
 
     exact = [place(edge[one][0 if forward else 1]) for one, forward, _ in area.edges]
     ends = [place(edge[one][1 if forward else 0]) for one, forward, _ in area.edges]
-    doubled = x_sum = y_sum = 0.0
-    for (x, y), (next_x, next_y) in pairwise([*exact, exact[0]]):
-        cross = x * next_y - next_x * y
-        doubled += cross
-        x_sum += (x + next_x) * cross
-        y_sum += (y + next_y) * cross
-    enclosed = doubled / 2.0
-    if enclosed:
-        centroid = (int(x_sum / (6.0 * enclosed)), int(y_sum / (6.0 * enclosed)))
-    else:  # a road may be a line
-        centroid = (int(sum(x for x, _ in exact) / len(exact)), int(sum(y for _, y in exact) / len(exact)))
+    centroid, area_m2 = exact_measures(exact)
     return Measured(
         corners=[(int(x), int(y)) for x, y in exact],
         ends=[(int(x), int(y)) for x, y in ends],
-        centroid=centroid,
-        area_m2=int(abs(enclosed * 1e-6)),
+        centroid=area.centroid_mm or centroid,
+        area_m2=area_m2,
     )
 
 
