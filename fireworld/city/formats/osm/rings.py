@@ -118,7 +118,10 @@ def is_inside(ring: Sequence[Corner], point: Corner) -> bool:
 def _ring(places: Sequence[Place], projection: Projection) -> Ring:
     """Project a closed row of places; corners that fall on one millimetre are one."""
     corners = [(x, y) for x, y in projection.to_mm(places).tolist()]
-    return [corner for k, corner in enumerate(corners) if corner != corners[k - 1]] or corners[:1]
+    ring = [corner for k, corner in enumerate(corners) if k == 0 or corner != corners[k - 1]]
+    while len(ring) > 1 and ring[-1] == ring[0]:
+        ring.pop()
+    return ring
 
 
 def _join(
