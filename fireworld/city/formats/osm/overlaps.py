@@ -77,7 +77,7 @@ def _is_sliver(shape: Shape) -> bool:
     """Return whether a building is too small or too thin to burn."""
     if len(set(shape.outer)) < 3:
         return True
-    area = abs(doubled_area_mm2(shape.outer)) / 2
+    area = (abs(doubled_area_mm2(shape.outer)) - sum(abs(doubled_area_mm2(hole)) for hole in shape.holes)) / 2
     ends = [*shape.outer[1:], shape.outer[0]]
     walls = np.array(ends, dtype=np.float64) - np.array(shape.outer, dtype=np.float64)
     length = float(np.sqrt((walls * walls).sum(axis=1)).sum())

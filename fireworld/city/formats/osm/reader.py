@@ -113,15 +113,20 @@ class OsmFile:
         """Return the bounds that the file names; a file of the time before versions were said is read as one of now."""
         try:
             return self._header_window()
-        except RuntimeError as error:
+        except self._faults as error:
             if _NO_VERSION not in str(error) or ending != ".osm":
                 raise self._complaint(error) from None
         content = path.read_bytes().replace(b"<osm>", b'<osm version="0.6">', 1)
         self._input = self._osmium.io.FileBuffer(content, "osm")
         try:
             return self._header_window()
-        except RuntimeError as error:
+        except self._faults as error:
             raise self._complaint(error) from None
+
+    @property
+    def _faults(self) -> tuple[type[Exception], ...]:
+        """What pyosmium raises for files that make no sense."""
+        return (RuntimeError, ValueError, UnicodeDecodeError, self._osmium.InvalidLocationError)
 
     def _header_window(self) -> Window | None:
         reader = self._osmium.io.Reader(self._input, self._osmium.osm.NOTHING)
@@ -181,7 +186,7 @@ class OsmFile:
             for one in objects:
                 if one.visible:
                     yield one
-        except (RuntimeError, ValueError, UnicodeDecodeError, osmium.InvalidLocationError) as error:
+        except self._faults as error:
             raise self._complaint(error) from None
 
     def _complaint(self, error: Exception) -> CityError:
