@@ -12,6 +12,9 @@ import click
 from fireworld.cli.city_osm import osm
 
 if TYPE_CHECKING:
+    from fireworld_viewer.pictures.city_plan import CityPlan
+
+    from fireworld.city.city import Plan
     from fireworld.maps.importing import ImportedCity
 
 WIDTH: Final = 80
@@ -167,3 +170,62 @@ def export(*, city: str, output: Path, force: bool, as_json: bool) -> None:
 def _print_item(line: str) -> None:
     """Write a line of a list."""
     click.echo(textwrap.fill(line, WIDTH, initial_indent="- ", subsequent_indent="  ", break_on_hyphens=False))
+
+
+@command.command()
+@click.argument("city", metavar="CITY")
+@click.option(
+    "-o", "--output", metavar="F.png", type=click.Path(path_type=Path), help="PNG, SVG or PDF.  [default: NAME.png]"
+)
+@force_option
+def show(*, city: str, output: Path | None, force: bool) -> None:
+    """Draw CITY: buildings by material, refuges, other kinds of buildings, roads, hydrants.
+
+    CITY is a city file, the folder of a map, or a scenario (by name or file). Where the map comes from is written into
+    a corner.
+
+    \b
+    fireworld city show sakae.json -o sakae.png
+    fireworld city show maps/kobe -o kobe.svg
+
+    Exit code: 0 drawn, 2 could not draw.
+    """
+    from fireworld_viewer.pictures.city_plan import draw_plan
+    from fireworld_viewer.pictures.figure_files import plain_style, save_figure
+
+    from fireworld.maps.sources import city_of
+
+    plan = city_of(city).plan
+    path = output or Path(Path(f"{plan.name}.png").name)
+    with plain_style():
+        save_figure(draw_plan(_drawn(plan)), path, force=force)
+    click.echo(f"{path}: {len(plan.footprints.building_id)} buildings")
+
+
+def _drawn(plan: Plan) -> CityPlan:
+    """Return what is drawn of a plan, in metres."""
+    import numpy as np
+    from fireworld_viewer.pictures.city_plan import CityPlan
+
+    from fireworld.city.formats.json_plan import BUILDING_TYPES
+    from fireworld.records import MATERIALS
+
+    found, streets, roads = plan.footprints, plan.streets, plan.roads
+    node = streets.node_mm / 1000.0
+    kinds = found.refuge if plan.kind is None else plan.kind  # 0 building, 1 refuge in either
+    wide, high = ((found.outline_mm.max(axis=0) - found.outline_mm.min(axis=0)) / 1000.0).tolist()
+    outlines = np.split(found.outline_mm / 1000.0, found.outline_ptr[1:-1])
+    entrances = streets.entrance_node[streets.entrance_node >= 0]
+    source = plan.source or {}
+    return CityPlan(
+        title=plan.name,
+        subtitle=f"{len(outlines)} buildings, {wide:.0f} m by {high:.0f} m",
+        attribution=str(source.get("attribution", "")),
+        outlines=outlines,
+        material=[MATERIALS[material] for material in found.material.tolist()],
+        kind=[BUILDING_TYPES[kind] for kind in kinds.tolist()],
+        roads=[] if roads is None else np.split(roads.outline_mm / 1000.0, roads.outline_ptr[1:-1]),
+        streets=node[streets.street],
+        hydrants=node[streets.hydrant_node],
+        entrances=node[entrances],
+    )

@@ -34,6 +34,8 @@ def _compiler(**more: Any) -> Callable[[Callable[..., Any]], Any]:
 # and a kernel makes no arrays. One that did would not compile.
 kernel = _compiler(_nrt=False)
 _closed = _compiler(_nrt=False, no_cpython_wrapper=True)
+_open_inlined = _compiler(_nrt=False, forceinline=True)
+_closed_inlined = _compiler(_nrt=False, no_cpython_wrapper=True, forceinline=True)
 making_arrays = _compiler()
 """For the few kernels that make arrays."""
 
@@ -48,8 +50,18 @@ class _Closed(CPUDispatcher):  # type: ignore[misc]  # numba is untyped
 
 def inner(function: Callable[..., Any]) -> Any:
     """Compile a function for other kernels alone: that spares a third of the compilation."""
-    if OPEN:
-        return kernel(function)
-    closed = _closed(function)
-    closed.__class__ = _Closed
-    return closed
+    return kernel(function) if OPEN else _close(_closed(function))
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """Compile as `inner` does, into the code of those that call it, however long it is.
+
+    For what is called often and hands groups of arrays on to what is called seldom. The compiler would leave it a
+    function by itself, because of the many arrays, and to hand them over can take longer than the work.
+    """
+    return _open_inlined(function) if OPEN else _close(_closed_inlined(function))
+
+
+def _close(function: Any) -> Any:
+    function.__class__ = _Closed
+    return function

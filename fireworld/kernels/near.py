@@ -144,7 +144,7 @@ def find_upper(
         upper: (any,) int32, out: the lists, each in any order.
 
     Returns:
-        The building before which there was too little room in `upper` to go on; n where all is done.
+        The building before which there was too little room in `upper`; n where all is done.
     """
     n = len(low)
     for a in range(begin, n):

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from fireworld.errors import one_line
+
 IDS_SHOWN_MAX: Final = 5
 
 
@@ -23,10 +25,10 @@ class Finding:
 
     def __str__(self) -> str:
         if not self.ids:
-            return self.text
+            return one_line(self.text)
         shown = ", ".join(str(one) for one in self.ids[:IDS_SHOWN_MAX])
         more = f" and {len(self.ids) - IDS_SHOWN_MAX} more" if len(self.ids) > IDS_SHOWN_MAX else ""
-        return f"{self.text}: {shown}{more}"
+        return one_line(f"{self.text}: {shown}{more}")
 
 
 @dataclass

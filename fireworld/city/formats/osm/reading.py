@@ -20,7 +20,7 @@ from fireworld.city.formats.osm.refuges import chosen_refuges, named_refuges, st
 from fireworld.city.formats.osm.rings import Losses, Shape, relation_shapes, way_shape
 from fireworld.city.formats.osm.streets import StreetCounts, street_graph, with_hydrants
 from fireworld.city.outlines import Building, Corner, assemble, centroid_mm, doubled_area_mm2
-from fireworld.city.streets import access_points
+from fireworld.city.streets import streets_of
 from fireworld.errors import CityError, expected
 from fireworld.records import MATERIALS
 
@@ -202,11 +202,7 @@ def _streets(
 
 def _far_from_streets(streets: StreetMap, centroids: Int64Array) -> list[int]:
     """Return the buildings that no water reaches from a street, by index."""
-    node, street = streets.node_mm.astype(np.int64), streets.street.astype(np.int64)
-    span = node[street[:, 1]] - node[street[:, 0]]
-    length = np.maximum(np.sqrt((span * span).sum(axis=1).astype(np.float64)).astype(np.int64), 1)
-    *_, point = access_points(node, street, length, centroids)
-    away = point - centroids
+    away = streets_of(streets, centroids.astype(np.int32)).access_mm.astype(np.int64) - centroids
     far: list[int] = np.flatnonzero((away * away).sum(axis=1) > FAR_FROM_STREETS_MM**2).tolist()
     return far
 

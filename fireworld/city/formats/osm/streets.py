@@ -14,7 +14,7 @@ from fireworld.city.formats.osm.area import Area
 from fireworld.city.formats.osm.reader import OsmNode, OsmWay
 from fireworld.city.formats.osm.simplify import simplified
 from fireworld.city.outlines import Corner
-from fireworld.city.streets import access_points
+from fireworld.city.streets import streets_of
 
 HYDRANT_REACH_MM: Final = 50_000
 """A hydrant farther from all streets is left out."""
@@ -76,13 +76,12 @@ def with_hydrants(
     """
     places = area.projection.to_mm([one.place for one in hydrants])
     places = places[area.holds(places)] if len(places) else places
-    node, street = np.array(nodes, dtype=np.int64), np.array(streets, dtype=np.int64)
     if not len(places):
         return _street_map(nodes, streets, []), 0, 0
-    span = node[street[:, 1]] - node[street[:, 0]]
-    length = np.maximum(np.floor(np.sqrt((span * span).sum(axis=1).astype(np.float64)) + 0.5).astype(np.int64), 1)
-    chosen, offset, point = access_points(node, street, length, places)
-    away = point - places
+    found = streets_of(_street_map(nodes, streets, []), places.astype(np.int32))
+    length, point = found.street_length_mm.tolist(), found.access_mm
+    chosen, offset = found.access_street, found.access_offset_mm
+    away = point.astype(np.int64) - places
     near = (away * away).sum(axis=1) <= HYDRANT_REACH_MM**2
     on_street: dict[int, list[tuple[int, Corner]]] = {}
     at: list[Corner] = []
