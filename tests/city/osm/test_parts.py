@@ -14,7 +14,7 @@ from fireworld.city.formats.osm.kinds import floors_of, material_of
 from fireworld.city.formats.osm.overlaps import weed
 from fireworld.city.formats.osm.projection import Projection
 from fireworld.city.formats.osm.reader import OsmNode, OsmRelation, OsmWay
-from fireworld.city.formats.osm.rings import Losses, Shape, relation_shapes, way_shape
+from fireworld.city.formats.osm.rings import Losses, Shape, relation_shapes, way_shapes
 from fireworld.city.formats.osm.simplify import simplified, straightened
 from fireworld.city.formats.osm.streets import street_graph, with_hydrants
 
@@ -80,11 +80,10 @@ def way(osm_id, *places, nodes=None, **tags):
 def test_a_closed_way_is_a_building_and_others_are_not():
     losses = Losses()
     square = ((0, 0), (1000, 0), (1000, 1000), (0, 0))
-    shape = way_shape(way(7, *square), EQUATOR, losses)
+    ways = [way(7, *square), way(8, *square[:3]), way(9, (0, 0), None, (1000, 1000), (0, 0))]
+    (shape,) = way_shapes(ways, EQUATOR, losses)
     assert shape.source == "w7"
     assert shape.outer == [(0, 0), (11132, 0), (11132, 11057)]
-    assert way_shape(way(8, *square[:3]), EQUATOR, losses) is None
-    assert way_shape(way(9, (0, 0), None, (1000, 1000), (0, 0)), EQUATOR, losses) is None
     assert (losses.open, losses.incomplete) == (["w8"], ["w9"])
 
 

@@ -67,7 +67,13 @@ def polygons_of(shapes: Sequence[Shape]) -> tuple[Any, Float64Array]:
     """Return the buildings as (n,) shapely polygons, those that cross themselves made valid, and their areas in mm2."""
     import shapely
 
-    made = np.array([shapely.Polygon(shape.outer, shape.holes) for shape in shapes], dtype=object)
+    sizes = [len(shape.outer) for shape in shapes]
+    corners = np.array([corner for shape in shapes for corner in shape.outer], dtype=np.float64)
+    rings: Any = shapely.linearrings(corners, indices=np.repeat(np.arange(len(shapes)), sizes))
+    made: Any = shapely.polygons(rings)
+    for k, shape in enumerate(shapes):
+        if shape.holes:
+            made[k] = shapely.Polygon(shape.outer, shape.holes)
     invalid = ~shapely.is_valid(made)
     made[invalid] = shapely.make_valid(made[invalid])
     return made, shapely.area(made)

@@ -7,17 +7,24 @@ millimetre, and lengths to 5 millionths of themselves: 5 mm in a kilometre.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain, islice
 from typing import Any, Final
 
 import numpy as np
 
 from fireworld.city.city import Float64Array, Int64Array
+from fireworld.city.outlines import Corner
+
+Place = tuple[int, int]
+"""Longitude and latitude in units of 1e-7 degrees."""
 
 UNITS_PER_DEGREE: Final = 10_000_000
 """OpenStreetMap keeps degrees as whole numbers of this size; about a centimetre."""
 LATITUDE_MAX: Final = 85.0
 RADIUS_MAX_M: Final = 20_000.0
+ROWS_AT_ONCE: Final = 10_000
 _SEMI_MAJOR_M: Final = 6_378_137.0
 _FLATTENING: Final = 1 / 298.257223563
 _E2: Final = _FLATTENING * (2 - _FLATTENING)
@@ -54,6 +61,16 @@ class Projection:
         metres = np.stack([x, y], axis=1)
         mm: Int64Array = np.floor(metres * 1000 + 0.5).astype(np.int64)
         return mm
+
+
+def projected(projection: Projection, rows: Iterable[Sequence[Place]]) -> Iterator[list[Corner]]:
+    """Yield rows of places in whole mm; many rows at once take little more time than one."""
+    remaining = iter(rows)
+    while some := list(islice(remaining, ROWS_AT_ONCE)):
+        places = np.fromiter(chain.from_iterable(chain.from_iterable(some)), dtype=np.int64)
+        corners = iter(map(tuple, projection.to_mm(places).tolist()))
+        for row in some:
+            yield list(islice(corners, len(row)))
 
 
 def sin_cos(angle: Float64Array) -> tuple[Float64Array, Float64Array]:

@@ -8,13 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from fireworld.city.formats.osm.projection import UNITS_PER_DEGREE
+from fireworld.city.formats.osm.projection import UNITS_PER_DEGREE, Place
 from fireworld.errors import CityError, described, expected
 
-Place = tuple[int, int]
-"""Longitude and latitude in units of 1e-7 degrees."""
 Window = tuple[int, int, int, int]
-"""West, south, east, north in the same units."""
+"""West, south, east, north in units of 1e-7 degrees."""
 
 FORMATS: Final[Mapping[str, str]] = {
     ".osm": "osm", ".osm.gz": "osm.gz", ".osm.bz2": "osm.bz2", ".pbf": "pbf", ".osm.xml": "osm",

@@ -17,7 +17,7 @@ from fireworld.city.formats.osm.kinds import LEVEL_HEIGHT_M, MATERIALS_BY_TAG, f
 from fireworld.city.formats.osm.overlaps import weed
 from fireworld.city.formats.osm.reader import Extract, OsmFile
 from fireworld.city.formats.osm.refuges import chosen_refuges, named_refuges, stations_of
-from fireworld.city.formats.osm.rings import Losses, Shape, relation_shapes, way_shape
+from fireworld.city.formats.osm.rings import Losses, Shape, relation_shapes, way_shapes
 from fireworld.city.formats.osm.streets import StreetCounts, street_graph, with_hydrants
 from fireworld.city.outlines import Building, Corner, assemble, centroid_mm, doubled_area_mm2
 from fireworld.city.streets import streets_of
@@ -90,14 +90,8 @@ def _shapes(extract: Extract, area: Area, report: Report) -> list[Shape]:
         made, ways = relation_shapes(relation, extract.members, area.projection, losses)
         shapes += made
         outlines |= ways
-    n_outlines = 0
-    for way in extract.buildings:
-        if way.osm_id in outlines:
-            n_outlines += 1
-            continue
-        shape = way_shape(way, area.projection, losses)
-        if shape is not None:
-            shapes.append(shape)
+    own = [way for way in extract.buildings if way.osm_id not in outlines]
+    shapes += way_shapes(own, area.projection, losses)
     above = [shape for shape in shapes if not _is_below(shape.tags)]
     inside = area.holds(np.array([_middle(shape) for shape in above], dtype=np.int64).reshape(-1, 2))
     here = sorted(
@@ -110,7 +104,11 @@ def _shapes(extract: Extract, area: Area, report: Report) -> list[Shape]:
     )
     report.note_areas("open", "buildings are not closed: left out", losses.open)
     report.note_number("underground", "buildings are underground: left out", below)
-    report.note_number("outlines", "ways are outlines of a building that a relation draws: taken once", n_outlines)
+    report.note_number(
+        "outlines",
+        "ways are outlines of a building that a relation draws: taken once",
+        len(extract.buildings) - len(own),
+    )
     report.note_areas("duplicates", "buildings have the corners of another: left out", weeded.duplicates)
     report.note_areas("slivers", "buildings are smaller than 6 m2 or thinner than 0.5 m: left out", weeded.slivers)
     report.note_areas("covered", "buildings are to 90 % or more within another: left out", weeded.covered)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from fireworld.city.formats.osm.projection import Projection
-from fireworld.city.formats.osm.reader import OsmRelation, OsmWay, Place
+from fireworld.city.formats.osm.projection import Place, Projection, projected
+from fireworld.city.formats.osm.reader import OsmRelation, OsmWay
 from fireworld.city.outlines import Corner, doubled_area_mm2
 
 Ring = list[Corner]
@@ -55,17 +55,18 @@ class Losses:
     lost_holes: list[str] = field(default_factory=list)
 
 
-def way_shape(way: OsmWay, projection: Projection, losses: Losses) -> Shape | None:
-    """Return the building that a way draws; None for one that is not closed or lost nodes."""
-    name = f"w{way.osm_id}"
-    if None in way.places:
-        losses.incomplete.append(name)
-        return None
-    if len(way.nodes) < 4 or way.nodes[0] != way.nodes[-1]:
-        losses.open.append(name)
-        return None
-    ring = _ring([place for place in way.places if place is not None], projection)
-    return Shape("way", way.osm_id, way.tags, ring)
+def way_shapes(ways: Iterable[OsmWay], projection: Projection, losses: Losses) -> list[Shape]:
+    """Return the buildings that ways draw; none for those that are not closed or lost nodes."""
+    whole: list[OsmWay] = []
+    for way in ways:
+        if None in way.places:
+            losses.incomplete.append(f"w{way.osm_id}")
+        elif len(way.nodes) < 4 or way.nodes[0] != way.nodes[-1]:
+            losses.open.append(f"w{way.osm_id}")
+        else:
+            whole.append(way)
+    rows = projected(projection, ([place for place in way.places if place is not None] for way in whole))
+    return [Shape("way", way.osm_id, way.tags, _ring(row)) for way, row in zip(whole, rows, strict=True)]
 
 
 def relation_shapes(
@@ -76,8 +77,8 @@ def relation_shapes(
     outer, n_open, lost, ways = _join(relation, members, ("outer", ""))
     inner, n_open_inner, lost_inner, _ = _join(relation, members, ("inner",))
     shapes = [
-        Shape("relation", relation.osm_id, relation.tags, _ring(places, projection), part=k)
-        for k, places in enumerate(outer)
+        Shape("relation", relation.osm_id, relation.tags, _ring(row), part=k)
+        for k, row in enumerate(projected(projection, outer))
     ]
     if n_open or lost or not shapes:
         (losses.incomplete if lost else losses.open).append(name)
@@ -85,8 +86,8 @@ def relation_shapes(
         return [], set()
     if n_open_inner or lost_inner:
         losses.lost_holes.append(name)
-    for places in inner:
-        hole = _ring(places, projection)
+    for row in projected(projection, inner):
+        hole = _ring(row)
         if len(hole) < 3 or abs(doubled_area_mm2(hole)) < 2_000_000 * HOLE_MIN_M2:
             losses.filled_holes += 1
             continue
@@ -115,9 +116,8 @@ def is_inside(ring: Sequence[Corner], point: Corner) -> bool:
     return inside
 
 
-def _ring(places: Sequence[Place], projection: Projection) -> Ring:
-    """Project a closed row of places; corners that fall on one millimetre are one."""
-    corners = [(x, y) for x, y in projection.to_mm(places).tolist()]
+def _ring(corners: Sequence[Corner]) -> Ring:
+    """Make a ring of a closed row; corners that fall on one millimetre are one."""
     ring = [corner for k, corner in enumerate(corners) if k == 0 or corner != corners[k - 1]]
     while len(ring) > 1 and ring[-1] == ring[0]:
         ring.pop()

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Final
 
 import numpy as np
 
 from fireworld.city.city import StreetMap
 from fireworld.city.formats.osm.area import Area
+from fireworld.city.formats.osm.projection import projected
 from fireworld.city.formats.osm.reader import OsmNode, OsmWay
 from fireworld.city.formats.osm.simplify import simplified
 from fireworld.city.outlines import Corner
@@ -29,7 +30,6 @@ Graph = dict[Corner, set[Corner]]
 class StreetCounts:
     """What was done to the streets."""
 
-    n_ways: int = 0
     tunnels: list[str] = field(default_factory=list)
     squares: list[str] = field(default_factory=list)
     cut: list[str] = field(default_factory=list)
@@ -51,14 +51,10 @@ def street_graph(ways: Iterable[OsmWay], area: Area) -> tuple[list[Corner], list
     """
     counts = StreetCounts()
     graph: Graph = {}
-    for way in ways:
-        if not _is_drivable(way, counts):
-            continue
-        counts.n_ways += 1
-        if None in way.places:
-            counts.cut.append(f"w{way.osm_id}")
-        for row in _rows(way):
-            _add(graph, [(x, y) for x, y in area.projection.to_mm(row).tolist()], area, counts)
+    driven = [way for way in ways if _is_drivable(way, counts)]
+    counts.cut = [f"w{way.osm_id}" for way in driven if None in way.places]
+    for row in projected(area.projection, chain.from_iterable(map(_rows, driven))):
+        _add(graph, row, area, counts)
     _keep_largest(graph, counts)
     counts.n_places = len(graph)
     streets = simplified(graph)
