@@ -216,11 +216,10 @@ def _drawn(plan: Plan) -> CityPlan:
     wide, high = ((found.outline_mm.max(axis=0) - found.outline_mm.min(axis=0)) / 1000.0).tolist()
     outlines = np.split(found.outline_mm / 1000.0, found.outline_ptr[1:-1])
     entrances = streets.entrance_node[streets.entrance_node >= 0]
-    source = plan.source or {}
     return CityPlan(
         title=plan.name,
         subtitle=f"{len(outlines)} buildings, {wide:.0f} m by {high:.0f} m",
-        attribution=str(source.get("attribution", "")),
+        attribution=plan.attribution,
         outlines=outlines,
         material=[MATERIALS[material] for material in found.material.tolist()],
         kind=[BUILDING_TYPES[kind] for kind in kinds.tolist()],

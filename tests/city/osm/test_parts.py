@@ -51,18 +51,26 @@ def test_floors(tags, floors, by):
     ("said", "material"), [("wood", 0), ("Timber", 0), ("glass", 1), ("brick", 2), ("reinforced_concrete", 2)]
 )
 def test_materials_by_tag(said, material):
-    assert material_of({"building": "house", "building:material": said}, seed=1, key=5) == (material, True)
+    assert material_of({"building": "house", "building:material": said}, floors=1, seed=1, key=5) == (material, True)
 
 
 @pytest.mark.parametrize(
-    ("kind", "shares"),
-    [("house", (80, 5, 15)), ("warehouse", (10, 65, 25)), ("office", (20, 30, 50)), ("yes", (75, 20, 5))],
+    ("kind", "floors", "shares"),
+    [
+        ("house", 2, (80, 5, 15)),
+        ("house", 4, (80, 5, 15)),
+        ("warehouse", 2, (10, 65, 25)),
+        ("office", 2, (20, 30, 50)),
+        ("yes", 3, (75, 20, 5)),
+        ("yes", 4, (20, 30, 50)),
+    ],
 )
-def test_materials_are_drawn_in_their_shares(kind, shares):
+def test_materials_are_drawn_in_their_shares(kind, floors, shares):
     tags = {"building": kind, "building:material": "gingerbread"}
-    drawn = [material_of(tags, seed=3, key=key)[0] for key in range(10_000_000_000, 10_000_020_000)]
+    drawn = [material_of(tags, floors=floors, seed=3, key=key)[0] for key in range(10_000_000_000, 10_000_020_000)]
     assert [100 * drawn.count(material) / 20_000 for material in range(3)] == pytest.approx(shares, abs=1.2)
-    assert drawn[:20] == [material_of(tags, seed=3, key=key)[0] for key in range(10_000_000_000, 10_000_000_020)]
+    again = [material_of(tags, floors=floors, seed=3, key=key)[0] for key in range(10_000_000_000, 10_000_000_020)]
+    assert drawn[:20] == again
 
 
 def test_every_share_is_of_a_hundred():

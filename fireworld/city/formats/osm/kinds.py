@@ -41,6 +41,7 @@ SHARES: Final[Mapping[str, tuple[int, int, int]]] = {
 """Wood, steel and concrete in per cent, by group of kinds."""
 OTHER_SHARES: Final = (75, 20, 5)
 """Of all other kinds: as in generated cities and the official maps."""
+BLOCK_FLOORS: Final = 4
 GROUP_OF: Final[Mapping[str, str]] = {
     **dict.fromkeys(
         ("house", "detached", "semidetached_house", "terrace", "bungalow", "cabin", "farm", "barn", "hut", "shed",
@@ -77,12 +78,16 @@ def floors_of(tags: Mapping[str, str]) -> tuple[int, str]:
     return FLOORS_BY_KIND.get(tags["building"], DEFAULT_FLOORS), ""
 
 
-def material_of(tags: Mapping[str, str], *, seed: int, key: int) -> tuple[int, bool]:
-    """Return a building's material and whether its tag says so; else it is drawn, by a key of its own, by its kind."""
+def material_of(tags: Mapping[str, str], *, floors: int, seed: int, key: int) -> tuple[int, bool]:
+    """Return a building's material and whether its tag says so; else it is drawn, by a key of its own, by its kind.
+
+    One of no known kind with four floors or more counts as a block.
+    """
     said = MATERIALS_BY_TAG.get(tags.get("building:material", "").lower())
     if said is not None:
         return said, True
-    wood, steel, _ = SHARES[GROUP_OF[tags["building"]]] if tags["building"] in GROUP_OF else OTHER_SHARES
+    group = GROUP_OF.get(tags["building"], "blocks" if floors >= BLOCK_FLOORS else "")
+    wood, steel, _ = SHARES.get(group, OTHER_SHARES)
     drawn = draws.below(seed, draws.CITY, key, _MATERIAL_DRAW, bound=100)
     return (WOOD if drawn < wood else STEEL if drawn < wood + steel else CONCRETE), False
 

@@ -143,7 +143,7 @@ def _buildings(shapes: Sequence[Shape], *, seed: int, report: Report) -> list[Bu
         slits_mm += slit_mm
         floors, said_by = floors_of(shape.tags)
         floors_from[said_by] += 1
-        material, said = material_of(shape.tags, seed=seed, key=shape.draw_key)
+        material, said = material_of(shape.tags, floors=floors, seed=seed, key=shape.draw_key)
         n_said += said
         drawn[material] += not said
         made.append(
