@@ -6,13 +6,17 @@ import bz2
 import gzip
 import json
 import os
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fireworld as fw
+from fireworld.city.formats.osm import kinds, reading
+from fireworld.city.formats.osm.reader import STREETS
 from fireworld.city.summary import load_plan
 from fireworld.errors import CityError, FireworldError, ScenarioError
 from fireworld.maps.osm import ATTRIBUTION
@@ -338,3 +342,41 @@ def test_the_middle_of_helsinki(tmp_path):
 @pytest.mark.parametrize(("name", "n"), [("southampton-2010.osm.gz", 42), ("fragment-2010.osm", 1)])
 def test_extracts_of_2010(name, n):
     assert len(fw.import_osm(real_file(f"osm/{name}")).plan.source_id) == n
+
+
+def rows_of(page, heading):
+    """The first table below a heading line of a page, without its head."""
+    lines = page.split(heading, 1)[1].splitlines()
+    begin = next(k for k, line in enumerate(lines) if line.startswith("|---"))
+    rows = []
+    for line in lines[begin + 1 :]:
+        if not line.startswith("|"):
+            break
+        rows.append([cell.strip() for cell in line.strip("|").split("|")])
+    return rows
+
+
+def test_the_page_has_the_tables_of_the_import():
+    page = (Path(__file__).parents[2] / "docs" / "openstreetmap.md").read_text(encoding="utf-8")
+    written = {}
+    for names, floors in rows_of(page, "| kind, by `building` | floors |"):
+        written |= dict.fromkeys(names.split(", "), int(floors))
+    assert written.pop("all others") == kinds.DEFAULT_FLOORS
+    assert written == {kind: n for kind, n in kinds.FLOORS_BY_KIND.items() if n != kinds.DEFAULT_FLOORS}
+    groups = {}
+    for names, *shares in rows_of(page, "| kinds | wood | steel | concrete |"):
+        percent = tuple(int(share.removesuffix(" %")) for share in shares)
+        groups |= dict.fromkeys(names.split(", "), percent)
+    assert groups.pop("all others") == kinds.OTHER_SHARES
+    assert groups.pop("and any other kind with 4 floors or more") == kinds.SHARES["blocks"]
+    assert groups.pop("as in generated cities") == kinds.OTHER_SHARES
+    assert groups == {kind: kinds.SHARES[group] for kind, group in kinds.GROUP_OF.items()}
+    streets = page.split("`highway` = ", 1)[1].split(".", 1)[0].replace(",", " ").replace(" or ", " ").split()
+    assert {name.removesuffix("_link") for name in STREETS} <= set(streets)
+
+
+def test_the_page_has_every_finding():
+    page = (Path(__file__).parents[2] / "docs" / "openstreetmap.md").read_text(encoding="utf-8")
+    named = {key for keys, _ in rows_of(page, "## What is repaired") for key in re.findall(r"`([a-z-]+)`", keys)}
+    source = Path(reading.__file__).read_text(encoding="utf-8")
+    assert named == set(re.findall(r'report\.note\w*\(\s*"([a-z-]+)"', source))

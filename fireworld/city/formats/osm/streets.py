@@ -33,7 +33,7 @@ class StreetCounts:
     tunnels: list[str] = field(default_factory=list)
     squares: list[str] = field(default_factory=list)
     cut: list[str] = field(default_factory=list)
-    """Ways that lost nodes, where they go on as several pieces."""
+    """Ways that lost nodes: what is left of them are several pieces."""
     clipped: int = 0
     """Pieces that were cut at the border of the area."""
     n_parts_dropped: int = 0
