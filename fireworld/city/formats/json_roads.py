@@ -56,7 +56,7 @@ def _passage(
     if len(numbers) != PASSAGE_NUMBERS:
         document.refuse(key, f"{PASSAGE_NUMBERS} numbers: two ids, x1, y1, x2, y2", f"{len(numbers)} of them")
     one, other, *edge = numbers
-    if one == other or not {one, other} <= roads.keys() | buildings:
+    if one == other or any(area not in roads and area not in buildings for area in (one, other)):
         document.refuse(key, "ids of two areas of the city", [one, other])
     if one in buildings and other in roads:
         document.refuse(key, "the road before the building", [one, other])
