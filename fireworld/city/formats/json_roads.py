@@ -38,8 +38,6 @@ def read_roads(document: Fields, footprints: Footprints, *, span_mm: int, id_max
             item.refuse("apexes", "as many y as x, at least one", f"{len(numbers)} numbers")
         outlines.append(list(zip(numbers[::2], numbers[1::2], strict=True)))
         centroids.append((item.integer("x", **span), item.integer("y", **span)))
-    if not ids:
-        document.refuse("roads", "at least one road", "an empty array")
     passages = [
         _passage(document, index, value, ids, known, span)
         for index, value in enumerate(document.array("passages", default=[]))
