@@ -128,8 +128,9 @@ def _print_import(made: ImportedCity) -> None:
     found = made.summary
     wide, high = found["extent_m"]
     click.echo(f"{found['name']}: {found['n_buildings']} buildings, {wide:.0f} m by {high:.0f} m")
-    rest = f"{found['n_refuges']} refuges, {found['n_hydrants']} hydrants, {found['n_entrances']} entrances"
-    click.echo(f"{found['n_roads']} roads, {rest}")
+    words = (("roads", "road"), ("refuges", "refuge"), ("hydrants", "hydrant"), ("entrances", "entrance"))
+    counts = [(found[f"n_{plural}"], plural, single) for plural, single in words]
+    click.echo(", ".join(f"{n} {single if n == 1 else plural}" for n, plural, single in counts))
     for line in made.report.lines:
         _print_item(line)
     for path in made.files:

@@ -199,7 +199,8 @@ def _streets(document: Fields, footprints: Footprints, roads: RoadMap | None) ->
     if roads is not None:
         if "streets" in document.object():
             document.refuse("streets", "no streets beside roads, of which they are made", "both")
-        unknown = [place for place in places if place not in set(roads.road_id.tolist())]
+        known = set(roads.road_id.tolist())
+        unknown = [place for place in places if place not in known]
         if unknown:
             document.refuse("hydrants", "ids of roads", unknown[0])
         return streets_of_roads(roads, footprints, places)
