@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fireworld.city.formats.osm import kinds
+from fireworld.city.formats.osm import kinds, overlaps
 from fireworld.city.formats.osm.area import Area
 from fireworld.city.formats.osm.kinds import floors_of, material_of
 from fireworld.city.formats.osm.overlaps import weed
@@ -290,3 +290,24 @@ def test_hydrants_get_nodes():
     assert made.street.tolist() == [[0, 1], [1, 2], [2, 3]]
     assert made.hydrant_node.tolist() == [0, 1, 2]
     assert (n_far, n_shared) == (1, 1)
+
+
+def test_of_many_courtyards_the_largest_stay():
+    outer = ((0, 0), (90_000, 0), (90_000, 90_000), (0, 90_000), (0, 0))
+    members = {1: way(1, *outer)}
+    for k in range(105):
+        x, y, side = 800 * (k % 11) * 10 + 500, 800 * (k // 11) * 10 + 500, 400 + k
+        members[2 + k] = way(2 + k, (x, y), (x + side, y), (x + side, y + side), (x, y + side), (x, y))
+    roles = tuple(("w", ref, "outer" if ref == 1 else "inner") for ref in members)
+    losses = Losses()
+    (found,), _ = relation_shapes(OsmRelation(5, {"building": "yes"}, roles), members, EQUATOR, losses)
+    assert losses == Losses(filled_holes=5)
+    widths = [max(x for x, _ in hole) - min(x for x, _ in hole) for hole in found.holes]
+    assert len(widths) == 100
+    assert min(widths) > 11.1 * 404
+
+
+def test_overlaps_are_found_across_blocks(monkeypatch):
+    monkeypatch.setattr(overlaps, "ROWS_AT_ONCE", 2)
+    shapes = [shape(k, 15 * k, 0, 15 * k + 20, 20) for k in range(7)]
+    assert weed(shapes).overlapping == ["w1", "w2", "w3", "w4", "w5", "w6"]

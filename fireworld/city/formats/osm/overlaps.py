@@ -18,6 +18,7 @@ WIDTH_MIN_M: Final = 0.5
 COVERED_SHARE: Final = 0.9
 """A building is within another if so much of it is."""
 OVERLAP_MIN_M2: Final = 1.0
+ROWS_AT_ONCE: Final = 2000
 
 
 @dataclass
@@ -94,14 +95,19 @@ def _overlaps(polygons: Any, areas: Float64Array) -> tuple[Array, Array, Float64
     """List the pairs that overlap: the smaller one (of equals the later), the other, and the share of the smaller."""
     import shapely
 
-    first, second = shapely.STRtree(polygons).query(polygons, predicate="intersects")
-    pairs = first < second
-    first, second = first[pairs], second[pairs]
-    order = np.lexsort((second, first))
-    first, second = first[order], second[order]
-    common = shapely.area(shapely.intersection(polygons[first], polygons[second]))
+    tree = shapely.STRtree(polygons)
+    found: list[tuple[Array, Array, Array]] = []
+    for begin in range(0, len(polygons), ROWS_AT_ONCE):
+        first, second = tree.query(polygons[begin : begin + ROWS_AT_ONCE], predicate="intersects")
+        first = first + begin
+        pairs = first < second
+        first, second = first[pairs], second[pairs]
+        order = np.lexsort((second, first))
+        first, second = first[order], second[order]
+        common = shapely.area(shapely.intersection(polygons[first], polygons[second]))
+        there = common >= 1e6 * OVERLAP_MIN_M2
+        found.append((first[there], second[there], common[there]))
+    first, second, common = (np.concatenate(column) for column in zip(*found, strict=True))
     smaller = np.where(areas[first] < areas[second], first, second)
-    other = first + second - smaller
     share: Float64Array = common / np.maximum(areas[smaller], 1.0)
-    there = common >= 1e6 * OVERLAP_MIN_M2
-    return smaller[there], other[there], share[there]
+    return smaller, first + second - smaller, share

@@ -115,7 +115,11 @@ def _shapes(extract: Extract, area: Area, report: Report) -> list[Shape]:
     report.note_areas("overlapping", "buildings overlap another by 1 m2 or more: kept as they are", weeded.overlapping)
     report.note_number("parts", "parts of buildings (building:part) are not read", extract.n_parts)
     report.note_number("points", "buildings are drawn as points: left out", extract.n_point_buildings)
-    report.note_number("filled-courtyards", "courtyards of less than 4 m2 are filled", losses.filled_holes)
+    report.note_number(
+        "filled-courtyards",
+        "courtyards of less than 4 m2, or beyond the 100 largest of a building, are filled",
+        losses.filled_holes,
+    )
     report.note_areas("lost-courtyards", "buildings have courtyards that are not closed: filled", losses.lost_holes)
     return weeded.shapes
 

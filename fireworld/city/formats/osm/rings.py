@@ -13,6 +13,8 @@ from fireworld.city.outlines import Corner, doubled_area_mm2
 Ring = list[Corner]
 HOLE_MIN_M2: Final = 4
 """Smaller holes, as of light shafts, are filled."""
+N_HOLES_MAX: Final = 100
+"""Of one building; the smallest of more are filled, too."""
 POINTS_TRIED: Final = 31
 
 
@@ -96,6 +98,10 @@ def relation_shapes(
             min(around, key=lambda shape: abs(doubled_area_mm2(shape.outer))).holes.append(hole)
         else:
             losses.lost_holes.append(name)
+    for shape in shapes:
+        largest = sorted(shape.holes, key=lambda hole: -abs(doubled_area_mm2(hole)))[:N_HOLES_MAX]
+        losses.filled_holes += len(shape.holes) - len(largest)
+        shape.holes = [hole for hole in shape.holes if hole in largest]
     return shapes, ways
 
 
