@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -10,7 +10,10 @@ from benchmarks.fires import CITY_SEED, LOTS, city_of, plan_of
 from benchmarks.plain_rays import random_rays, walls_hit
 from benchmarks.timing import Contender, Row, compare, measure
 from fireworld.city import links
-from fireworld.city.build import build_city
+from fireworld.city.air import cover_cells
+from fireworld.city.build import build_city, visiting_order
+from fireworld.city.generator import generate_plan
+from fireworld.city.near import near_relation
 from fireworld.city.outlines import walls_of
 from fireworld.parameters import PAPER
 from fireworld.policy.kernel import each_another
@@ -69,6 +72,20 @@ def build_row(size: int, *, seconds: float) -> Row:
     return measure("city", "build a city", label, Contender("build_city", run), seconds=seconds)
 
 
+def parts_rows(columns: int, rows: int, *, seconds: float) -> Iterator[Row]:
+    """Time the parts of a city that must not grow faster than it: its plan, its air cells, its near buildings."""
+    fire, plan = PAPER.fire, generate_plan(columns=columns, rows=rows, seed=CITY_SEED)
+    order = visiting_order(plan.footprints.building_id)
+    found = links.radiation_links(plan.footprints, order, fire, seed=CITY_SEED)
+    parts: dict[str, Callable[[None], object]] = {
+        "plan": lambda _: generate_plan(columns=columns, rows=rows, seed=CITY_SEED),
+        "air cells": lambda _: cover_cells(plan.footprints, fire.air_cell_mm),
+        "near buildings": lambda _: near_relation(plan.footprints, found),
+    }
+    for what, run in parts.items():
+        yield measure("city", what, f"{columns * rows} buildings", Contender("linear", run), seconds=seconds)
+
+
 def first_step_row(*, seconds: float) -> Row:
     """Time the way from the text of the default scenario to the end of its first step."""
     policy = each_another()
@@ -92,6 +109,8 @@ def rows(*, quick: bool) -> Iterator[Row]:
         yield ray_row(size, seconds=seconds)
     for size in sizes:
         yield links_row(size, seconds=seconds)
+    for columns, depth in ((32, 32),) if quick else ((32, 32), (160, 125), (400, 250)):
+        yield from parts_rows(columns, depth, seconds=seconds)
     for size in sizes:
         yield build_row(size, seconds=seconds)
     yield first_step_row(seconds=seconds)

@@ -6,17 +6,15 @@ from typing import Final
 
 import numpy as np
 
-from fireworld.city.city import AirCells, Footprints, Int64Array
-from fireworld.city.outlines import bounding_boxes, numbered, walls_of
+from fireworld.city.city import AirCells, Float64Array, Footprints
+from fireworld.city.outlines import bounding_boxes
 from fireworld.errors import CityError, expected
+from fireworld.kernels.covers import SAMPLES, count_covers
 
-SAMPLES: Final = 10
-"""Sample points along each side of a cell."""
 N_CELLS_MAX: Final = 4_000_000
 """Cells of the largest air grid: 10 km by 10 km in cells of 5 m."""
-
-N_COVERS_MAX: Final = 400_000
-"""Cells that all buildings may cover together: 100 samples each, so that the memory needed stays below 1 GB."""
+N_COVERS_MAX: Final = 16_000_000
+"""Cells that the bounding boxes of all buildings may hold together: what a city keeps of them stays below 1 GB."""
 
 
 def cover_cells(footprints: Footprints, cell_mm: int, *, where: str = "city") -> AirCells:
@@ -24,9 +22,9 @@ def cover_cells(footprints: Footprints, cell_mm: int, *, where: str = "city") ->
 
     The grid starts at the minimum of all corners and has 1 + span // cell_mm cells a side. Cover in per cent is how
     many of a cell's 10 * 10 sample points, from its lower left corner in steps of a tenth, lie in the building:
-    even-odd rule, half-open in y, and a point on a wall belongs to the building if the inside is at its right.
-    Everything is whole numbers (in tenths of a millimetre, so that any cell size has exact samples). Raises CityError,
-    which begins with `where`, for a city too large, and for a building that covers no sample point.
+    even-odd rule, half-open in y, and a point on a wall belongs to the building if the inside is at its right, but for
+    the rounding of `fireworld.kernels.covers`. Raises CityError, which begins with `where`, for a city too large, and
+    for a building that covers no sample point.
     """
     low, high = bounding_boxes(footprints)
     origin, span = low.min(axis=0), high.max(axis=0) - low.min(axis=0)
@@ -37,19 +35,21 @@ def cover_cells(footprints: Footprints, cell_mm: int, *, where: str = "city") ->
         raise CityError(expected(where, "buildings", wanted, got, "try to find a building far away from the others"))
     first, last = (low - origin) // cell_mm, (high - origin) // cell_mm
     blocks = last - first + 1  # (n, 2) cells of each building's bounding box
-    largest = int(np.argmax(blocks[:, 0] * blocks[:, 1]))
-    if int((blocks[:, 0] * blocks[:, 1]).sum()) > N_COVERS_MAX:
+    n_cells = blocks[:, 0] * blocks[:, 1]
+    if int(n_cells.sum()) > N_COVERS_MAX:
+        largest = int(np.argmax(n_cells))
         wanted = f"at most {N_COVERS_MAX} air cells of {cell_mm} mm under all buildings together"
         key = f"building {int(footprints.building_id[largest])}: apexes"
-        got = f"{int(blocks[largest, 0])} by {int(blocks[largest, 1])} cells under this one"
+        got = f"{int(n_cells.sum())}, {int(blocks[largest, 0])} by {int(blocks[largest, 1])} of them under this one"
         raise CityError(expected(where, key, wanted, got, "try larger air cells or smaller buildings"))
-    counts = _count_samples(footprints, origin + first * cell_mm, blocks, cell_mm)
-
-    building, within = numbered(np.zeros(len(blocks), dtype=np.int64), blocks[:, 0] * blocks[:, 1] - 1)
-    x = first[building, 0] + within // blocks[building, 1]
-    y = first[building, 1] + within % blocks[building, 1]
-    covered = counts > 0
-    n_covered = np.bincount(building[covered], minlength=len(blocks))
+    samples = [_samples(int(origin[axis]), int(shape[axis]), cell_mm) for axis in (0, 1)]
+    flips = np.empty((SAMPLES, int(blocks[:, 0].max()) * SAMPLES + 1), dtype=np.uint8)
+    inside = np.empty(int(n_cells.max()), dtype=np.uint8)
+    ptr = np.empty(len(first) + 1, dtype=np.int32)
+    cell = np.empty((3, int(n_cells.sum())), dtype=np.int32)
+    outlines = footprints.outline_ptr, footprints.outline_mm
+    count_covers(*outlines, first, blocks, *samples, flips, inside, ptr, cell)
+    n_covered = np.diff(ptr)
     if not n_covered.all():
         lost = int(footprints.building_id[int(np.argmin(n_covered))])
         wanted = "a footprint that covers a sample point of the air grid"
@@ -58,48 +58,20 @@ def cover_cells(footprints: Footprints, cell_mm: int, *, where: str = "city") ->
         origin_mm=(int(origin[0]), int(origin[1])),
         cell_mm=cell_mm,
         shape=(int(shape[0]), int(shape[1])),
-        ptr=np.concatenate([[0], np.cumsum(n_covered)]).astype(np.int32),
-        x=x[covered].astype(np.int32),
-        y=y[covered].astype(np.int32),
-        percent=counts[covered].astype(np.int32),
+        ptr=ptr,
+        x=cell[0, : ptr[-1]].copy(),  # without the room for cells that have no sample inside
+        y=cell[1, : ptr[-1]].copy(),
+        percent=cell[2, : ptr[-1]].copy(),
     )
 
 
-def _count_samples(footprints: Footprints, corner_mm: Int64Array, blocks: Int64Array, cell_mm: int) -> Int64Array:
-    """Count the sample points inside each building, cell by cell of its bounding box, x outer, y inner.
+def _samples(origin_mm: int, n_cells: int, cell_mm: int) -> Float64Array:
+    """Return where the sample points of a row of cells lie, mm: ten a cell, in the rounding of the official program.
 
-    Every building has a raster of samples, one row per sample y. Each crossing of a wall with a row flips all samples
-    at and right of it; a row has an even number of crossings, so one running parity over all rows will do. `corner_mm`
-    (n, 2) is the lower left of each building's block of cells, `blocks` (n, 2) their number along x and y.
+    It keeps the corner of a cell and a tenth of its side in single precision, which is exact up to 16 km and for
+    whole centimetres.
     """
-    walls = walls_of(footprints)
-    rows, width = blocks[:, 1] * SAMPLES, blocks[:, 0] * SAMPLES + 1  # one spare sample takes crossings at the end
-    raster_start = np.cumsum(rows * width) - rows * width
-
-    # In tenths of a millimetre a sample lies every `cell_mm`. A wall crosses the rows k with y1 <= k * cell_mm < y2.
-    start = SAMPLES * (walls.start_mm - corner_mm[walls.building])
-    end = SAMPLES * (walls.end_mm - corner_mm[walls.building])
-    row_low = _ceil_divide(np.minimum(start[:, 1], end[:, 1]), cell_mm)
-    row_high = _ceil_divide(np.maximum(start[:, 1], end[:, 1]), cell_mm)
-    wall, row = numbered(row_low, row_high - 1)
-
-    rise, run = (end[:, 1] - start[:, 1])[wall], (end[:, 0] - start[:, 0])[wall]
-    sign = np.sign(rise)
-    crossing = (start[wall, 0] * rise + (row * cell_mm - start[wall, 1]) * run) * sign  # times |rise|
-    sample = _ceil_divide(crossing, rise * sign * cell_mm)  # the first at or right of the crossing
-    owner = walls.building[wall]
-    flips = np.bincount(raster_start[owner] + row * width[owner] + sample, minlength=int((rows * width).sum()))
-    inside = np.cumsum(flips, dtype=np.uint32) & 1  # parity survives a wrap
-
-    at = np.flatnonzero(inside)
-    building = np.searchsorted(raster_start, at, side="right") - 1
-    within = at - raster_start[building]
-    cell = within % width[building] // SAMPLES * blocks[building, 1] + within // width[building] // SAMPLES
-    n_cells = blocks[:, 0] * blocks[:, 1]
-    cell_start = np.cumsum(n_cells) - n_cells
-    return np.bincount(cell_start[building] + cell, minlength=int(n_cells.sum()))
-
-
-def _ceil_divide(numerator: Int64Array, denominator: Int64Array | int) -> Int64Array:
-    """Divide whole numbers, rounding up; denominators are positive."""
-    return -(-numerator // denominator)
+    corner = (origin_mm + cell_mm * np.arange(n_cells, dtype=np.int64)).astype(np.float32).astype(np.float64)
+    step = float(np.float32(cell_mm) / np.float32(SAMPLES))
+    samples: Float64Array = (step * np.arange(SAMPLES) + corner[:, None]).ravel()
+    return samples

@@ -33,12 +33,13 @@ FLOOR_HEIGHT_M: Final = 3
 def build_city(plan: Plan, fire: FireParameters, *, seed: int) -> City:
     """Build a city from its plan; all its arrays are read-only. `seed`: of the rays that measure radiation.
 
-    Raises CityError if the plan is too large for the air grid, or a building covers no air cell.
+    Raises CityError if the plan is too large for the air grid, a building covers no air cell, or the walls are so long
+    that they send too many rays.
     """
     footprints = plan.footprints
     air = cover_cells(footprints, fire.air_cell_mm, where=plan.name)
     order = visiting_order(footprints.building_id)
-    links = radiation_links(footprints, order, fire, seed=seed)
+    links = radiation_links(footprints, order, fire, seed=seed, where=plan.name)
     city = City(
         name=plan.name,
         footprints=footprints,

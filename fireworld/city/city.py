@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, TypeVar
 
@@ -24,7 +25,7 @@ class Footprints:
     building_id: Int64Array  # (n,)
     refuge: UInt8Array  # (n,) 1 where tanks are refilled
     outline_ptr: Int32Array  # (n+1,) start of each building's corners
-    outline_mm: Int32Array  # (corners, 2) x, y; the closing corner is not repeated
+    outline_mm: Int32Array  # (corners, 2) x, y, as listed: corners may be repeated, and the first one at the end
     centroid_mm: Int32Array  # (n, 2)
     floors: Int32Array  # (n,)
     material: UInt8Array  # (n,) 0 wood, 1 steel, 2 concrete
@@ -48,6 +49,10 @@ class Plan:
     name: str
     footprints: Footprints
     streets: StreetMap
+    source: Mapping[str, Any] | None = None
+    """Where it comes from: anything that JSON can hold. Nothing is computed from it."""
+    notes: tuple[str, ...] = ()
+    """What whoever reads the map should know of it, a sentence each; nothing is computed from them."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +105,7 @@ class City:
     heat_capacity: Float32Array  # (n,) energy per degree
     initial_fuel: Float32Array  # (n,) energy
     ignition_point: Float32Array  # (n,) degrees above ambient
-    wall_area_m2: Float64Array  # (n,) without the closing wall
+    wall_area_m2: Float64Array  # (n,) without the wall from the last corner listed to the first
     order: Int32Array  # (n,) in which the official program visits the buildings
     air: AirCells
     links: Links

@@ -66,7 +66,11 @@ def _sides(corners: Sequence[Corner]) -> list[tuple[Corner, Corner]]:
 
 @dataclass(frozen=True)
 class Walls:
-    """All w walls, building by building, in the order of the corners; the closing wall of each is its last."""
+    """All w walls, building by building, in the order of the corners; the closing wall of each is its last.
+
+    A corner listed twice in a row makes no wall. Only a closing wall may have no length: where the first corner is
+    listed again at the end.
+    """
 
     building: Int32Array  # (w,) index of the owner, rising
     start_mm: Int64Array  # (w, 2)
@@ -81,7 +85,7 @@ class Walls:
 
 
 def walls_of(footprints: Footprints) -> Walls:
-    """List the walls of all buildings; wall k leads from corner k to the next corner of its building."""
+    """List the walls of all buildings, each from a corner to the next one of its building."""
     ptr = footprints.outline_ptr.astype(np.int64)
     corners = footprints.outline_mm.astype(np.int64)
     successor = np.arange(1, len(corners) + 1)
@@ -89,7 +93,22 @@ def walls_of(footprints: Footprints) -> Walls:
     closing = np.zeros(len(corners), dtype=np.bool_)
     closing[ptr[1:] - 1] = True
     building = np.repeat(np.arange(len(ptr) - 1, dtype=np.int32), np.diff(ptr))
-    return Walls(building=building, start_mm=corners, end_mm=corners[successor], closing=closing)
+    ends = corners[successor]
+    walls = closing | (corners != ends).any(axis=1)
+    return Walls(building=building[walls], start_mm=corners[walls], end_mm=ends[walls], closing=closing[walls])
+
+
+def without_repeats(footprints: Footprints) -> tuple[Int32Array, Int32Array]:
+    """Return the outlines, ptr (n+1,) and corners (c, 2) in mm, without corners listed twice in a row.
+
+    A first corner that is listed again at the end counts as such: no outline says how it is closed.
+    """
+    ptr, corners = footprints.outline_ptr, footprints.outline_mm
+    successor = np.arange(1, len(corners) + 1)
+    successor[ptr[1:] - 1] = ptr[:-1]
+    kept = (corners != corners[successor]).any(axis=1)
+    before = np.concatenate([[0], np.cumsum(kept)])
+    return before[ptr].astype(np.int32), corners[kept]
 
 
 def bounding_boxes(footprints: Footprints) -> tuple[Int64Array, Int64Array]:

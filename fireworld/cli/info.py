@@ -1,4 +1,4 @@
-"""`fireworld info`: what a recording holds and how far it is good."""
+"""`fireworld info`: what a recording holds and how far it is good, or what a city file holds."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("log", metavar="[LOG]", required=False, type=click.Path(path_type=Path))
+@click.argument("log", metavar="[LOG|CITY]", required=False, type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Write JSON.")
 @click.option("--schema", is_flag=True, help="List its topics and fields: types, shapes, units, meaning.")
 @click.option("--proto", is_flag=True, help="Write the messages of this version's logs as a .proto file.")
@@ -25,10 +25,12 @@ if TYPE_CHECKING:
 def command(context: click.Context, *, log: Path | None, as_json: bool, schema: bool, proto: bool) -> None:
     """Show what LOG recorded, what it holds and how far it is good.
 
-    LOG is the recording of a run or of a training.
+    LOG is the recording of a run or of a training. Of a city file it shows how large the city is, where it comes from
+    and what is odd about it.
 
     \b
     fireworld info run.mcap             header, outcome, size of each topic
+    fireworld info city.json            buildings, streets, source
     fireworld info run.mcap --schema    its topics and fields, those of a later version too
     fireworld info --schema             those that this version writes
 
@@ -44,6 +46,11 @@ def command(context: click.Context, *, log: Path | None, as_json: bool, schema: 
         raise click.UsageError("--schema and --proto exclude each other.")
     if log is None and not (schema or proto):
         raise click.UsageError("Missing argument 'LOG'; only --schema and --proto do without.")
+    if log is not None and _is_city(log):
+        if schema or proto:
+            raise click.UsageError("--schema and --proto go with logs, not with a city file.")
+        _show_city(log, as_json=as_json)
+        return
     if log is not None and noun_of(log) == "training":
         _show_training(context, log, as_json=as_json, schema=schema or proto)
     recording = None if log is None else open_log(log, partial=True)
@@ -57,6 +64,26 @@ def command(context: click.Context, *, log: Path | None, as_json: bool, schema: 
         else:
             _show(recording, summary(recording))
     context.exit(0 if recording is None or recording.damage is None else 1)
+
+
+def _is_city(path: Path) -> bool:
+    """Return whether the ending of a file's name is that of a map format."""
+    from fireworld.city.formats import FORMATS
+
+    return path.suffix.lower() in FORMATS
+
+
+def _show_city(path: Path, *, as_json: bool) -> None:
+    """Print what a city file holds."""
+    from fireworld.city.summary import describe_plan, load_plan, plan_summary
+    from fireworld.errors import one_line
+
+    plan = load_plan(path)
+    if as_json:
+        click.echo(json.dumps(plan_summary(plan), indent=2))
+        return
+    for label, text in describe_plan(plan):
+        click.echo(f"{label:<12} {one_line(text)}")
 
 
 def _show_training(context: click.Context, path: Path, *, as_json: bool, schema: bool) -> NoReturn:

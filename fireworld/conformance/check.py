@@ -121,7 +121,7 @@ def check(city_file: CityFile, path: Path) -> Report:
         tallies=comparison.tallies,
         tables=tuple(tables),
         first_difference=comparison.first,
-        notes=tuple(_notes(trace, city_file.plan.name)),
+        notes=(*city_file.plan.notes, *_notes(trace, city_file.plan.name)),
     )
 
 

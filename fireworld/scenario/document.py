@@ -25,7 +25,9 @@ DIRECTIONS: Final[tuple[Direction, ...]] = ("N", "E", "S", "W")
 Fraction = Annotated[float, Meta(ge=0, le=1)]
 Point = tuple[Fraction, Fraction]
 """A place as fractions of the city's bounding box: x from west to east, y from south to north."""
-LOTS_MAX: Final = 20_000
+LOTS_MAX: Final = 500_000
+"""What is built of so many buildings takes about 1 GB; what a run, a log and a viewer make of it comes on top."""
+SIDE_MAX: Final = 10_000
 Seed = Annotated[int, Meta(ge=0, le=2**32 - 1)]
 BuildingIds = Annotated[tuple[int, ...], Meta(min_length=1)]
 Metres = Annotated[float, Meta(ge=0, le=1e6)]
@@ -85,12 +87,12 @@ class Overrides(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class GeneratedCity(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A synthetic city."""
 
-    columns: Annotated[int, Meta(ge=1, le=200, description="Lots from west to east.")]
-    rows: Annotated[int, Meta(ge=1, le=200, description="Lots from south to north.")]
+    columns: Annotated[int, Meta(ge=1, le=SIDE_MAX, description="Lots from west to east.")]
+    rows: Annotated[int, Meta(ge=1, le=SIDE_MAX, description="Lots from south to north.")]
     seed: Annotated[Seed, Meta(description="Another seed, another city of the same size.")] = 1
     lot_m: Annotated[float, Meta(ge=5, le=100, description="Side of a square lot.")] = 14.0
     block: Annotated[
-        tuple[Annotated[int, Meta(ge=1, le=200)], Annotated[int, Meta(ge=1, le=200)]],
+        tuple[Annotated[int, Meta(ge=1, le=SIDE_MAX)], Annotated[int, Meta(ge=1, le=SIDE_MAX)]],
         Meta(description="Lots of a block, along x and along y."),
     ] = (3, 2)
     street_m: Annotated[float, Meta(ge=1, le=100, description="Width of a street.")] = 8.0

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fireworld.city.city import City
+from fireworld.city.outlines import without_repeats
 from fireworld.draws import STEP, hash_key
 from fireworld.kernels.arrays import DRAWS, Array
 from fireworld.kernels.brigades import REFILLING
@@ -39,11 +40,12 @@ def city_record(city: City, placement: Placement, parameters: Parameters) -> Cit
     footprints, streets, air = city.footprints, city.streets, city.air
     middle_x, middle_y = city.middle_mm
     brigades, n_brigades = parameters.brigades, len(placement.brigade_refuge)
+    outline_ptr, outline_mm = without_repeats(footprints)
     return CityRecord(
         name=city.name,
         building_id=footprints.building_id.astype(np.int32),
-        outline_ptr=footprints.outline_ptr,
-        **_in_metres("outline", footprints.outline_mm),
+        outline_ptr=outline_ptr,
+        **_in_metres("outline", outline_mm),
         **_in_metres("center", footprints.centroid_mm),
         floors=footprints.floors,
         material=footprints.material,

@@ -1,13 +1,15 @@
-"""Small plans for the tests, plans as city files, and the walls that rays meet."""
+"""Small plans for the tests, and the walls that rays meet."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from fireworld.city.city import Array, Footprints, Int32Array, Int64Array, Plan, StreetMap
+from fireworld.city.formats.json_text import plan_text
 from fireworld.city.links import wall_grid, wall_table
 from fireworld.city.outlines import Building, Corner, assemble, centroid_mm, doubled_area_mm2
 from fireworld.kernels.rays import first_hit
@@ -49,35 +51,9 @@ def plan(*outlines: Sequence[Corner]) -> Plan:
 
 
 def dump_plan(plan: Plan) -> dict[str, Any]:
-    """Turn a plan into a city document: `parse_plan` of its JSON gives the same plan.
-
-    Hydrants get identifiers after the buildings' highest.
-    """
-    footprints, streets = plan.footprints, plan.streets
-    corners, ptr = footprints.outline_mm.ravel().tolist(), (2 * footprints.outline_ptr).tolist()
-    next_id = int(footprints.building_id.max()) + 1
-    return {
-        "name": plan.name,
-        "buildings": [
-            {
-                "id": int(footprints.building_id[b]),
-                "type": "refuge" if footprints.refuge[b] else "building",
-                "apexes": corners[ptr[b] : ptr[b + 1]],
-                "floors": int(footprints.floors[b]),
-                "code": int(footprints.material[b]),
-                "ground_area": int(footprints.ground_area_m2[b]),
-                "x": int(footprints.centroid_mm[b, 0]),
-                "y": int(footprints.centroid_mm[b, 1]),
-                "inflammable": bool(footprints.inflammable[b]),
-            }
-            for b in range(len(footprints.building_id))
-        ],
-        "streets": {"nodes": streets.node_mm.tolist(), "edges": streets.street.tolist()},
-        "hydrants": [
-            {"id": next_id + k, "x": int(streets.node_mm[node, 0]), "y": int(streets.node_mm[node, 1])}
-            for k, node in enumerate(streets.hydrant_node.tolist())
-        ],
-    }
+    """Turn a plan into a city document: `parse_plan` of its JSON gives the same plan."""
+    document: dict[str, Any] = json.loads(plan_text(plan))
+    return document
 
 
 def walls_hit(

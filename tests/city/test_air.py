@@ -92,9 +92,16 @@ def test_a_city_too_large_for_the_grid_is_refused():
         cover_cells(footprints(rectangle(0, 0, 5000, 5000), rectangle(10**9, 10**9, 5000, 5000)), 5000)
 
 
-def test_a_building_over_too_many_cells_is_refused_by_name():
-    with pytest.raises(CityError, match=r"building 9: apexes: expected at most 400000 air cells of 5000 mm"):
-        cover_cells(footprints(rectangle(0, 0, 4_000_000, 4_000_000), ids=[9]), 5000)
+def test_buildings_over_too_many_cells_are_refused_by_the_largest_ones_name():
+    outlines = [rectangle(0, 0, 9_000_000, 9_000_000) for _ in range(5)]
+    with pytest.raises(CityError, match=r"building 4: apexes: expected at most 16000000 air cells of 5000 mm"):
+        cover_cells(footprints(*outlines, rectangle(0, 0, 5000, 5000), ids=[4, 5, 6, 7, 8, 9]), 5000)
+
+
+def test_a_building_of_four_kilometres_is_a_building():
+    air = cover_cells(footprints(rectangle(0, 0, 4_000_000, 4_000_000)), 5000)
+    assert len(air.x) == 800 * 800
+    assert (air.percent == 100).all()
 
 
 def test_physics_by_hand():

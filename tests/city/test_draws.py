@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from numba import njit
 
 from fireworld import draws
+from fireworld.city import lot_draws
 from fireworld.kernels import draws as kernel
 
 INT64 = st.integers(-(2**63), 2**63 - 1)
@@ -39,6 +40,18 @@ def test_keys_never_change():
 def test_purposes_differ():
     names = ["BURN_RATE", "DAMAGE", "DAMAGE_NOISE", "EXPLORE", "ACTION", "RAY", "CITY", "PLACEMENT", "STEP", "TABLE"]
     assert len({getattr(draws, name) for name in names}) == len(names)
+
+
+@given(INT64, st.integers(0, 20), st.lists(INT64, min_size=1, max_size=5), INT64, st.integers(1, 2**31))
+def test_many_at_once_are_the_same_draws(seed, purpose, entities, step, bound):
+    many = np.array(entities)
+    each = [draws.hash_key(seed, purpose, entity, step) for entity in entities]
+    assert lot_draws.hash_keys(seed, purpose, many, step).tolist() == each
+    each = [draws.uniform(seed, purpose, entity, step) for entity in entities]
+    assert lot_draws.uniforms(seed, purpose, many, step).tolist() == each
+    each = [draws.below(seed, purpose, entity, step, bound=bound) for entity in entities]
+    assert lot_draws.below(seed, purpose, many, step, bound=bound).tolist() == each
+    assert lot_draws.below(seed, purpose, many, step, bound=np.full(len(many), bound)).tolist() == each
 
 
 @settings(deadline=None)  # the first example compiles

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fireworld.city.formats import json_plan
 from fireworld.city.formats.json_plan import parse_plan
 from fireworld.city.generator import generate_plan
 from fireworld.conformance.city_file import load_city_file
@@ -35,6 +36,7 @@ CITY = {
     "hydrants": [{"id": 900, "x": 29000, "y": 0}],
     "ignitions": [7],
     "water": [],
+    "source": {"map": "drawn by hand", "years": [2024]},
 }
 
 
@@ -110,10 +112,22 @@ def test_what_a_building_may_leave_out():
 CORNERS = {"apexes": [50000, 0, 54000, 0, 54000, 4000]}
 
 
-def test_repeated_corners_are_left_out():
+def test_corners_are_kept_as_they_are_listed():
     doubled = [0, 0, 0, 0, 12000, 0, 12000, 10000, 12000, 10000, 0, 10000, 0, 0]
     plan = parse(changed(("buildings", 0, "apexes"), doubled))
-    assert plan.footprints.outline_mm.tolist()[:4] == [[0, 0], [12000, 0], [12000, 10000], [0, 10000]]
+    assert plan.footprints.outline_ptr.tolist() == [0, 7, 10]
+    assert plan.footprints.outline_mm.ravel().tolist()[:14] == doubled
+
+
+def test_too_many_buildings_are_refused_at_once(monkeypatch):
+    monkeypatch.setattr(json_plan, "BUILDINGS_MAX", 1)
+    with pytest.raises(CityError, match=r"^city.json: buildings: expected at most 1 buildings, got 2 of them"):
+        parse(CITY)
+
+
+def test_a_source_may_be_anything_that_json_holds():
+    source = deep(19) | {"text": "x" * 65_000, "none": None, "list": [1, 2.5, True], "\ud800": "\n"}
+    assert parse(changed(("source",), source)).source == source
 
 
 @pytest.mark.parametrize("share", [0.0, 0.4])
@@ -125,6 +139,14 @@ def test_a_plan_survives_being_written_and_read(share):
 def test_a_plan_with_footpaths_survives_too():
     plan = parse(changed(("streets",), DELETE))
     assert same(plan, parse(dump_plan(plan)))
+
+
+def deep(n):
+    """Put objects into objects."""
+    value = {}
+    for _ in range(n):
+        value = {"a": value}
+    return value
 
 
 B0 = ("buildings", 0)
@@ -163,21 +185,16 @@ REFUSALS = [
     ),
     ((*B0, "apexes"), [0, 0, 9000, 0, 9000, 0.5], "building 7: apexes.5: expected a whole number"),
     ((*B0, "apexes"), [0, 0, 2**31, 0, 9000, 5], "building 7: apexes.2: expected a whole number"),
-    (
-        (*B0, "apexes"),
-        [0, 0, 10000, 10000, 10000, 0, 0, 9000],
-        "building 7: apexes: expected an outline that does not cross or touch itself, got Self-intersection",
-    ),
-    (
-        (*B0, "apexes"),
-        [0, 0, 4000, 0, 4000, 4000, 8000, 4000, 8000, 8000, 4000, 8000, 4000, 4000, 0, 4000],
-        "building 7: apexes: expected an outline that does not cross or touch itself, got Ring Self-intersection",
-    ),
+    (("source",), "OpenStreetMap", "source: expected an object, got a text"),
+    (("source",), None, "source: expected an object, got no value (null)"),
+    (("source",), {"a": "x" * 65_536}, "source: expected at most 65536 bytes, got 65545 bytes"),
+    (("source",), deep(20), "source: expected at most 20 objects and arrays in each other, got more of them"),
+    (("source",), {"a": deep(800)}, "source: expected at most 20 objects and arrays in each other"),
     (("name",), "", "name: expected a text of 1 to 100 printable characters, got ''"),
     (("name",), "two\nlines", "name: expected a text of 1 to 100 printable characters, got 'two\\nlines'"),
     (("name",), "two \n lines", "name: expected a text of 1 to 100 printable characters, got two \\n lines"),
     (("wah\nter",), [], "wah\\nter: expected one of the keys name,"),
-    (("wahter",), [], "wahter: expected one of the keys name, buildings, streets, hydrants,"),
+    (("wahter",), [], "wahter: expected one of the keys name, source, buildings, streets, hydrants,"),
     (("streets",), None, "streets: expected an object, got no value (null)"),
     (("streets", "nodes"), [], "streets.nodes: expected at least one pair, got an empty array"),
     (("streets", "nodes"), [[0, 0], [1]], "streets.nodes.1: expected a pair of whole numbers, got [1]"),

@@ -51,6 +51,46 @@ def test_links_relate_in_both_directions():
     assert near(plan, links) == [[2], [], [0]]
 
 
+def test_links_named_twice_and_of_near_buildings_count_once():
+    plan = footprints(*[rectangle(20_000 * k, 0, 5000, 5000) for k in range(4)])
+    ptr, building = np.array([0, 2, 3, 3, 4], np.int32), np.array([1, 3, 0, 0], np.int32)
+    assert near(plan, Links(ptr, building, np.ones(4, np.float32))) == [[1, 3], [0, 2], [1, 3], [0, 2]]
+
+
+def test_a_building_over_the_whole_city_is_near_all():
+    crowd = [rectangle(40_000 * (k % 30), 40_000 * (k // 30), 5000, 5000) for k in range(900)]
+    found = near(footprints(*crowd[:450], rectangle(-500_000, -500_000, 2_500_000, 2_500_000), *crowd[450:]))
+    wall = [k for k, other in enumerate(found) if 450 in other]
+    assert wall == found[450] == []  # its walls are far from all of them
+    ring = [(-10_000, -10_000), (1_190_000, -10_000), (1_190_000, 1_190_000), (-10_000, 1_190_000)]
+    found = near(footprints(*crowd, ring))
+    at_the_edge = [k for k in range(900) if {k % 30, k // 30} & {0, 29}]
+    assert found[900] == at_the_edge
+    assert [k for k in range(900) if 900 in found[k]] == at_the_edge
+
+
+def test_many_neighbours_need_more_room():
+    heap = [rectangle(100 * k, 100 * k, 5000, 5000) for k in range(40)]
+    assert near(footprints(*heap)) == [[other for other in range(40) if other != k] for k in range(40)]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_outlines_that_cross_themselves_and_repeat_corners(seed):
+    import shapely
+
+    draw = np.random.default_rng(seed)
+    outlines = []
+    for _ in range(60):
+        corners = draw.integers(0, 400_000, 2) + draw.integers(-30_000, 30_000, (draw.integers(3, 8), 2))
+        corners = np.repeat(corners, draw.integers(1, 3, len(corners)), axis=0)
+        outlines.append([(int(x), int(y)) for x, y in corners])
+    rings = [shapely.LinearRing(outline) for outline in outlines]
+    closer = np.array([[one.distance(other) < 30_000 for other in rings] for one in rings])
+    np.fill_diagonal(closer, val=False)
+    listed = [[*outline, outline[0]] if k % 2 else outline for k, outline in enumerate(outlines)]
+    assert near(footprints(*listed)) == [np.flatnonzero(row).tolist() for row in closer]
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_agrees_with_shapely(seed):
     import shapely

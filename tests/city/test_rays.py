@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from fireworld.city.build import visiting_order
 from fireworld.city.links import radiation_links
 from fireworld.city.outlines import walls_of
+from fireworld.errors import CityError
 from fireworld.parameters import FireParameters
 from tests.city.plans import footprints, rectangle, walls_hit
 
@@ -101,6 +103,17 @@ def test_two_long_walls_face_to_face():
     # North and south walls send 1000 rays each; about half of the facing one's reach the neighbour.
     assert links.building.tolist() == [1, 0]
     assert links.share == pytest.approx([500 / 2010] * 2, abs=0.04)
+
+
+def test_too_many_rays_are_refused_by_the_name_of_the_building_that_sends_most():
+    plan = footprints(rectangle(0, 0, 10_000, 10_000), rectangle(20_000, 0, 10_000_000, 10_000_000), ids=[4, 7])
+    order = visiting_order(plan.building_id)
+    with pytest.raises(CityError) as caught:
+        radiation_links(plan, order, replace(FIRE, ray_rate_per_mm=10.0), seed=1, where="here")
+    assert str(caught.value) == (
+        "here: building 7: apexes: expected at most 200000000 rays from all walls, at 10 a mm, got 400400000, "
+        "400000000 of them from this one; try a smaller parameters.fire.ray_rate_per_mm"
+    )
 
 
 def test_a_lonely_building_has_no_links():

@@ -12,12 +12,13 @@ from typing import Any, Final, Never
 import numpy as np
 
 from fireworld.city.city import Footprints, Int64Array, Plan, StreetMap, freeze
+from fireworld.city.crossings import crossing_outlines
 from fireworld.city.fields import Fields
 from fireworld.city.footpaths import footpaths
-from fireworld.city.outlines import Building, Corner, assemble, centroid_mm, doubled_area_mm2
+from fireworld.city.outlines import Building, Corner, assemble, centroid_mm, doubled_area_mm2, without_repeats
 from fireworld.errors import CityError, expected
 
-READ_KEYS: Final = ("name", "buildings", "streets", "hydrants")
+READ_KEYS: Final = ("name", "source", "buildings", "streets", "hydrants")
 IGNORED_KEYS: Final = (
     "brigade_moves", "brigades", "civilians", "comment", "extinguish", "ignitions", "later_ignitions", "seed", "steps",
     "units", "water",
@@ -30,6 +31,11 @@ COORDINATE_MAX_MM: Final = 1_000_000_000
 ID_MAX: Final = 2**31 - 1
 FLOORS_MAX: Final = 500
 GROUND_AREA_MAX_M2: Final = 10_000_000
+BUILDINGS_MAX: Final = 500_000
+"""As in generated cities; reading so many takes about 2 GB."""
+SOURCE_MAX_BYTES: Final = 65_536
+SOURCE_DEPTH_MAX: Final = 20
+IDS_SHOWN_MAX: Final = 5
 
 
 def parse_plan(text: bytes, *, where: str, name: str = "city") -> Plan:
@@ -39,6 +45,8 @@ def parse_plan(text: bytes, *, where: str, name: str = "city") -> Plan:
     items = document.array("buildings")
     if not items:
         document.refuse("buildings", "at least one building", "an empty array")
+    if len(items) > BUILDINGS_MAX:
+        document.refuse("buildings", f"at most {BUILDINGS_MAX} buildings", f"{len(items)} of them")
     buildings: list[Building] = []
     taken: set[int] = set()
     for index, item in enumerate(items):
@@ -47,10 +55,16 @@ def parse_plan(text: bytes, *, where: str, name: str = "city") -> Plan:
             document.refuse(f"buildings.{index}.id", "an identifier of its own", building.building_id)
         taken.add(building.building_id)
         buildings.append(building)
-    _check_outlines(document, buildings)
     footprints = assemble(buildings)
-    streets = _streets(document, footprints)
-    return freeze(Plan(name=document.text("name", default=name), footprints=footprints, streets=streets))
+    return freeze(
+        Plan(
+            name=document.text("name", default=name),
+            footprints=footprints,
+            streets=_streets(document, footprints),
+            source=_source(document),
+            notes=_notes(footprints),
+        )
+    )
 
 
 def _parse_json(text: bytes, where: str) -> Any:
@@ -91,7 +105,7 @@ def _building(item: Fields) -> Building:
     doubled_area = abs(doubled_area_mm2(corners))
     if doubled_area < 2_000_000:
         item.refuse("apexes", "an area of at least 1 m2", f"{doubled_area / 2_000_000:.6f} m2")
-    middle = centroid_mm(corners)
+    middle = (0, 0) if {"x", "y"} <= item.object().keys() else centroid_mm(corners)
     span = (-COORDINATE_MAX_MM, COORDINATE_MAX_MM)
     return Building(
         building_id=building_id,
@@ -111,32 +125,44 @@ def _building(item: Fields) -> Building:
 
 
 def _corners(item: Fields) -> list[Corner]:
-    """Read an outline: [x0, y0, x1, y1, ...], repeated corners and a repeated first one at the end left out."""
+    """Read an outline: [x0, y0, x1, y1, ...], just as it is listed."""
     numbers = item.integers("apexes", low=-COORDINATE_MAX_MM, high=COORDINATE_MAX_MM)
     if len(numbers) % 2:
         item.refuse("apexes", "as many y as x", f"{len(numbers)} numbers")
-    listed = list(zip(numbers[::2], numbers[1::2], strict=True))
-    corners = [corner for index, corner in enumerate(listed) if index == 0 or corner != listed[index - 1]]
-    while len(corners) > 1 and corners[0] == corners[-1]:
-        corners.pop()
+    corners = list(zip(numbers[::2], numbers[1::2], strict=True))
     if len(set(corners)) < 3:
         item.refuse("apexes", "at least 3 distinct corners", f"{len(set(corners))} of them")
     return corners
 
 
-def _check_outlines(document: Fields, buildings: list[Building]) -> None:
-    """Raise CityError for the first building whose outline crosses or touches itself."""
-    import shapely
+def _source(document: Fields) -> dict[str, Any] | None:
+    """Read what the file says of where it comes from: an object with anything in it."""
+    if "source" not in document.object():
+        return None
+    source = Fields(document.where, "source", document.object()["source"]).object()
+    if _is_deeper(source, SOURCE_DEPTH_MAX):
+        document.refuse("source", f"at most {SOURCE_DEPTH_MAX} objects and arrays in each other", "more of them")
+    n_bytes = len(json.dumps(source))
+    if n_bytes > SOURCE_MAX_BYTES:
+        document.refuse("source", f"at most {SOURCE_MAX_BYTES} bytes", f"{n_bytes} bytes")
+    return source
 
-    corners = np.array([corner for building in buildings for corner in building.corners_mm], dtype=np.float64)
-    owner = np.repeat(np.arange(len(buildings)), [len(building.corners_mm) for building in buildings])
-    polygons: Any = shapely.polygons(shapely.linearrings(corners, indices=owner))
-    valid = shapely.is_valid(polygons)
-    if not valid.all():
-        index = int(np.argmin(valid))
-        place = shapely.is_valid_reason(polygons[index])
-        culprit = Fields(document.where, f"building {buildings[index].building_id}: ", {})
-        culprit.refuse("apexes", "an outline that does not cross or touch itself", f"{place} mm")
+
+def _is_deeper(value: Any, depth: int) -> bool:
+    """Return whether a JSON value has more objects and arrays in each other than that."""
+    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else None
+    return parts is not None and (depth == 0 or any(_is_deeper(part, depth - 1) for part in parts))
+
+
+def _notes(footprints: Footprints) -> tuple[str, ...]:
+    """Say which outlines cross or touch themselves: that is allowed, but may be a slip."""
+    crossing = footprints.building_id[crossing_outlines(*without_repeats(footprints))].tolist()
+    if not crossing:
+        return ()
+    shown = ", ".join(str(building_id) for building_id in crossing[:IDS_SHOWN_MAX])
+    more = f" and {len(crossing) - IDS_SHOWN_MAX} more" if len(crossing) > IDS_SHOWN_MAX else ""
+    those = f"building{'' if len(crossing) == 1 else 's'} {shown}{more}"
+    return (f"outlines that cross or touch themselves: {those}; the even-odd rule says what is inside",)
 
 
 def _streets(document: Fields, footprints: Footprints) -> StreetMap:
