@@ -124,7 +124,11 @@ class Quantity:
 
 
 def _time(outcome: Outcome) -> str:
-    return f"{outcome.steps} steps" if outcome.completed else f"not within {outcome.steps} steps"
+    if outcome.completed:
+        return f"{outcome.steps} steps"
+    if outcome.n_burning == 0:  # of a kernel that goes on when nothing burns any more
+        return f"nothing burns after {outcome.steps} steps"
+    return f"not within {outcome.steps} steps"
 
 
 QUANTITIES: Final = (

@@ -129,6 +129,12 @@ class RunHeader:
         """Whether this is the log of another program, which has no decisions to replay."""
         return self.origin != ""
 
+    @property
+    def title(self) -> str:
+        """Scenario, policy and, if it is known, seed."""
+        seed = "" if self.lacks("seed") else f", seed {self.seed}"
+        return f"{self.scenario}, {self.policy}{seed}"
+
     def lacks(self, name: str) -> bool:
         """Return whether a field, as in "buildings.energy", a topic, or the "seed" was not recorded."""
         absent = absent_names(self.not_recorded)
@@ -513,8 +519,7 @@ class RecordingBase(ABC):
         return len(self.steps)
 
     def __repr__(self) -> str:
-        header = self.header
-        return f"<{type(self).__name__}: {header.scenario}, {header.policy}, seed {header.seed}, {len(self)} steps>"
+        return f"<{type(self).__name__}: {self.header.title}, {len(self)} steps>"
 
 
 class MemoryRecording(RecordingBase):
