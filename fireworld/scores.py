@@ -1,4 +1,4 @@
-"""The official scores: how much counts as saved, and the two rules. Kernels and the importer of official logs share them."""
+"""The official scores: how much counts as saved, and the two rules, for kernels and for imported logs."""
 
 from __future__ import annotations
 

@@ -173,7 +173,8 @@ def _unknown_values(header: RunHeader) -> dict[type[Any], dict[str, float]]:
     if not header.not_recorded:
         return {}
     unknown: dict[type[Any], dict[str, float]] = {}
-    for kind in (CityRecord, *STEP_TOPICS):
+    kinds: tuple[type[Any], ...] = (CityRecord, *STEP_TOPICS)
+    for kind in kinds:
         single = [item for item in message_of(kind).fields if item.wire == "double" and not item.repeated]
         absent = {item.name: math.nan for item in single if header.lacks(f"{kind.topic[1:]}.{item.name}")}
         unknown |= {kind: absent} if absent else {}

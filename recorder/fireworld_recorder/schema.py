@@ -132,9 +132,7 @@ def message_of(record_type: type[Any]) -> Message:
     )
 
 
-def channel_of(
-    record_type: type[Any], package: str, *, declared: Callable[[Field], bool] = lambda _: True
-) -> Channel:
+def channel_of(record_type: type[Any], package: str, *, declared: Callable[[Field], bool] = lambda _: True) -> Channel:
     """Return the channel of a topic; its schema is a FileDescriptorSet, by protobuf's descriptor.proto.
 
     Args:

@@ -10,7 +10,7 @@ import numpy as np
 
 from fireworld.errors import LogError, expected
 from fireworld.recording.official_log import names
-from fireworld.recording.official_log.parts import Edge, Entity
+from fireworld.recording.official_log.parts import Entity
 from fireworld.recording.official_log.streets import streets_of
 from fireworld.records import Array, CityRecord
 
@@ -53,7 +53,7 @@ def cast_of(entities: Sequence[Entity]) -> Cast:
         raise LogError(expected("initial conditions", "", "entities with numbers of their own", "a number twice"))
     buildings = [entity for entity in entities if entity.kind in names.BUILDINGS]
     if not buildings:
-        raise LogError(expected("initial conditions", "", "at least one building", "none"))
+        raise LogError(expected("initial conditions", "", "at least one building", "none of them"))
     return Cast(
         buildings=buildings,
         brigades=[entity for entity in entities if entity.kind == names.FIRE_BRIGADE],
@@ -148,7 +148,7 @@ def _center(area: Entity) -> tuple[int, int]:
     """Return the middle of an area as the log has it, in mm."""
     x, y = (area.properties.get(axis) for axis in (names.X, names.Y))
     if not isinstance(x, int) or not isinstance(y, int):
-        raise LogError(expected(f"{names.ENTITIES[area.kind]} {area.id}", "x, y", "its position", "none"))
+        raise LogError(expected(f"{names.ENTITIES[area.kind]} {area.id}", "x, y", "its position", "no position"))
     _check_near(area, (x, y))
     return x, y
 

@@ -1,4 +1,4 @@
-"""Import the log of an official kernel: read it once, front to back, and write a recording of fireworld's own format."""
+"""Import the log of an official kernel: read it once, front to back, and write a recording."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ from fireworld.recording.official_log.parts import (
     Part,
     Parts,
 )
-from fireworld.recording.official_log.source import SEVEN_ZIP, Bytes, unpacked
+from fireworld.recording.official_log.seven_zip import MAGIC
+from fireworld.recording.official_log.source import Bytes, unpacked
 from fireworld.recording.official_log.world import NOT_RECORDED, World, settings_text
 from fireworld.records import CityRecord, RunHeader, StepRecord
 from fireworld.version import __version__
@@ -46,6 +47,7 @@ ORIGIN: Final = "official log"
 SETTINGS_ATTACHMENT: Final = "kernel.cfg"
 _SETTINGS: Final = ("resq-fire.", "fire.", "ignition.", "misc.injury.", "score.", "kernel.timesteps", "random.seed")
 """What of the configuration is kept in the recording."""
+_WANTED: Final = "expected the log of an official kernel"
 _SEED: Final = "random.seed"
 _N_STEPS: Final = "kernel.timesteps"
 
@@ -94,12 +96,12 @@ class Imported:
     def lines(self) -> list[str]:
         """Return what is known in lines of text."""
         left_out = f"; {self.n_left_out} other rescuers are left out" if self.n_left_out else ""
+        score = f"{self.outcome.score:.3f} of {self.outcome.score_max:.0f}"
         found = [
             f"{self.source}: {self.form}",
             f"{self.path}: {self.n_steps} steps, up to step {self.last_step}, digest {self.digest}",
             f"{self.outcome.n_buildings} buildings, {self.outcome.n_civilians} civilians{left_out}",
-            f"score {self.outcome.score:.3f} of {self.outcome.score_max:.0f}, by today's rule"
-            f" {self.outcome.score_now:.3f}",
+            f"score {score}, by today's rule {self.outcome.score_now:.3f}",
         ]
         if self.official is not None and self.official.value is not None:
             found.append(f"{self.official.value:.3f} by the kernel's own {self.official.function} and its factors")
@@ -128,7 +130,7 @@ class _Import:
         """Take a part of the log; a step is written when the next part tells that it is over."""
         if isinstance(part, Initial):
             if self.initial is not None:
-                raise LogError(expected("initial conditions", "", "one record of them", "two"))
+                raise LogError(expected("initial conditions", "", "one record of them", "a second one"))
             self.initial = part
         elif isinstance(part, Configuration):
             self.settings = self.settings or part.values
@@ -143,7 +145,7 @@ class _Import:
         """Write the header and the city, unless they are written; return what is under way."""
         if self.begun is None:
             if self.initial is None:
-                raise LogError(expected("record", "", "initial conditions before the first step", "none"))
+                raise LogError(expected("record", "", "initial conditions before the first step", "none of them"))
             entities = self.initial.entities
             cast = cast_of(entities)
             world = World(entities, cast)
@@ -242,12 +244,12 @@ def _named(source: Path) -> Iterator[None]:
 def _parts(source: Path, form: Form, stack: ExitStack) -> Parts:
     """Yield the parts of a file, whatever its form."""
     if source.is_dir():
-        raise LogError(expected("", "", "the log of an official kernel", "a folder"))
+        raise LogError(f"{_WANTED}, got a folder")
     file: IO[bytes] = stack.enter_context(source.open("rb"))
-    if source.is_file() and file.read(len(SEVEN_ZIP)) == SEVEN_ZIP:
-        yield from archive_form.read_parts(source, form)
-        return
-    if source.is_file():
+    if source.is_file():  # what comes from a pipe is read once
+        if file.read(len(MAGIC)) == MAGIC:
+            yield from archive_form.read_parts(file, form)
+            return
         file.seek(0)
     data, packed = unpacked(file)
     for part in _parts_of(data, form):
@@ -267,7 +269,7 @@ def _parts_of(data: Bytes, form: Form) -> Parts:
     if protobuf_form.begins(start):
         return protobuf_form.read_parts(data, form)
     got = f"a file that begins with {start[:8]!r}" if start else "an empty file"
-    raise LogError(expected("", "", "the log of an official kernel", got))
+    raise LogError(f"{_WANTED}, got {got}")
 
 
 def _header(city: CityRecord, settings: Mapping[str, str], absent: set[str], *, form: Form) -> RunHeader:

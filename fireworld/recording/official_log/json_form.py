@@ -57,59 +57,79 @@ def read_parts(source: Bytes, form: Form) -> Parts:
             yield part
 
 
-def _records(source: Bytes) -> Iterator[Any]:
-    """Yield the records one by one; the text of one is held at a time."""
-    pieces = source.read_all()
-    to_text = codecs.getincrementaldecoder("utf-8-sig")()
-    decoder = json.JSONDecoder()
-    text, ended = "", False
+class _Text:
+    """The text of a file, of which the part that is looked at is held."""
 
-    def more() -> bool:
-        """Take the next piece to the text; False at the end of the file."""
-        nonlocal text, ended
-        wanted = max(1, len(text))  # twice as much as before, so that a long record is not parsed again and again
-        taken = []
+    def __init__(self, source: Bytes) -> None:
+        self.text = ""
+        self._pieces = source.read_all()
+        self._decoder = codecs.getincrementaldecoder("utf-8-sig")()
+        self._ended = False
+
+    def drop(self, n: int) -> None:
+        """Forget the first characters."""
+        self.text = self.text[n:]
+
+    def more(self) -> bool:
+        """Take as much again as is held, so that a long record is not parsed too often; False at the end of the file.
+
+        Raises:
+            LogError: it is no UTF-8, or what is held is too long for a record.
+        """
+        wanted, taken = max(1, len(self.text)), []
         try:
-            while wanted > 0 and not ended:
-                piece = next(pieces, b"")
-                ended = not piece
-                taken.append(to_text.decode(piece, final=ended))
+            while wanted > 0 and not self._ended:
+                piece = next(self._pieces, b"")
+                self._ended = not piece
+                taken.append(self._decoder.decode(piece, final=self._ended))
                 wanted -= len(taken[-1])
         except UnicodeDecodeError:
             raise LogError("expected JSON in UTF-8, got other bytes") from None
-        text += "".join(taken)
-        if len(text) > _RECORD_CHARACTERS_MAX:
+        self.text += "".join(taken)
+        if len(self.text) > _RECORD_CHARACTERS_MAX:
             raise LogError(f"expected records of at most {_RECORD_CHARACTERS_MAX} characters, got more")
-        return bool(taken) and any(taken)
+        return any(taken)
 
-    while (head := _HEAD.match(text)) is None:
-        if len(text) > _HEAD_CHARACTERS_MAX or not more():
-            raise LogError(expected("JSON", "", '{"records": [...]}', text[:20]))
-    text = text[head.end() :]
+
+def _records(source: Bytes) -> Iterator[Any]:
+    """Yield the records one by one; the text of one is held at a time."""
+    held = _Text(source)
+    while (head := _HEAD.match(held.text)) is None:
+        if len(held.text) > _HEAD_CHARACTERS_MAX or not held.more():
+            raise LogError(expected("JSON", "", '{"records": [...]}', held.text[:20]))
+    held.drop(head.end())
     while True:
-        text = text[_GAP.match(text).end() :]  # type: ignore[union-attr]  # it matches the empty text, too
-        if text.startswith("]"):
-            while more():
-                pass
-            if text[1:].strip() != "}":
-                raise LogError(expected("JSON", "", "} after the records", text[1:20].strip() or "nothing"))
-            return
-        try:
-            record, end = decoder.raw_decode(text)
-            if end == len(text) and more():  # a number may go on
-                continue
-        except RecursionError:
-            raise LogError("expected records, got arrays in arrays in arrays") from None
-        except json.JSONDecodeError as error:
-            if "Unterminated" not in error.msg and error.pos < len(text) - _LITERAL_CHARACTERS:
-                raise LogError(f"expected JSON, got {error.msg}") from None
-            if more():
-                continue
-            raise CutOffError("it ends within a record") from None
-        except ValueError:  # an integer of thousands of digits
-            raise LogError("expected JSON with numbers of sane size, got something larger") from None
-        text = text[end:]
-        yield record
+        gap = _GAP.match(held.text)
+        held.drop(gap.end() if gap else 0)
+        if held.text.startswith("]"):
+            break
+        found = _next_record(held)
+        if found is not None:
+            yield found[0]
+            held.drop(found[1])
+    while held.more():
+        pass
+    if held.text[1:].strip() != "}":
+        raise LogError(expected("JSON", "", "} after the records", held.text[1:20].strip() or "nothing more"))
+
+
+def _next_record(held: _Text) -> tuple[Any, int] | None:
+    """Return the record that the text begins with and where it ends; None if more of the text was taken instead."""
+    try:
+        record, end = json.JSONDecoder().raw_decode(held.text)
+    except json.JSONDecodeError as error:
+        if "Unterminated" not in error.msg and error.pos < len(held.text) - _LITERAL_CHARACTERS:
+            raise LogError(f"expected JSON, got {error.msg}") from None
+        if held.more():
+            return None
+        raise CutOffError("it ends within a record") from None
+    except RecursionError:
+        raise LogError("expected records, got arrays in arrays in arrays") from None
+    except ValueError:  # an integer of thousands of digits
+        raise LogError("expected JSON with numbers of sane size, got something larger") from None
+    if end == len(held.text) and held.more():  # a number may go on
+        return None
+    return record, end
 
 
 def _part(record: Mapping[str, Any], form: Form) -> Part | None:

@@ -54,8 +54,7 @@ def read_parts(source: Bytes, form: Form) -> Parts:
         record = _Record(source.read(length))
         try:
             part = _READERS[kind](record)
-            if record.position != length:
-                raise LogError(f"{length - record.position} bytes are left over")
+            record.end()
         except LogError as error:
             raise LogError(f"record {n_records}: {_NAMES[kind]}: {error}") from None
         yield part
@@ -78,6 +77,11 @@ class _Record:
         found = self._data[self.position : end]
         self.position = end
         return found
+
+    def end(self) -> None:
+        """Check that nothing is left."""
+        if self.position != len(self._data):
+            raise LogError(f"{len(self._data) - self.position} bytes are left over")
 
     def number(self) -> int:
         """Take a number of four bytes, with a sign."""

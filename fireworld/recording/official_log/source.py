@@ -16,11 +16,11 @@ BYTES_MAX: Final = 64 << 30
 """What a log unpacks to at most."""
 MEMORY_MAX: Final = 96 << 20
 """What the unpacking of xz and lzma may take; official kernels write dictionaries of 16 MiB."""
-SEVEN_ZIP: Final = b"7z\xbc\xaf\x27\x1c"
 _XZ: Final = b"\xfd7zXZ\x00"
 _GZIP: Final = b"\x1f\x8b"
 _HINTS: Final = {
     b"(\xb5/\xfd": "it is compressed: unpack it with zstd -d",
+    b"7z\xbc\xaf": "a 7z archive cannot come from a pipe: write it to a file",
     b"BZh": "it is compressed: unpack it with bzip2 -d",
     b"PK": "it is an archive: unpack it",
     b"version ": "it is a pointer of Git LFS: fetch the file with git lfs pull",

@@ -57,7 +57,7 @@ class _People:
         self.water = np.zeros(n, dtype=np.int32)
         for one in people:
             if one.properties.get(names.HP) is None:
-                raise LogError(expected(f"{names.ENTITIES[one.kind]} {one.id}", "hp", "health points", "none"))
+                raise LogError(expected(f"{names.ENTITIES[one.kind]} {one.id}", "hp", "health points", "none of them"))
         self.ids = [one.id for one in people]
 
     def take(self, entity: Entity) -> None:
@@ -187,7 +187,7 @@ class World:
             if (middle := self._middle.get(where)) is not None:
                 return middle
             person = where
-        raise LogError(expected(f"step {self.step}", f"person {person}", "a position", "none"))
+        raise LogError(expected(f"step {self.step}", f"person {person}", "a position", "no position"))
 
     def _watched(self) -> dict[str, Array]:
         """Return copies of what events follow from."""
@@ -201,7 +201,7 @@ class World:
         if self.step == 0:
             return events_of([])
         before, now = self._before, self._watched()
-        found = [
+        found: list[tuple[str, Sequence[int]]] = [
             ("tank-empty", zero_against_more(now[f"{names.FIRE_BRIGADE}.water"], before[f"{names.FIRE_BRIGADE}.water"]))
         ]
         found += fire_changes(before["fieryness"], now["fieryness"]).events

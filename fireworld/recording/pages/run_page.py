@@ -59,10 +59,11 @@ def report(logs: AnyRun | Sequence[AnyRun], output: Path | str, *, force: bool =
 
 
 def _run_page(logs: Sequence[StoredRun], images: Mapping[str, bytes]) -> str:
-    """Write the page, with PNG files of the "maps" and "curves" of all runs, and the "timeline" of decisions if there is one."""
+    """Write the page, with PNG files: "maps" and "curves" of all runs, "timeline" of decisions if there is one."""
     names = _names(logs)
     title = " against ".join(one_line(log.header.title) for log in logs)
     rewarded = not all(log.header.lacks("rewards") for log in logs)
+    imported = all(log.header.imported for log in logs)
     signs = " Rewards are never above zero: less is worse." if rewarded else ""
     body = [
         f"<h1>{escape(title)}</h1>",
@@ -81,7 +82,7 @@ def _run_page(logs: Sequence[StoredRun], images: Mapping[str, bytes]) -> str:
         "<h2>Events</h2>",
         _event_counts(logs, names),
         *(part for log, name in zip(logs, names, strict=True) for part in _events_of_note(log, name)),
-        f"<h2>{'Where it comes from' if all(log.header.imported for log in logs) else 'How to get the same again'}</h2>",
+        f"<h2>{'Where it comes from' if imported else 'How to get the same again'}</h2>",
         *(part for log, name in zip(logs, names, strict=True) for part in _repetition(log, name)),
         *_scenarios(logs, names),
     ]  # fmt: skip

@@ -6,22 +6,30 @@ import lzma
 import pytest
 
 from tests.recording.official_log import writer
+from tests.recording.official_log.archive import archived
 
 FORMS = {
-    "town.log": lambda log: writer.protobuf(log),
+    "town.log": writer.protobuf,
     "town-2022.log": lambda log: writer.protobuf(log, prefixed=True),
     "unframed.log": lambda log: writer.protobuf(log, framed=False),
     "town.log.lzma": lambda log: lzma.compress(writer.protobuf(log), format=lzma.FORMAT_ALONE),
     "alone.log.xz": lambda log: lzma.compress(writer.protobuf(log, prefixed=True), format=lzma.FORMAT_ALONE),
     "real.log.xz": lambda log: lzma.compress(writer.protobuf(log, prefixed=True), format=lzma.FORMAT_XZ),
     "town.log.gz": lambda log: gzip.compress(writer.protobuf(log)),
-    "old.log": lambda log: writer.old(log),
+    "old.log": writer.old,
     "old.log.xz": lambda log: lzma.compress(writer.old(log)),
-    "town.json": lambda log: writer.as_json(log),
+    "town.7z": archived,
+    "town.json": writer.as_json,
     "numbers.json": lambda log: writer.as_json(log, numbers=True),
     "town.json.lzma": lambda log: lzma.compress(writer.as_json(log), format=lzma.FORMAT_ALONE),
 }
 """How a log is written, by the name of a file."""
+
+
+@pytest.fixture
+def here(empty_folder):
+    """The current folder, without the recordings that other tests of this room begin with."""
+    return empty_folder
 
 
 @pytest.fixture

@@ -247,7 +247,10 @@ def as_json(log: Log, *, numbers: bool = False) -> bytes:
             "urn": kind + 0x1100 if numbers else ENTITY_NAMES[kind], "entityID": number, "properties": properties,
         }  # fmt: skip
 
-    records: list[dict[str, Any]] = [{"start": {}}, {"initialCondition": {"entities": [thing(one) for one in log.town]}}]
+    records: list[dict[str, Any]] = [
+        {"start": {}},
+        {"initialCondition": {"entities": [thing(one) for one in log.town]}},
+    ]
     if log.settings is not None:
         records.append({"config": {"config": {"data": log.settings}}})
     for time, changes in enumerate(log.steps, start=log.first_step):
