@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from fireworld.recording.export import export as export
     from fireworld.recording.export import recover as recover
     from fireworld.recording.fork import fork as fork
-    from fireworld.recording.official_log.importer import Imported as Imported
+    from fireworld.recording.official_log.imported import Imported as Imported
     from fireworld.recording.official_log.importer import import_log as import_log
     from fireworld.recording.record import run as run
     from fireworld.recording.run import Run as Run
@@ -61,7 +61,7 @@ _ROOMS = {
     "Difference": "recording.difference",
     "Explanation": "recording.explain",
     "FireworldError": "errors",
-    "Imported": "recording.official_log.importer",
+    "Imported": "recording.official_log.imported",
     "Observation": "policy.protocol",
     "Outcome": "outcome",
     "Policy": "policy.protocol",

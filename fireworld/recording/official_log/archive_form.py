@@ -9,7 +9,8 @@ from typing import IO, Final
 from fireworld.errors import LogError
 from fireworld.recording.official_log.parts import End, Form, Parts
 from fireworld.recording.official_log.protobuf_form import RECORD_BYTES_MAX, parse_record
-from fireworld.recording.official_log.seven_zip import Archive, ArchivedFile
+from fireworld.recording.official_log.seven_zip import Archive
+from fireworld.recording.official_log.seven_zip_header import ArchivedFile
 
 _FIRST: Final = ("INITIAL_CONDITIONS", "CONFIG")
 _LAST: Final = "END_OF_LOG"

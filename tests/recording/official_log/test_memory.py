@@ -19,7 +19,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
 
 
 def big_log(path, *, n_buildings=3000, n_steps=300, agents=40):
-    """Write a raw log of a gigabyte: five sixths of it perception, as in real ones; all buildings change all the time."""
+    """Write a raw log of a gigabyte: five sixths of it perception, as in real ones; all buildings always change."""
     town = [one for one in writer.town() if one[0] != writer.BUILDING]
     for k in range(n_buildings):
         x, y = 20_000 * (k % 60), 20_000 * (k // 60) + 50_000
