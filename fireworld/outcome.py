@@ -126,7 +126,7 @@ class Quantity:
 def _time(outcome: Outcome) -> str:
     if outcome.completed:
         return f"{outcome.steps} steps"
-    if outcome.n_burning == 0:  # of a kernel that goes on when nothing burns any more
+    if outcome.n_burning == 0:  # a kernel continues when nothing burns any more
         return f"nothing burns after {outcome.steps} steps"
     return f"not within {outcome.steps} steps"
 

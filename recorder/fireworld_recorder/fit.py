@@ -20,7 +20,7 @@ BUILDING: Final = frozenset({"link_building", "refuge_building", "civilian_build
 """Fields that hold indices of buildings, -1 for none."""
 
 Lacks = Callable[[str], bool]
-"""Tells whether a log does not have a field, as in "buildings.energy"."""
+"""Says whether a log does not have a field, as in "buildings.energy"."""
 
 
 def _lacks_nothing(_: str) -> bool:

@@ -168,7 +168,7 @@ class Log(RecordingBase):
 def _unknown_values(header: RunHeader) -> dict[type[Any], dict[str, float]]:
     """Return NaN for each single number of the record types that a log does not have; nothing for most logs.
 
-    Whole numbers stay 0: `header.lacks` tells whether they mean anything.
+    Whole numbers stay 0: `header.lacks` says whether they mean anything.
     """
     if not header.not_recorded:
         return {}

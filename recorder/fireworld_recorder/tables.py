@@ -71,7 +71,7 @@ class ExportTable:
 
         Args:
             record: the step, or the city.
-            lacks: tells which fields the log does not have, as `RunHeader.lacks` does.
+            lacks: whether the log does not have a field, as `RunHeader.lacks` does.
 
         Returns:
             An array for each column, all of one length; None for a field that is empty there.

@@ -63,7 +63,7 @@ class _Import:
     ended: bool = False
 
     def take(self, part: Part, stack: ExitStack) -> None:
-        """Take a part of the log; a step is written when the next part tells that it is over."""
+        """Take a part of the log; a step is written when the next one begins."""
         if isinstance(part, Initial):
             if self.initial is not None:
                 raise LogError(expected("initial conditions", "", "one record of them", "a second one"))
@@ -125,7 +125,7 @@ def import_log(
     so. A log that was cut off is imported up to its last whole step.
 
     Args:
-        file: the log: raw, .xz, .lzma, .gz, .7z or JSON, of any year; what it is is told by its content.
+        file: the log: raw, .xz, .lzma, .gz, .7z or JSON, of any year; its bytes say which it is.
         output: the recording to write.
         force: replace an existing recording.
         on_step: called after each step.

@@ -127,7 +127,7 @@ def _next_record(held: _Text) -> tuple[Any, int] | None:
         raise LogError("expected records, got arrays in arrays in arrays") from None
     except ValueError:  # an integer of thousands of digits
         raise LogError("expected JSON with numbers of sane size, got something larger") from None
-    if end == len(held.text) and held.more():  # a number may go on
+    if end == len(held.text) and held.more():  # a number may continue
         return None
     return record, end
 

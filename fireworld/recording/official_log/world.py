@@ -1,4 +1,4 @@
-"""The state that an official log tells of, carried forward from step to step, and its records."""
+"""The state that an official log has, carried forward from step to step, and its records."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ def test_every_form_becomes_the_same_recording(written, name):
         ("numbers.json", "JSON, names as numbers"),
     ],
 )
-def test_the_form_of_a_log_is_told(written, name, words):
+def test_the_form_of_a_log_is_named(written, name, words):
     assert fw.import_log(written(name), "found.mcap").form == words
 
 

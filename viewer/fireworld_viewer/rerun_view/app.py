@@ -179,7 +179,7 @@ def _identity(recordings: Sequence[Recording]) -> str:
 
 
 def _heat(recording: Recording) -> str:
-    """Return the field that tells runs apart best: all digits of the heat, where they are recorded."""
+    """Return the field that runs differ in first: all digits of the heat, where they are recorded."""
     return "temperature" if recording.header.lacks("buildings.energy") else "energy"
 
 
