@@ -23,7 +23,7 @@ def command(context: click.Context, *, file: Path, output: Path, force: bool, as
     fireworld import-log rescue.log.xz -o old.mcap
     fireworld view old.mcap
 
-    Raw logs, .xz, .lzma, .gz and JSON of all years are read, .7z with the extra 7z.
+    Raw logs, .xz, .lzma, .gz, .7z and JSON of all years are read, by what is in the file.
     What such a log does not have, such as fuel, choices and rewards, is absent from the recording: it can be
     shown, compared and exported, not replayed. A log that was cut off is imported up to its last whole step.
 

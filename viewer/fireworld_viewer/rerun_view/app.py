@@ -157,7 +157,8 @@ def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome
         lay_out = blueprint.pair if comparing else blueprint.single
         stream.send_blueprint(lay_out(*recordings, focus=bool(plotted), outcome=outcome))
         stream.send_recording_name(" | ".join(map(blueprint.title, recordings)))
-        log_legend(stream, comparing=comparing)
+        acting = any(not one.header.lacks("brigades.activity") for one in recordings)
+        log_legend(stream, comparing=comparing, acting=acting)
         if outcome is not None:
             log_page(stream, OUTCOME_PATH, outcome.markdown)
         if comparing:

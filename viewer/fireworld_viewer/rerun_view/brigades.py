@@ -46,9 +46,8 @@ def log_brigades(layers: Layers, recording: Recording) -> None:
     tank = numbers["tank_litres"]
     if "activity" in numbers:
         rgb = colors.packed_table(colors.ACTIVITY_RGB)[numbers["activity"]].reshape(-1)
-    else:  # each in the color of its curve
-        cycle = [colors.BRIGADE_RGB[index % len(colors.BRIGADE_RGB)] for index in range(n)]
-        rgb = np.tile(colors.packed_table(cycle), k)
+    else:
+        rgb = np.repeat(colors.packed_table([colors.BRIGADE_UNKNOWN_RGB]), k * n)
     balls = rerun.Points3D.columns(positions=position.reshape(-1, 3), colors=rgb)
     layers.static("team/brigades", rerun.Points3D.from_fields(radii=[_BALL_RADIUS_M]))
     layers.rows("team/brigades", balls.partition(width), number_columns("Brigade", numbers))
