@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from fireworld.recording.export import export as export
     from fireworld.recording.export import recover as recover
     from fireworld.recording.fork import fork as fork
+    from fireworld.recording.official_log.imported import Imported as Imported
+    from fireworld.recording.official_log.importer import import_log as import_log
     from fireworld.recording.record import run as run
     from fireworld.recording.run import Run as Run
     from fireworld.recording.run import open_log as open_log
@@ -59,6 +61,7 @@ _ROOMS = {
     "Difference": "recording.difference",
     "Explanation": "recording.explain",
     "FireworldError": "errors",
+    "Imported": "recording.official_log.imported",
     "Observation": "policy.protocol",
     "Outcome": "outcome",
     "Policy": "policy.protocol",
@@ -74,6 +77,7 @@ _ROOMS = {
     "explain": "recording.explain",
     "export": "recording.export",
     "fork": "recording.fork",
+    "import_log": "recording.official_log.importer",
     "load_team": "policy.teams.team",
     "open_log": "recording.run",
     "open_training": "training.log.reader",

@@ -27,6 +27,7 @@ COMMANDS: Final = {
     "verify": "Replay a recording and compare every step.",
     "export": "Write a recording as tables for data tools.",
     "golden": "Run golden recordings again and compare.",
+    "import-log": "Make a recording of an official kernel's log.",
     "recover": "Rescue the committed steps of a damaged recording.",
     "view": "Open recordings in Rerun.",
     "render": "Draw recordings: pictures, strips, films.",
@@ -49,7 +50,7 @@ class LazyGroup(click.Group):
         del ctx
         if cmd_name not in COMMANDS:
             return None
-        module = importlib.import_module(f"fireworld.cli.{cmd_name}")
+        module = importlib.import_module(f"fireworld.cli.{cmd_name.replace('-', '_')}")
         return _with_debug(module.command)
 
     def invoke(self, ctx: click.Context) -> object:

@@ -157,7 +157,8 @@ def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome
         lay_out = blueprint.pair if comparing else blueprint.single
         stream.send_blueprint(lay_out(*recordings, focus=bool(plotted), outcome=outcome))
         stream.send_recording_name(" | ".join(map(blueprint.title, recordings)))
-        log_legend(stream, comparing=comparing)
+        acting = any(not one.header.lacks("brigades.activity") for one in recordings)
+        log_legend(stream, comparing=comparing, acting=acting)
         if outcome is not None:
             log_page(stream, OUTCOME_PATH, outcome.markdown)
         if comparing:
@@ -173,9 +174,14 @@ def _identity(recordings: Sequence[Recording]) -> str:
     digest = hashlib.sha256()
     for one in recordings:
         digest.update(f"{one.header.scenario_digest} {one.header.seed} {one.header.policy_digest}".encode())
-        for numbers in (one.steps, one.column("/buildings", "energy"), one.column("/brigades", "x_m")):
+        for numbers in (one.steps, one.column("/buildings", _heat(one)), one.column("/brigades", "x_m")):
             digest.update(numbers.tobytes())
     return digest.hexdigest()[:32]
+
+
+def _heat(recording: Recording) -> str:
+    """Return the field that runs differ in first: all digits of the heat, where they are recorded."""
+    return "temperature" if recording.header.lacks("buildings.energy") else "energy"
 
 
 def _run_viewer(
