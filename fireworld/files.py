@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import secrets
 import shutil
-import tempfile
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -107,13 +107,14 @@ def written_beside(path: Path) -> Iterator[Path]:
     """
     path = path.absolute()  # whoever works meanwhile may change the current folder
     with _output_errors(path):
-        scratch = Path(tempfile.mkdtemp(prefix=".fireworld-", dir=path.parent))
+        scratch = path.parent / f".fireworld-{secrets.token_hex(8)}"
         partial = scratch / path.name
         try:
+            scratch.mkdir(0o700)  # in here, so that an interrupt right after it leaves none
             yield partial
             partial.replace(path)
         finally:
-            shutil.rmtree(scratch, ignore_errors=True)
+            _remove(scratch)
 
 
 @contextmanager
@@ -131,8 +132,8 @@ def new_folder(folder: Path, *, own: Collection[str], force: bool = False) -> It
         for leftover in (partial, replaced):
             check_folder(leftover, own=own, force=True)
             shutil.rmtree(leftover, ignore_errors=True)
-        partial.mkdir()
         try:
+            partial.mkdir()
             yield partial
             if folder.exists():
                 folder.rename(replaced)
@@ -143,7 +144,16 @@ def new_folder(folder: Path, *, own: Collection[str], force: bool = False) -> It
                 replaced.rename(folder)
             raise
         finally:
-            shutil.rmtree(partial, ignore_errors=True)
+            _remove(partial)
+
+
+def _remove(scratch: Path) -> None:
+    """Remove a folder, all of it even if an interrupt comes meanwhile."""
+    try:
+        shutil.rmtree(scratch, ignore_errors=True)
+    except BaseException:
+        shutil.rmtree(scratch, ignore_errors=True)
+        raise
 
 
 def write_file(path: Path, data: bytes) -> None:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import _thread
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Event
+from typing import Final
+
+AGAIN_SECONDS: Final = 0.01
 
 
 class Interrupted(KeyboardInterrupt):
@@ -14,9 +19,33 @@ class Interrupted(KeyboardInterrupt):
 
 
 def end_like_ctrl_c() -> None:
-    """Let SIGTERM, by which CI systems and `timeout` end a process, do what Ctrl-C does."""
+    """Let SIGTERM, by which CI systems and `timeout` end a process, do what Ctrl-C does, and let neither be lost."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)
+        if sys.unraisablehook is sys.__unraisablehook__:
+            sys.unraisablehook = _once_more
+
+
+def _once_more(fault: sys.UnraisableHookArgs) -> None:
+    """Send Ctrl-C again that came within a finalizer, out of which Python lets nothing raise."""
+    if not isinstance(fault.exc_value, KeyboardInterrupt):
+        sys.__unraisablehook__(fault)
+        return
+    timer = threading.Timer(AGAIN_SECONDS, _thread.interrupt_main)
+    timer.daemon = True
+    timer.start()
+
+
+def was_interrupted(error: BaseException) -> bool:
+    """Return whether an error is what others made of Ctrl-C: compiled code, or a library under import, say."""
+    seen: set[int] = set()
+    cause: BaseException | None = error
+    while cause is not None and id(cause) not in seen:
+        if isinstance(cause, KeyboardInterrupt):
+            return True
+        seen.add(id(cause))
+        cause = cause.__cause__ or cause.__context__
+    return False
 
 
 @contextmanager
