@@ -220,7 +220,7 @@ def replay_every(
     if not place.is_dir():
         raise OutputError(expected(str(place), "", "an existing folder", "none", "make it first"))
     names = [one.name for one in opened.scenarios]
-    opened.position(scenario if scenario is not None else opened.lines[0].scenario if len(opened) else 0, -1)
+    opened.position(0 if scenario is None else scenario, -1)  # every training begins in the first
     chosen = {
         number: place / episode_file(names[line.scenario], line.episode)
         for number, line in enumerate(opened.lines)
