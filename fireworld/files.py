@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import secrets
 import shutil
 from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from fireworld.errors import OutputError, expected
@@ -105,8 +106,8 @@ def written_beside(path: Path) -> Iterator[Path]:
     Raises:
         OutputError: it cannot be written.
     """
-    path = path.absolute()  # whoever works meanwhile may change the current folder
     with _output_errors(path):
+        path = path.absolute()  # whoever works meanwhile may change the current folder
         scratch = path.parent / f".fireworld-{secrets.token_hex(8)}"
         partial = scratch / path.name
         try:
@@ -145,6 +146,21 @@ def new_folder(folder: Path, *, own: Collection[str], force: bool = False) -> It
             raise
         finally:
             _remove(partial)
+
+
+@contextmanager
+def same_folder() -> Iterator[None]:
+    """Come back to the current folder at the end, wherever users' code has gone, if it is still there."""
+    try:
+        before = Path.cwd()
+    except OSError:
+        before = None
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            if before is not None and Path.cwd() != before:
+                os.chdir(before)
 
 
 def _remove(scratch: Path) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import _thread
 import signal
-import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,18 +18,13 @@ class Interrupted(KeyboardInterrupt):
 
 
 def end_like_ctrl_c() -> None:
-    """Let SIGTERM, by which CI systems and `timeout` end a process, do what Ctrl-C does, and let neither be lost."""
+    """Let SIGTERM, by which CI systems and `timeout` end a process, do what Ctrl-C does."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-        if sys.unraisablehook is sys.__unraisablehook__:
-            sys.unraisablehook = _once_more
 
 
-def _once_more(fault: sys.UnraisableHookArgs) -> None:
-    """Send Ctrl-C again that came within a finalizer, out of which Python lets nothing raise."""
-    if not isinstance(fault.exc_value, KeyboardInterrupt):
-        sys.__unraisablehook__(fault)
-        return
+def once_more() -> None:
+    """Send Ctrl-C again, in a moment: it came where Python lets nothing raise, in a finalizer."""
     timer = threading.Timer(AGAIN_SECONDS, _thread.interrupt_main)
     timer.daemon = True
     timer.start()

@@ -111,8 +111,7 @@ class Recorder:
         """
         from fireworld.errors import FireworldError
         from fireworld.policy.names import find_policy
-        from fireworld.recording.golden.spec import make_spec, prepare_golden
-        from fireworld.recording.record import run_prepared
+        from fireworld.recording.golden.spec import make_spec, prepare_golden, run_golden
 
         path = self._path(name)
         try:
@@ -127,7 +126,7 @@ class Recorder:
                 tolerances=tolerances,
                 ignore=ignore,
             )
-            fresh = run_prepared(prepare_golden(spec, path.parent, policy=named, cities=self._cities))
+            fresh = run_golden(prepare_golden(spec, path.parent, policy=named, cities=self._cities))
             self._compare(path, fresh)
         except FireworldError as error:
             raise _failure(str(error)) from None

@@ -90,7 +90,7 @@ def _shown(observation: Observation) -> Observation:
     return replace(observation, city=city, world=world, known_targets=read_only(observation.known_targets))
 
 
-def _is_ours(policy: Policy) -> bool:
+def is_ours(policy: Policy) -> bool:
     """Return whether a policy is fireworld's own: it changes nothing, and kernels want arrays as they are."""
     return type(policy).__module__.startswith("fireworld.") and not isinstance(policy, Adapted)
 
@@ -100,11 +100,12 @@ class Adapted(Policy):
 
     def __init__(self, given: Any) -> None:
         self.given = given
-        self._choose = given.decide if isinstance(given, Policy) else given
-        for name in ("begin", "keeps", "stateless", "digest"):
-            own = getattr(given, name, None)
-            if own is not None:
-                setattr(self, name, own)
+        with users_code(given, "its attributes"):
+            self._choose = given.decide if isinstance(given, Policy) else given
+            for name in ("begin", "keeps", "stateless", "digest"):
+                own = getattr(given, name, None)
+                if own is not None:
+                    setattr(self, name, own)
 
     def decide(self, observation: Observation) -> Decision | str | int:
         """Return what the user's own answers, which may be anything."""
@@ -127,12 +128,12 @@ def begin(policy: Policy, city: CityArrays, *, n_brigades: int, seed: int) -> No
     """Let a policy prepare for a run; raise PolicyError if its own `begin` fails."""
     asked = complete(policy)
     with users_code(policy, "begin"):
-        asked.begin(city if _is_ours(asked) else read_only(city), n_brigades, seed)
+        asked.begin(city if is_ours(asked) else read_only(city), n_brigades, seed)
 
 
 def ask(policy: Policy, observation: Observation) -> Decision:
     """Return a policy's decision, checked and in plain Python values; PolicyError if it fails or makes no sense."""
-    if _is_ours(policy):
+    if is_ours(policy):
         return _checked(policy.decide(observation), policy, observation)
     try:
         with PRINTS_ASIDE:
@@ -170,6 +171,13 @@ def users_code(what: object, moment: str) -> Iterator[None]:
         raise
     except BaseException as error:
         raise _failure(what, moment, error) from error
+
+
+def own_digest(policy: Policy) -> str:
+    """Return the digest that a policy says it has, "" for none, or what is no text; PolicyError if it cannot say."""
+    with users_code(policy, "digest"):
+        digest = policy.digest
+        return digest if isinstance(digest, str) else ""
 
 
 def name_of(policy: object) -> str:
@@ -215,6 +223,9 @@ def _checked(answer: Any, policy: Policy, observation: Observation) -> Decision:
         except (ArithmeticError, TypeError, ValueError):
             raise refusal(wanted, f"{name} {shown(value)}") from None
 
+    if inspect.iscoroutine(answer):
+        answer.close()
+        raise refusal(AN_ANSWER, "a coroutine", "decide without async")
     bare = not isinstance(answer, Decision)
     action = _action_index(answer if bare else answer.action)
     if action is None or (bare and isinstance(answer, bool)):

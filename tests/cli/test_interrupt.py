@@ -94,10 +94,7 @@ def test_ctrl_c_that_others_made_something_else_of(here, fireworld, monkeypatch)
     """Compiled code and libraries under import raise their own errors when it comes at the wrong moment."""
 
     def wrapped(*_, **__):
-        try:
-            raise KeyboardInterrupt
-        except KeyboardInterrupt as error:
-            raise SystemError("returned a result with an exception set") from error
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
 
     monkeypatch.setattr("fireworld.scenario.load_scenario", wrapped)
     done = fireworld("run", "quick")
@@ -106,8 +103,8 @@ def test_ctrl_c_that_others_made_something_else_of(here, fireworld, monkeypatch)
 
 LOST = """
 import signal, sys, time
-from fireworld.interrupt import end_like_ctrl_c
-end_like_ctrl_c()
+from fireworld.cli import _say_what_is_ignored
+_say_what_is_ignored()
 class Finalized:
     def __del__(self):
         signal.raise_signal(signal.SIGINT)

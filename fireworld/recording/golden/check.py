@@ -17,11 +17,10 @@ from fireworld.errors import FireworldError, OutputError, expected
 from fireworld.files import check_output
 from fireworld.junit import clean, report
 from fireworld.recording.difference_text import change_lines
-from fireworld.recording.golden.spec import prepare_golden, spec_of
+from fireworld.recording.golden.spec import prepare_golden, run_golden, spec_of
 from fireworld.recording.golden.store import SUFFIX, is_text_of, make_folder, store_recording, text_path
 from fireworld.recording.golden.training import prepare_training, training_changes, training_spec_of
 from fireworld.recording.inputs import is_training
-from fireworld.recording.record import run_prepared
 from fireworld.recording.run import Run
 from fireworld.records import RunHeader
 from fireworld.simulation.built import CityCache
@@ -189,7 +188,7 @@ def check_golden(path: Path, *, cities: CityCache | None = None) -> GoldenResult
             fresh = prepare_training(training_spec_of(header), path.parent, recorded=golden, cities=cities)
         else:
             header = open_log(path).header
-            fresh = run_prepared(prepare_golden(spec_of(header), path.parent, recorded=header, cities=cities))
+            fresh = run_golden(prepare_golden(spec_of(header), path.parent, recorded=header, cities=cities))
         return compare_golden(path, fresh)
     except FireworldError as error:
         return GoldenResult(path=path, header=header, error=str(error))

@@ -10,11 +10,15 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 import msgspec
+from fireworld_recorder.diff import compare
 
-from fireworld.errors import LogError, expected
+from fireworld.errors import LogError, PolicyError, expected
+from fireworld.policy.asking import is_ours, name_of
 from fireworld.policy.names import NamedPolicy, find_policy, with_file
-from fireworld.recording.replay import build_recorded
+from fireworld.recording.record import run_prepared
+from fireworld.recording.replay import Replay, build_recorded
 from fireworld.recording.resume import refind_policy
+from fireworld.recording.run import Run
 from fireworld.records import RunHeader
 from fireworld.scenario import load_scenario, scenario_names
 from fireworld.simulation.built import CityCache
@@ -129,6 +133,22 @@ def prepare_golden(
     run = prepare_run(built, named, seed=spec.seed, n_steps_max=spec.steps)
     attachments = {**run.header.attachments, SPEC_ATTACHMENT: msgspec.json.encode(spec)}
     return replace(run, header=replace(run.header, attachments=attachments))
+
+
+def run_golden(prepared: PreparedRun) -> Run:
+    """Run what `prepare_golden` prepared, in memory.
+
+    Raises:
+        PolicyError: the policy failed; or it is a user's, and its decisions alone, in a world that it has never seen,
+            do not lead to the same steps.
+        Interrupted: Ctrl-C.
+    """
+    fresh = run_prepared(prepared)
+    if not is_ours(prepared.policy) and not compare(fresh, Replay(fresh)).same:
+        wanted = "decisions that lead to its outcome by themselves"
+        where = f"policy {name_of(prepared.policy)}"
+        raise PolicyError(expected(where, f"seed {fresh.header.seed}", wanted, "a world that it has changed"))
+    return fresh
 
 
 def _prepare_recorded(spec: GoldenSpec, recorded: RunHeader | None) -> PreparedRun:

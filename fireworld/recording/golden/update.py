@@ -14,11 +14,10 @@ from fireworld.errors import FireworldError, LogError, OutputError, expected
 from fireworld.files import write_file
 from fireworld.interrupt import gentle_interrupt
 from fireworld.recording.golden.check import FOLDER, GoldenResult, check_goldens, compare_golden
-from fireworld.recording.golden.spec import GoldenSpec, make_spec, prepare_golden, spec_of
+from fireworld.recording.golden.spec import GoldenSpec, make_spec, prepare_golden, run_golden, spec_of
 from fireworld.recording.golden.store import SUFFIX, make_folder, store_golden, store_text
 from fireworld.recording.golden.training import TrainingSpec, make_training_spec, prepare_training, training_spec_of
 from fireworld.recording.inputs import is_training
-from fireworld.recording.record import run_prepared
 from fireworld.recording.run import Run
 from fireworld.training.log.reader import open_training
 from fireworld.training.log.verify import TrainedAgain
@@ -68,7 +67,7 @@ def add_golden(
     """
     path = _free_path(folder, name if name is not None else _default_name(scenario, policy, seed))
     spec = make_spec(folder, scenario=scenario, policy=policy, seed=seed, steps=steps, settings=settings)
-    fresh = run_prepared(prepare_golden(spec, folder))
+    fresh = run_golden(prepare_golden(spec, folder))
     make_folder(folder)
     with gentle_interrupt():
         store_golden(path, fresh)

@@ -207,7 +207,7 @@ def test_check_interrupted(kept, golden, monkeypatch):
     def interrupted(run):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(check, "run_prepared", interrupted)
+    monkeypatch.setattr(check, "run_golden", interrupted)
     before = contents(kept)
     assert golden("check").code == 130
     assert golden("update", "--reason", "None.").code == 130
@@ -368,3 +368,36 @@ def test_a_policy_in_a_file_of_code(here, golden, monkeypatch):
     (here / "elsewhere").mkdir()
     monkeypatch.chdir(here / "elsewhere")
     assert golden("check", "../kept").code == 0
+
+
+CHEAT = """
+class Policy:
+    def decide(self, observation):
+        energy = observation.world.fire.energy
+        energy.base[:] = 0.0
+        return 0
+"""
+
+
+def test_a_policy_that_does_more_than_decide_has_no_golden(here, golden, write_policy):
+    assert golden(*MINE).code == 0
+    before = contents(here / "recordings" / "golden")
+    write_policy(CHEAT)
+    wanted = "policy mine:Policy: seed 1: expected decisions that lead to its outcome by themselves"
+    for words in ((*MINE, "--name", "other"), ("update", "--reason", "None.")):
+        done = golden(*words)
+        assert done.code == 2
+        assert wanted in done.err
+    done = golden("check")
+    assert done.code == 2
+    assert wanted in " ".join(done.out.split())
+    assert contents(here / "recordings" / "golden") == before
+
+
+def test_a_policy_that_changes_the_folder_changes_no_other_golden(here, golden, write_policy):
+    assert golden(*MINE).code == 0
+    assert golden("add", "quick", "--policy", "easiest", "--steps", 4, "--name", "z").code == 0
+    write_policy(
+        "import os\n\n\nclass Policy:\n    def decide(self, observation):\n        os.chdir('/')\n        return 3\n"
+    )
+    assert golden("check").code == 0
