@@ -23,17 +23,20 @@ def check_output(path: Path, *, force: bool = False, endings: Collection[str] = 
     Raises:
         OutputError: it exists, it is no regular file, its ending is another, or there is no folder for it.
     """
-    if endings and path.suffix.lower() not in endings:
-        raise OutputError(expected(str(path), "", f"a file ending in {', '.join(endings)}", path.suffix or "no ending"))
-    _check_parent(path)
-    if path.is_dir():
-        raise OutputError(expected(str(path), "", "the name of a file", "a folder"))
-    if path.is_symlink() or (path.exists() and not path.is_file()):
-        raise OutputError(expected(str(path), "", "the name of a regular file", "a link or a device"))
-    if path.exists() and not force:
-        raise OutputError(
-            expected(str(path), "", "a name that is free", "an existing file", "use --force to replace it")
-        )
+    with _output_errors(path):
+        if endings and path.suffix.lower() not in endings:
+            raise OutputError(
+                expected(str(path), "", f"a file ending in {', '.join(endings)}", path.suffix or "no ending")
+            )
+        _check_parent(path)
+        if path.is_dir():
+            raise OutputError(expected(str(path), "", "the name of a file", "a folder"))
+        if path.is_symlink() or (path.exists() and not path.is_file()):
+            raise OutputError(expected(str(path), "", "the name of a regular file", "a link or a device"))
+        if path.exists() and not force:
+            raise OutputError(
+                expected(str(path), "", "a name that is free", "an existing file", "use --force to replace it")
+            )
 
 
 def check_outputs(paths: Sequence[Path], *, force: bool = False, inputs: Sequence[Path] = ()) -> None:
@@ -66,11 +69,11 @@ def check_folder(folder: Path, *, own: Collection[str], force: bool = False) -> 
     Raises:
         OutputError: it exists, it is no folder, it holds something else, or there is no folder for it.
     """
-    _check_parent(folder)
-    if not folder.exists() and not folder.is_symlink():
-        return
-    is_folder = folder.is_dir() and not folder.is_symlink()
     with _output_errors(folder):
+        _check_parent(folder)
+        if not folder.exists() and not folder.is_symlink():
+            return
+        is_folder = folder.is_dir() and not folder.is_symlink()
         found = sorted(path.name for path in folder.iterdir()) if is_folder else [folder.name]
     foreign = [name for name in found if name not in own or not is_folder]
     if foreign:
@@ -172,11 +175,11 @@ def _remove(scratch: Path) -> None:
         raise
 
 
-def write_file(path: Path, data: bytes) -> None:
-    """Write a file, beside and renamed.
+def write_file(path: Path, data: bytes | str) -> None:
+    """Write a file, beside and renamed; a text as UTF-8, with any bytes of names in it as Python writes them.
 
     Raises:
         OutputError: it cannot be written.
     """
     with written_beside(path) as partial:
-        partial.write_bytes(data)
+        partial.write_bytes(data if isinstance(data, bytes) else data.encode("utf-8", "backslashreplace"))

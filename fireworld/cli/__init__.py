@@ -93,7 +93,8 @@ def main() -> None:
     be_patient()
     try:
         code = root.main(standalone_mode=False)
-        sys.stdout.flush()
+        if sys.stdout is not None:
+            sys.stdout.flush()
     except FireworldError as error:
         code = _show(error, str(error))
     except click.ClickException as error:
@@ -104,6 +105,8 @@ def main() -> None:
         code = INTERRUPTED
     except StandardOutputError as error:
         code = _show(error, f"standard output: cannot be written: {error}")
+    except OSError as error:  # of a file that somebody named: its name is too long, say
+        code = _show(error, _of_a_file(error) or f"internal error: {described(error)}; run it again with --debug")
     except BaseException as error:
         if isinstance(error, SystemExit) and "_FIREWORLD_COMPLETE" in os.environ:
             raise
@@ -134,6 +137,15 @@ def _say_what_is_ignored() -> None:
         sys.unraisablehook = lambda fault: warn(fault.exc_value, "a finalizer")
     if threading.excepthook is threading.__excepthook__:
         threading.excepthook = lambda fault: warn(fault.exc_value, "a thread")
+
+
+def _of_a_file(error: OSError) -> str:
+    """Return the line of a file's error, "" if it is not a file's."""
+    from fireworld.errors import one_line
+
+    if not isinstance(error.filename, str | bytes | os.PathLike):
+        return ""
+    return one_line(f"{os.fsdecode(error.filename)}: {error.strerror}; try another name or folder")
 
 
 def _show(error: BaseException, line: str) -> int:

@@ -54,7 +54,7 @@ def report(logs: AnyRun | Sequence[AnyRun], output: Path | str, *, force: bool =
             "curves": png_bytes(draw_curves(runs)),
             "timeline": png_bytes(draw_timeline(runs)),
         }
-    write_file(Path(output), _run_page(runs, images).encode())
+    write_file(Path(output), _run_page(runs, images))
 
 
 def _run_page(logs: Sequence[StoredRun], images: Mapping[str, bytes]) -> str:
