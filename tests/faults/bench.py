@@ -25,12 +25,14 @@ class Bench:
         folder: empty, the case's own; the current folder of its calls.
         material: what `tests.faults.material` made; not to be changed.
         outcome: of the case so far; calls add what is wrong with them.
+        light: leave out what takes more than some seconds.
         processes: call `python -m fireworld` rather than a fork of this process.
         told: lines that say what was called, for who repeats the case.
     """
 
-    def __init__(self, place: Path, material: Path, *, processes: bool = False) -> None:
-        self.folder, self.material, self.processes = place / "case", material, processes
+    def __init__(self, place: Path, material: Path, *, light: bool = False) -> None:
+        self.folder, self.material, self.light = place / "case", material, light
+        self.processes = False
         self.outcome = Outcome()
         self.told: list[str] = []
         self._io = place / "io"
@@ -87,9 +89,23 @@ class Bench:
             done = calls.forked(
                 words, place, io=self._io, at=at, before=before, act=act, cpu_seconds_max=cpu_seconds_max
             )
-        self.told.append(f"{' '.join(done.words)}: {done.code}, {done.cpu_seconds:.2f} s: {done.line}")
-        self.outcome.failures += judge(done, codes, cpu_seconds_max=cpu_seconds_max)
+        self._note(done, codes, cpu_seconds_max)
         return done
+
+    def crowd(
+        self, many: Sequence[Sequence[object]], *, codes: Collection[int], cpu_seconds_max: float = CPU_SECONDS_MAX
+    ) -> list[Done]:
+        """Call many commands at once, each in a fork; arguments as for `call`."""
+        found = calls.crowd(many, self.folder, io=self._io / "crowd", cpu_seconds_max=cpu_seconds_max)
+        for done in found:
+            self._note(done, codes, cpu_seconds_max)
+        return found
+
+    def _note(self, done: Done, codes: Collection[int], cpu_seconds_max: float) -> None:
+        self.told.append(f"{' '.join(done.words)}: {done.code}, {done.cpu_seconds:.2f} s: {done.line}")
+        wrong = judge(done, codes, cpu_seconds_max=cpu_seconds_max)
+        self.told += [done.err.strip()] if wrong else []
+        self.outcome.failures += wrong
 
     def files(self) -> dict[str, bytes]:
         """Return the files of the folder, and of those in it, by their names in it."""

@@ -73,12 +73,20 @@ def forked(
     """
     _COUNTERS[:] = bytes(16)
     texts = tuple(map(str, words))
-    for name in ("out", "err"):
-        (io / name).write_bytes(b"")
-    child = os.fork()
-    if child == 0:
-        _become(texts, folder, io, at, before, act, cpu_seconds_max)
+    child = _fork(texts, folder, io, at, before, act, cpu_seconds_max)
     return _wait(child, texts, io, at, wall_seconds_max)
+
+
+def crowd(many: Sequence[Sequence[object]], folder: Path, *, io: Path, cpu_seconds_max: float) -> list[Done]:
+    """Call many commands at once, each in a fork of this process; arguments as for `forked`."""
+    began = []
+    for number, words in enumerate(many):
+        texts, own = tuple(map(str, words)), io / str(number)
+        own.mkdir(parents=True)
+        child = _fork(texts, folder, own, None, None, None, cpu_seconds_max)
+        _running.add(child)
+        began.append((child, texts, own))
+    return [_wait(child, texts, own, None, WALL_SECONDS_MAX) for child, texts, own in began]
 
 
 def process(
@@ -112,7 +120,7 @@ def process(
             stderr=err,
             env={**os.environ, **(environment or {})},
             start_new_session=True,
-            preexec_fn=begin,
+            preexec_fn=begin,  # noqa: PLW1509 - this process has one thread
         )
         done = _wait(child.pid, texts, io, at, wall_seconds_max)
         child.returncode = done.code  # it has been waited for
@@ -134,6 +142,15 @@ def _limit(cpu_seconds_max: float) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (used + MORE_MEMORY_BYTES, used + MORE_MEMORY_BYTES))
     resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_BYTES_MAX, FILE_BYTES_MAX))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _fork(texts: tuple[str, ...], folder: Path, io: Path, *how: Any) -> int:
+    for name in ("out", "err"):
+        (io / name).write_bytes(b"")
+    child = os.fork()
+    if child == 0:
+        _become(texts, folder, io, *how)
+    return child
 
 
 def _become(
@@ -159,7 +176,7 @@ def _become(
         sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115 - until the end
         sys.stderr = open(2, "w", encoding="utf-8", errors="backslashreplace", closefd=False)  # noqa: SIM115
         os.chdir(folder)
-        sys.path[0] = "" if act is None else sys.path[0]
+        sys.path[0] = ""
         sys.argv = ["fireworld", *words]
         _limit(cpu_seconds_max)
         if before is not None:

@@ -26,6 +26,8 @@ from multiprocessing.context import ForkProcess
 from pathlib import Path
 from typing import Any, Final
 
+if __name__ == "__main__":
+    os.environ.setdefault("FIREWORLD_FUZZ_EXAMPLES", "200")  # before it is read, by the imports that follow
 from tests.docs.pages import ROOT
 from tests.faults import calls, material
 from tests.faults.bench import Bench
@@ -47,6 +49,7 @@ class Worker:
 
     process: ForkProcess
     pipe: Any
+    light: bool
     case: str = ""
     began: float = 0.0
 
@@ -67,7 +70,7 @@ def main(words: Sequence[str] | None = None) -> int:
             _say(f"going on after {len(ledger.outcomes)} cases, in {ledger.path}")
         kinds = {name: KINDS[name] for name in arguments.only or KINDS}
         try:
-            _campaign(kinds, ledger, place, seconds=arguments.seconds, seed=arguments.seed, n=arguments.jobs)
+            _campaign(kinds, ledger, place, arguments)
         except KeyboardInterrupt:
             _say("interrupted")
     sys.stdout.write(f"{ledger.table()}\n")
@@ -81,20 +84,22 @@ def _parse(words: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--only", nargs="+", choices=list(KINDS), metavar="KIND", help=f"of {', '.join(KINDS)}")
     parser.add_argument("--resume", action="store_true", help="go on after what is finished, if the code is the same")
     parser.add_argument("--jobs", type=int, default=2, help="cases at a time")
+    parser.add_argument("--light", action="store_true", help="leave out cases that take more than some seconds")
     parser.add_argument("--case", help="try this one alone, as in kills:1000017, and say what happens")
     return parser.parse_args(words)
 
 
-def try_case(case: str, place: Path) -> tuple[Outcome, list[str]]:
+def try_case(case: str, place: Path, *, light: bool = False) -> tuple[Outcome, list[str]]:
     """Try a case; return what came of it, and what was called.
 
     Args:
         case: its name: kind and seed.
         place: where the material is, and where the case gets a folder.
+        light: leave out what takes more than some seconds.
     """
-    name, _, seed = case.partition(":")
+    name = case.partition(":")[0]
     folder = Path(tempfile.mkdtemp(prefix=f"{name}-", dir=place))
-    bench = Bench(folder, place / "material")
+    bench = Bench(folder, place / "material", light=light)
     try:
         outcome = KINDS[name].run(random.Random(case), bench)
     except Exception as error:  # noqa: BLE001 - a fault of the campaign's own is no success
@@ -114,11 +119,11 @@ def cases_of(name: str, seed: int, ledger: Ledger) -> Iterator[str]:
             yield case
 
 
-def _campaign(kinds: dict[str, Kind], ledger: Ledger, place: Path, *, seconds: float, seed: int, n: int) -> None:
-    end, said = time.monotonic() + seconds, time.monotonic()
-    waiting = {name: cases_of(name, seed, ledger) for name in kinds}
+def _campaign(kinds: dict[str, Kind], ledger: Ledger, place: Path, arguments: argparse.Namespace) -> None:
+    end, said = time.monotonic() + arguments.seconds, time.monotonic()
+    waiting = {name: cases_of(name, arguments.seed, ledger) for name in kinds}
     spent = {name: (ledger.tallies()[name].seconds if name in ledger.tallies() else 0.0) for name in kinds}
-    workers = [_hire(place) for _ in range(n)]
+    workers = [_hire(place, light=arguments.light) for _ in range(arguments.jobs)]
     try:
         while time.monotonic() < end + GRACE_SECONDS:
             for worker in workers:
@@ -165,7 +170,7 @@ def _take(worker: Worker, ledger: Ledger, spent: dict[str, float], place: Path) 
         outcome = Outcome()
         outcome.fail("other", "the process that tried it died")
         worker.process.join()
-        case, began, worker = worker.case, worker.began, _hire(place)
+        case, began, worker = worker.case, worker.began, _hire(place, light=worker.light)
     else:
         case, began = worker.case, worker.began
     seconds = time.monotonic() - began
@@ -177,15 +182,15 @@ def _take(worker: Worker, ledger: Ledger, spent: dict[str, float], place: Path) 
     return worker
 
 
-def _hire(place: Path) -> Worker:
+def _hire(place: Path, *, light: bool) -> Worker:
     here, there = get_context("fork").Pipe()
-    process = get_context("fork").Process(target=_work, args=(there, place))
+    process = get_context("fork").Process(target=_work, args=(there, place, light))
     process.start()
     there.close()
-    return Worker(process, here)
+    return Worker(process, here, light)
 
 
-def _work(pipe: Any, place: Path) -> None:
+def _work(pipe: Any, place: Path, light: bool) -> None:
     """Be a worker: try what comes."""
 
     def leave(*_: object) -> None:
@@ -196,7 +201,7 @@ def _work(pipe: Any, place: Path) -> None:
     signal.signal(signal.SIGTERM, leave)
     with suppress(EOFError):
         while True:
-            pipe.send(try_case(pipe.recv(), place)[0])
+            pipe.send(try_case(pipe.recv(), place, light=light)[0])
 
 
 def _repeat(case: str, place: Path) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import gzip
 import io
+import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -300,30 +301,32 @@ def _altered_message(generator: random.Random, record_type: type[Any], data: byt
 
 
 def _odd_value(generator: random.Random, value: Any, item: Any) -> Any:
+    if item.repeated:
+        return _odd_array(generator, np.array(value, np.dtype(DTYPES[item.wire])))
+    if isinstance(value, bytes):
+        return generator.choice((b"", b"\0" * 32, value[:-1], generator.randbytes(64)))
+    if isinstance(value, str):
+        return generator.choice(ODD_TEXTS)
+    if isinstance(value, bool):
+        return not value
     number = generator.choice(ODD_NUMBERS)
-    if not item.repeated:
-        if isinstance(value, bytes):
-            return generator.choice((b"", b"\0" * 32, value[:-1], generator.randbytes(64)))
-        if isinstance(value, str):
-            return generator.choice(ODD_TEXTS)
-        if isinstance(value, bool):
-            return not value
-        return number if isinstance(value, float) or number == number and abs(number) < 2**53 else 3
-    dtype = np.dtype(DTYPES[item.wire])
-    array = np.array(value, dtype)
-    how = generator.randrange(5)
+    return number if isinstance(value, float) or (math.isfinite(number) and abs(number) < 2**53) else 3
+
+
+def _odd_array(generator: random.Random, array: Any) -> Any:
+    """Return another length, or other numbers."""
+    how, number = generator.randrange(5), generator.choice(ODD_NUMBERS)
     if how == 0:
         return array[: generator.randrange(len(array) + 1)]
     if how == 1:
-        return np.concatenate([array, array[: 1 + generator.randrange(4)], np.zeros(1, dtype)])
+        return np.concatenate([array, array[: 1 + generator.randrange(4)], np.zeros(1, array.dtype)])
+    if array.dtype == np.uint8:
+        number = abs(int(number)) % 128 if math.isfinite(number) else 99
+    elif array.dtype.kind in "iu":
+        info = np.iinfo(array.dtype)
+        number = int(min(max(number, info.min // 2), info.max // 2)) if math.isfinite(number) else info.max
     with np.errstate(all="ignore"):
-        if dtype.kind == "u" and dtype.itemsize == 1:
-            odd = np.array(abs(int(number)) % 128 if number == number and abs(number) < 2**60 else 99, dtype)
-        elif dtype.kind in "iu":
-            info = np.iinfo(dtype)
-            odd = np.array(min(max(int(number), info.min), info.max) if abs(number) < 2**60 else info.max, dtype)
-        else:
-            odd = np.array(number).astype(dtype)
+        odd = np.array(number).astype(array.dtype)
     if how == 2 or not len(array):
         return np.full(len(array) or 1, odd)
     array[generator.randrange(len(array))] = odd

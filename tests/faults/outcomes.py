@@ -109,16 +109,16 @@ def judge(done: Done, codes: Collection[int], *, cpu_seconds_max: float = CPU_SE
         found.append(Failure("memory", f"{said}: {done.peak_bytes / 1e6:.0f} MB"))
     if done.n_orphans:
         found.append(Failure("other", f"{said}: left {done.n_orphans} processes behind"))
-    if done.code == USER_ERROR and not done.timed_out:
+    if done.code == USER_ERROR and not done.timed_out and done.words[0] != "pytest":
         found += [Failure("line", f"{said}: {fault}") for fault in faults_of_a_refusal(done)]
     return found
 
 
 def faults_of_a_refusal(done: Done) -> list[str]:
     """Return what is wrong with what was said with exit code 2: it is one printable line that says something."""
-    if done.words[:2] == ("golden", "check") and not done.err:
-        return [] if done.out.strip() else ["nothing was said"]  # in its table, beside those that are the same
     lines = [line for line in done.err.splitlines() if _LINE.match(line)]
+    if done.words[:2] == ("golden", "check") and not lines:
+        return [] if done.out.strip() else ["nothing was said"]  # in its table, beside those that are the same
     if len(lines) != 1:
         return [f"expected one line of complaint, got {len(lines)}: {done.err.strip()[-300:]!r}"]
     if _ESCAPES.search(lines[0]):

@@ -6,7 +6,7 @@ import random
 from typing import Final, Protocol
 
 from tests.faults.bench import Bench
-from tests.faults.kinds import damage, kills
+from tests.faults.kinds import crowds, damage, disks, fuzzed, kills, policies, surroundings
 from tests.faults.outcomes import Outcome
 
 
@@ -21,4 +21,6 @@ class Kind(Protocol):
         """Try one case, whatever the generator draws; return what came of it."""
 
 
-KINDS: Final[dict[str, Kind]] = {kind.NAME: kind for kind in (kills, damage)}
+KINDS: Final[dict[str, Kind]] = {
+    kind.NAME: kind for kind in (kills, damage, fuzzed, policies, disks, crowds, surroundings)
+}

@@ -142,7 +142,9 @@ def _look(bench: Bench, reader: Reader, found: Damaged, state: str, done: Done, 
     for name in reader.outputs:
         there = (bench.folder / name).exists()
         outcome.expect(there == (done.code == 0), f"{said}: exits {done.code}, {name} is there: {there}", "half file")
-    left = [name for name in bench.files() if ".partial" in name and name != "r.mcap.partial" or ".fireworld-" in name]
+    left = [
+        name for name in bench.files() if (".partial" in name and name != "r.mcap.partial") or ".fireworld-" in name
+    ]
     allowed = {"o.mcap.partial"} if reader.words[0] == "fork" else {"r.mcap.partial"}
     outcome.expect(set(left) <= allowed, f"{said}: left {', '.join(left)}")
     del same
