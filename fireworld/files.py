@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import secrets
 import shutil
-import tempfile
 from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from fireworld.errors import OutputError, expected
@@ -22,17 +23,20 @@ def check_output(path: Path, *, force: bool = False, endings: Collection[str] = 
     Raises:
         OutputError: it exists, it is no regular file, its ending is another, or there is no folder for it.
     """
-    if endings and path.suffix.lower() not in endings:
-        raise OutputError(expected(str(path), "", f"a file ending in {', '.join(endings)}", path.suffix or "no ending"))
-    _check_parent(path)
-    if path.is_dir():
-        raise OutputError(expected(str(path), "", "the name of a file", "a folder"))
-    if path.is_symlink() or (path.exists() and not path.is_file()):
-        raise OutputError(expected(str(path), "", "the name of a regular file", "a link or a device"))
-    if path.exists() and not force:
-        raise OutputError(
-            expected(str(path), "", "a name that is free", "an existing file", "use --force to replace it")
-        )
+    with _output_errors(path):
+        if endings and path.suffix.lower() not in endings:
+            raise OutputError(
+                expected(str(path), "", f"a file ending in {', '.join(endings)}", path.suffix or "no ending")
+            )
+        _check_parent(path)
+        if path.is_dir():
+            raise OutputError(expected(str(path), "", "the name of a file", "a folder"))
+        if path.is_symlink() or (path.exists() and not path.is_file()):
+            raise OutputError(expected(str(path), "", "the name of a regular file", "a link or a device"))
+        if path.exists() and not force:
+            raise OutputError(
+                expected(str(path), "", "a name that is free", "an existing file", "use --force to replace it")
+            )
 
 
 def check_outputs(paths: Sequence[Path], *, force: bool = False, inputs: Sequence[Path] = ()) -> None:
@@ -65,11 +69,11 @@ def check_folder(folder: Path, *, own: Collection[str], force: bool = False) -> 
     Raises:
         OutputError: it exists, it is no folder, it holds something else, or there is no folder for it.
     """
-    _check_parent(folder)
-    if not folder.exists() and not folder.is_symlink():
-        return
-    is_folder = folder.is_dir() and not folder.is_symlink()
     with _output_errors(folder):
+        _check_parent(folder)
+        if not folder.exists() and not folder.is_symlink():
+            return
+        is_folder = folder.is_dir() and not folder.is_symlink()
         found = sorted(path.name for path in folder.iterdir()) if is_folder else [folder.name]
     foreign = [name for name in found if name not in own or not is_folder]
     if foreign:
@@ -105,15 +109,16 @@ def written_beside(path: Path) -> Iterator[Path]:
     Raises:
         OutputError: it cannot be written.
     """
-    path = path.absolute()  # whoever works meanwhile may change the current folder
     with _output_errors(path):
-        scratch = Path(tempfile.mkdtemp(prefix=".fireworld-", dir=path.parent))
+        path = path.absolute()  # whoever works meanwhile may change the current folder
+        scratch = path.parent / f".fireworld-{secrets.token_hex(8)}"
         partial = scratch / path.name
         try:
+            scratch.mkdir(0o700)  # in here, so that an interrupt right after it leaves none
             yield partial
             partial.replace(path)
         finally:
-            shutil.rmtree(scratch, ignore_errors=True)
+            _remove(scratch)
 
 
 @contextmanager
@@ -131,8 +136,8 @@ def new_folder(folder: Path, *, own: Collection[str], force: bool = False) -> It
         for leftover in (partial, replaced):
             check_folder(leftover, own=own, force=True)
             shutil.rmtree(leftover, ignore_errors=True)
-        partial.mkdir()
         try:
+            partial.mkdir()
             yield partial
             if folder.exists():
                 folder.rename(replaced)
@@ -143,14 +148,38 @@ def new_folder(folder: Path, *, own: Collection[str], force: bool = False) -> It
                 replaced.rename(folder)
             raise
         finally:
-            shutil.rmtree(partial, ignore_errors=True)
+            _remove(partial)
 
 
-def write_file(path: Path, data: bytes) -> None:
-    """Write a file, beside and renamed.
+@contextmanager
+def same_folder() -> Iterator[None]:
+    """Come back to the current folder at the end, wherever users' code has gone, if it is still there."""
+    try:
+        before = Path.cwd()
+    except OSError:
+        before = None
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            if before is not None and Path.cwd() != before:
+                os.chdir(before)
+
+
+def _remove(scratch: Path) -> None:
+    """Remove a folder, all of it even if an interrupt comes meanwhile."""
+    try:
+        shutil.rmtree(scratch, ignore_errors=True)
+    except BaseException:
+        shutil.rmtree(scratch, ignore_errors=True)
+        raise
+
+
+def write_file(path: Path, data: bytes | str) -> None:
+    """Write a file, beside and renamed; a text as UTF-8, with any bytes of names in it as Python writes them.
 
     Raises:
         OutputError: it cannot be written.
     """
     with written_beside(path) as partial:
-        partial.write_bytes(data)
+        partial.write_bytes(data if isinstance(data, bytes) else data.encode("utf-8", "backslashreplace"))

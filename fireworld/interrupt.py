@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import _thread
 import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Event
+from typing import Final
+
+AGAIN_SECONDS: Final = 0.01
 
 
 class Interrupted(KeyboardInterrupt):
@@ -17,6 +21,25 @@ def end_like_ctrl_c() -> None:
     """Let SIGTERM, by which CI systems and `timeout` end a process, do what Ctrl-C does."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)
+
+
+def once_more() -> None:
+    """Send Ctrl-C again, in a moment: it came where Python lets nothing raise, in a finalizer."""
+    timer = threading.Timer(AGAIN_SECONDS, _thread.interrupt_main)
+    timer.daemon = True
+    timer.start()
+
+
+def was_interrupted(error: BaseException) -> bool:
+    """Return whether an error is what others made of Ctrl-C: compiled code, or a library under import, say."""
+    seen: set[int] = set()
+    cause: BaseException | None = error
+    while cause is not None and id(cause) not in seen:
+        if isinstance(cause, KeyboardInterrupt):
+            return True
+        seen.add(id(cause))
+        cause = cause.__cause__ or cause.__context__
+    return False
 
 
 @contextmanager

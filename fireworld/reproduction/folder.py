@@ -77,7 +77,7 @@ class ReproductionFolder:
 
     def write(self, name: str, content: bytes | str) -> None:
         """Write a file of the folder; errors as for `write_file`."""
-        write_file(self.path / name, content.encode() if isinstance(content, str) else content)
+        write_file(self.path / name, content)
 
     def repetition(self, number: int) -> Repetition | None:
         """Return a repetition that was trained before, or None; TrainingError if a file is damaged, or gone."""

@@ -100,7 +100,8 @@ class _TableWriter:
         self._held: list[list[Array | None]] = []
         self._n_held = 0
         self._schema = schema_of(table, metadata)
-        self._writer = pq.ParquetWriter(folder / f"{table.name}{SUFFIX}", self._schema, compression="zstd")
+        self._file = (folder / f"{table.name}{SUFFIX}").open("wb")  # arrow itself takes no names of any bytes
+        self._writer = pq.ParquetWriter(self._file, self._schema, compression="zstd")
 
     def add(self, record: Any) -> None:
         """Add the rows of a step, or of the city."""
@@ -129,7 +130,8 @@ class _TableWriter:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._writer.close()
+        with self._file:
+            self._writer.close()
 
 
 def schema_of(table: ExportTable, metadata: Mapping[str, str]) -> Any:

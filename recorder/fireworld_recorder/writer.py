@@ -97,12 +97,12 @@ class StepFile:
         self._open = False
         replace_partial = force or not self._keep_partial
         check_output(path, force=force)
-        if not replace_partial and self.partial.exists():
-            raise OutputError(
-                f"{self.partial}: a {self.kind.noun} that did not end left this, or one is under way;"
-                f" try {self.kind.rescue}"
-            )
         with self._guard():
+            if not replace_partial and self.partial.exists():
+                raise OutputError(
+                    f"{self.partial}: a {self.kind.noun} that did not end left this, or one is under way;"
+                    f" try {self.kind.rescue}"
+                )
             self._file = _begin_file(self.partial, replace=replace_partial)
             self._open = True
             self._writer = ContainerWriter(self._file, profile=PROFILE, library=kind.format)

@@ -22,7 +22,8 @@ def main() -> None:
     parser.add_argument("names", nargs="*", help="only these tests")
     arguments = parser.parse_args()
     import tests.fuzz.test_files
-    import tests.fuzz.test_logs  # noqa: F401  # importing them fills TARGETS
+    import tests.fuzz.test_logs
+    import tests.fuzz.test_tables  # noqa: F401  # importing them fills TARGETS
 
     end = time.monotonic() + arguments.seconds
     for turn in itertools.count(arguments.first_seed):

@@ -146,7 +146,7 @@ def update_goldens(
     changed = [result for result in results if result.differs]
     with gentle_interrupt():  # what begins here takes a moment, and belongs together
         if changed:
-            write_file(folder / REASONS, _reasons(folder / REASONS, reason, changed).encode())
+            write_file(folder / REASONS, _reasons(folder / REASONS, reason, changed))
         return [_update(result) for result in results]
 
 

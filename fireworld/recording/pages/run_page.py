@@ -56,7 +56,7 @@ def report(logs: AnyRun | Sequence[AnyRun], output: Path | str, *, force: bool =
         }
         if any(map(_has_decisions, runs)):
             images["timeline"] = png_bytes(draw_timeline(runs))
-    write_file(Path(output), _run_page(runs, images).encode())
+    write_file(Path(output), _run_page(runs, images))
 
 
 def _run_page(logs: Sequence[StoredRun], images: Mapping[str, bytes]) -> str:
