@@ -85,7 +85,7 @@ root.params.append(DEBUG)
 def main() -> None:
     """Run the command line; an error ends in one line and exit code 2, one of fireworld's own too, Ctrl-C in 130."""
     from fireworld.errors import FireworldError, described
-    from fireworld.interrupt import end_like_ctrl_c
+    from fireworld.interrupt import end_like_ctrl_c, is_interrupt
     from fireworld.stdout import StandardOutputError, be_patient, leave
 
     end_like_ctrl_c()
@@ -104,7 +104,11 @@ def main() -> None:
     except StandardOutputError as error:
         code = _show(error, f"standard output: cannot be written: {error}")
     except Exception as error:  # noqa: BLE001 - a fault of fireworld's own: never the exit code of a verdict
-        code = _show(error, f"internal error: {described(error)}; run it again with --debug")
+        if is_interrupt(error):
+            click.echo("interrupted", err=True)
+            code = INTERRUPTED
+        else:
+            code = _show(error, f"internal error: {described(error)}; run it again with --debug")
     leave()
     sys.exit(code)
 
