@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from fireworld.errors import OutputError, expected
 from fireworld.evaluation.runs import KINDS, Row
-from fireworld.files import write_file
+from fireworld.files import read_input, write_file
 from fireworld.version import __version__
 
 FORMAT: Final = "fireworld-results/1"
@@ -25,6 +25,9 @@ KEYS: Final[dict[str, type]] = {
     "version": str,
 }
 """The first columns: which run it is. `outcome.COLUMNS` follow: how it came out."""
+N_BYTES_MAX: Final = 1 << 28
+N_ROWS_MAX: Final = 2_000_000
+TEXT_BYTES_MAX: Final = 10_000
 N_FIRST: Final = 14
 """Columns of the first version, none of which may be empty; a later one is, in a row that is older."""
 _SIMULATOR: Final = (
@@ -119,10 +122,7 @@ def read_results(path: Path) -> dict[RunKey, Result]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise _not_results(path, error.strerror or str(error)) from None
+    content = read_input(path, what="a file of results", n_bytes_max=N_BYTES_MAX, error=OutputError)
     try:
         with pq.ParquetFile(pa.BufferReader(content), page_checksum_verification=True) as file:
             table = file.read()
