@@ -18,6 +18,7 @@ KINDS: Final = {
     stat.S_IFCHR: "a device", stat.S_IFBLK: "a device",
 }  # fmt: skip
 """What is at a path, where it is no regular file."""
+TEXT_BYTES_MAX: Final = 1 << 24
 
 
 def read_input(
@@ -60,6 +61,23 @@ def read_input(
     if size > n_bytes_max:
         raise error(expected(where, key, f"{what} of at most {n_bytes_max} bytes", f"{size} bytes{suffix}"))
     return content
+
+
+def read_text_file(path: Path, *, strict: bool = False) -> str:
+    """Read a text that belongs to an output.
+
+    Args:
+        path: the file.
+        strict: raise for bytes that are no UTF-8, since the text is written again; else they are replaced.
+
+    Raises:
+        OutputError: it cannot be read, or is no such text.
+    """
+    content = read_input(path, what="a text", n_bytes_max=TEXT_BYTES_MAX, error=OutputError)
+    try:
+        return content.decode("utf-8", errors="strict" if strict else "replace")
+    except UnicodeDecodeError as error:
+        raise OutputError(expected(str(path), "", "UTF-8 text", f"another byte at offset {error.start}")) from None
 
 
 def _without_waiting(path: str, flags: int) -> int:

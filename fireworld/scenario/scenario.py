@@ -21,6 +21,8 @@ from fireworld.scenario.explain import find_faults
 from fireworld.scenario.yaml_text import read_yaml, write_yaml
 
 SIZE_MAX_BYTES: Final = 1_000_000
+DEPTH_MAX: Final = 20
+DIGITS_MAX: Final = 18
 CITY_BYTES_MAX: Final = 1 << 28
 """Room for the outlines and streets of a city of half a million buildings."""
 
@@ -236,6 +238,8 @@ def split_settings(settings: Iterable[str], *, example: str = "brigades.n=7") ->
 def _assign(document: dict[str, Any], key: str, value: object, *, source: str) -> None:
     """Set one value in a tree of dicts and lists by its dotted key."""
     at: Any = document
+    if key.count(".") >= DEPTH_MAX:
+        raise ScenarioError(expected(source, key, f"a key of at most {DEPTH_MAX} parts", key.count(".") + 1))
     *parents, last = key.split(".")
     for depth, name in enumerate(parents):
         index = _entry(at, name, key=".".join(parents[: depth + 1]), source=source)
@@ -251,7 +255,7 @@ def _entry(at: Any, name: str, *, key: str, source: str) -> str | int:
         return name
     if not isinstance(at, list):
         raise ScenarioError(expected(source, key, "a key of a scenario", "a part of a plain value"))
-    if not name.isdecimal() or int(name) > len(at):
+    if not name.isdecimal() or len(name) > DIGITS_MAX or int(name) > len(at):
         raise ScenarioError(expected(source, key, f"a number from 0 to {len(at)}", name))
     if int(name) == len(at):
         at.append(None)

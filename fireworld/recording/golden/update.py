@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 from fireworld_recorder.reader import open_log
 
 from fireworld.errors import FireworldError, LogError, OutputError, expected
-from fireworld.files import write_file
+from fireworld.files import read_text_file, write_file
 from fireworld.interrupt import gentle_interrupt
 from fireworld.recording.golden.check import FOLDER, GoldenResult, check_goldens, compare_golden
 from fireworld.recording.golden.spec import GoldenSpec, make_spec, prepare_golden, spec_of
@@ -203,5 +203,5 @@ def _default_name(scenario: str | Path, policy: str, seed: int) -> str:
 
 def _reasons(path: Path, reason: str, changed: Sequence[GoldenResult]) -> str:
     """Return the list of reasons with one more entry: the reason, and where each golden first differs."""
-    before = path.read_text(encoding="utf-8") if path.is_file() else REASONS_TITLE
+    before = read_text_file(path, strict=True) if path.is_file() else REASONS_TITLE
     return before + "".join([f"\n* {reason}\n", *(f"  * {result.name}: {result.sentence}\n" for result in changed)])
