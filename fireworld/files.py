@@ -1,15 +1,88 @@
-"""Files and folders that a command or function is asked to write: checks, and nothing half-written bears a name."""
+"""Files: what is read is a regular file of bounded size; what is written is checked first, and never half-written."""
 
 from __future__ import annotations
 
 import os
 import secrets
 import shutil
+import stat
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Final
 
-from fireworld.errors import OutputError, expected
+from fireworld.errors import FireworldError, OutputError, expected
+
+KINDS: Final = {
+    stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device", stat.S_IFBLK: "a device",
+}  # fmt: skip
+"""What is at a path, where it is no regular file."""
+TEXT_BYTES_MAX: Final = 1 << 24
+
+
+def read_input(
+    path: Path,
+    *,
+    what: str,
+    n_bytes_max: int,
+    error: type[FireworldError],
+    source: str = "",
+    key: str = "",
+    or_names: str = "",
+) -> bytes:
+    """Read a regular file that is not larger than such a file can be.
+
+    Args:
+        path: the file.
+        what: what it should be, as in "a city file".
+        n_bytes_max: its greatest size.
+        error: what is raised.
+        source: what names the file in errors, if not its path.
+        key: the key of the source that names the file.
+        or_names: what else could have been given, for the error of a file that is not there.
+
+    Raises:
+        FireworldError: of the kind given: it is no regular file, is larger, or cannot be read.
+    """
+    where, suffix = source or str(path), f": {path}" if key else ""
+    try:
+        with open(path, "rb", opener=_without_waiting) as file:
+            status = os.fstat(file.fileno())
+            size = status.st_size
+            kind = KINDS.get(stat.S_IFMT(status.st_mode))
+            content = b"" if kind or size > n_bytes_max else file.read(n_bytes_max + 1)
+    except (OSError, ValueError) as fault:  # a path with a null byte is a ValueError
+        reason = (fault.strerror if isinstance(fault, OSError) else None) or str(fault)
+        raise error(expected(where, key, or_names or what, f"{reason}{suffix}")) from None
+    if kind:
+        raise error(expected(where, key, f"{what}, a regular file", f"{kind}{suffix}"))
+    size = max(size, len(content))
+    if size > n_bytes_max:
+        raise error(expected(where, key, f"{what} of at most {n_bytes_max} bytes", f"{size} bytes{suffix}"))
+    return content
+
+
+def read_text_file(path: Path, *, strict: bool = False) -> str:
+    """Read a text that belongs to an output.
+
+    Args:
+        path: the file.
+        strict: raise for bytes that are no UTF-8, since the text is written again; else they are replaced.
+
+    Raises:
+        OutputError: it cannot be read, or is no such text.
+    """
+    content = read_input(path, what="a text", n_bytes_max=TEXT_BYTES_MAX, error=OutputError)
+    try:
+        return content.decode("utf-8", errors="strict" if strict else "replace")
+    except UnicodeDecodeError as error:
+        raise OutputError(expected(str(path), "", "UTF-8 text", f"another byte at offset {error.start}")) from None
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Open a file; a pipe that nobody writes to must not hold it up."""
+    return os.open(path, flags | os.O_NONBLOCK)
 
 
 def check_output(path: Path, *, force: bool = False, endings: Collection[str] = ()) -> None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import _thread
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Event
+from types import FrameType
 from typing import Final
 
 AGAIN_SECONDS: Final = 0.01
@@ -72,3 +73,50 @@ def gentle_interrupt(asked: Event | None = None) -> Iterator[Event]:
     finally:
         for one in numbers:
             signal.signal(one, previous)
+
+
+class Postponed:
+    """Ctrl-C that has to wait: foreign code is under way that would swallow it, or fail in other ways."""
+
+    def __init__(self) -> None:
+        self._previous: dict[int, Callable[[int, FrameType | None], object]] = {}
+        self._asked: list[int] = []
+
+    @contextmanager
+    def __call__(self) -> Iterator[None]:
+        """Keep signals back until the end, or until `let_through` is called."""
+        if self._previous or threading.current_thread() is not threading.main_thread():
+            yield  # within another such stretch; or in a thread, which gets no signals
+            return
+        for number in (signal.SIGINT, signal.SIGTERM):
+            handler = signal.getsignal(number)
+            if callable(handler):
+                self._previous[number] = handler
+                signal.signal(number, self._note)
+        try:
+            yield
+        finally:
+            for kept, handler in self._previous.items():
+                signal.signal(kept, handler)
+            self._previous = {}
+            self._deliver({})
+
+    def let_through(self) -> None:
+        """Do what the signals that came meanwhile ask for; may raise KeyboardInterrupt."""
+        if self._asked and threading.current_thread() is threading.main_thread():
+            self._deliver(self._previous)
+
+    def _deliver(self, handlers: dict[int, Callable[[int, FrameType | None], object]]) -> None:
+        asked, self._asked = self._asked, []
+        for number in asked:
+            handler = handlers.get(number) or signal.getsignal(number)
+            if callable(handler):
+                handler(number, None)
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        del frame
+        self._asked.append(number)
+
+
+postponed = Postponed()
+"""The one of this process."""

@@ -8,8 +8,11 @@ from typing import Any, Final
 import numpy as np
 
 from fireworld.city.city import Int32Array, Int64Array, StreetMap, Streets
+from fireworld.errors import CityError, expected
 
 UNREACHED: Final = 1 << 60
+NODES_MAX: Final = 20_000
+"""The ways between all of them take 5 GB."""
 
 
 def streets_of(street_map: StreetMap, centroid_mm: Int32Array) -> Streets:
@@ -46,6 +49,7 @@ def shortest_ways(node_mm: Int64Array, street: Int64Array, length_mm: Int64Array
     shortest way (ties: lowest index), -1 where there is none and from a node to itself.
     """
     m = len(node_mm)
+    check_nodes(m)
     neighbours = _neighbours(m, street, length_mm)
     distance = np.full((m, m), UNREACHED, dtype=np.int64)
     np.fill_diagonal(distance, 0)
@@ -71,6 +75,12 @@ def shortest_ways(node_mm: Int64Array, street: Int64Array, length_mm: Int64Array
     next_node[unreached] = -1
     distance[unreached] = -1
     return distance, next_node
+
+
+def check_nodes(n_nodes: int, *, where: str = "city") -> None:
+    """Raise CityError for a map of more nodes than the ways between all of them have room for."""
+    if n_nodes > NODES_MAX:
+        raise CityError(expected(where, "streets", f"at most {NODES_MAX} nodes", n_nodes))
 
 
 def _neighbours(m: int, street: Int64Array, length_mm: Int64Array) -> list[tuple[Int64Array, Int64Array]]:

@@ -272,7 +272,7 @@ def _header(run: StoredRun, change: ForkChange, step: int) -> RunHeader:
     }
     try:
         before = json.loads(header.attachments.get(FORK_ATTACHMENT, b"[]"))
-    except ValueError:
+    except (ValueError, RecursionError):
         before = []
     forks = [*before, made] if isinstance(before, list) else [made]
     attachments = {name: data for name, data in header.attachments.items() if name not in OF_POLICY}

@@ -11,7 +11,7 @@ from fireworld_recorder.totals import final_outcome
 from fireworld_recorder.writer import LogWriter
 
 from fireworld.errors import OutputError
-from fireworld.files import write_file
+from fireworld.files import read_text_file, write_file
 from fireworld.parameters import PRESETS
 from fireworld.recording.golden.spec import GoldenSpec, hash_line, spec_of
 from fireworld.recording.golden.training import store_training, training_text
@@ -66,7 +66,7 @@ def store_text(path: Path) -> bool:
     """
     text = training_text(open_training(path)) if is_training(path) else golden_text(open_log(path))
     beside, content = text_path(path), text.encode()
-    if beside.is_file() and beside.read_bytes() == content:
+    if beside.is_file() and read_text_file(beside).encode() == content:
         return False
     write_file(beside, content)
     return True

@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 from fireworld_recorder.reader import open_log
 
 from fireworld.errors import FireworldError, LogError, OutputError, expected
-from fireworld.files import write_file
+from fireworld.files import read_text_file, write_file
 from fireworld.interrupt import gentle_interrupt
 from fireworld.recording.golden.again import run_again
 from fireworld.recording.golden.check import FOLDER, GoldenResult, check_goldens, compare_golden
@@ -206,7 +206,7 @@ def _reasons(path: Path, reason: str, changed: Sequence[GoldenResult]) -> str:
 
     Where the last entry has this reason it is the same update, which was killed: what it lacks is added to it.
     """
-    before = path.read_text(encoding="utf-8") if path.is_file() else REASONS_TITLE
+    before = read_text_file(path, strict=True) if path.is_file() else REASONS_TITLE
     head, lines = f"\n* {reason}\n", [f"  * {result.name}: {result.sentence}\n" for result in changed]
     last = before.rpartition("\n* ")[2]
     if not f"\n* {last}".startswith(head):

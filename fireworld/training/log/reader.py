@@ -330,7 +330,7 @@ def _setting(header: TrainingHeader) -> tuple[Method, Curriculum, CityCache]:
             for stage in text["stages"]
         )
         curriculum = Curriculum(str(text["name"]), stages)
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise LogError(f"attachments: {CURRICULUM_ATTACHMENT} and {METHOD_ATTACHMENT} make no sense: {error}") from None
     except FireworldError as error:
         raise LogError(f"attachments: {error}") from None
