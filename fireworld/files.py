@@ -9,7 +9,7 @@ import stat
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Final
+from typing import IO, Final
 
 from fireworld.errors import FireworldError, OutputError, expected
 
@@ -19,6 +19,7 @@ KINDS: Final = {
 }  # fmt: skip
 """What is at a path, where it is no regular file."""
 TEXT_BYTES_MAX: Final = 1 << 24
+PIECE_BYTES: Final = 1 << 20
 
 
 def read_input(
@@ -51,7 +52,7 @@ def read_input(
             status = os.fstat(file.fileno())
             size = status.st_size
             kind = KINDS.get(stat.S_IFMT(status.st_mode))
-            content = b"" if kind or size > n_bytes_max else file.read(n_bytes_max + 1)
+            content = b"" if kind or size > n_bytes_max else _read_most(file, n_bytes_max)
     except (OSError, ValueError) as fault:  # a path with a null byte is a ValueError
         reason = (fault.strerror if isinstance(fault, OSError) else None) or str(fault)
         raise error(expected(where, key, or_names or what, f"{reason}{suffix}")) from None
@@ -78,6 +79,15 @@ def read_text_file(path: Path, *, strict: bool = False) -> str:
         return content.decode("utf-8", errors="strict" if strict else "replace")
     except UnicodeDecodeError as error:
         raise OutputError(expected(str(path), "", "UTF-8 text", f"another byte at offset {error.start}")) from None
+
+
+def _read_most(file: IO[bytes], n_bytes_max: int) -> bytes:
+    """Read a file, or a little more of it than it may have; piece by piece, since what is asked for takes memory."""
+    pieces, n_bytes = [], 0
+    while n_bytes <= n_bytes_max and (piece := file.read(PIECE_BYTES)):
+        pieces.append(piece)
+        n_bytes += len(piece)
+    return b"".join(pieces)
 
 
 def _without_waiting(path: str, flags: int) -> int:

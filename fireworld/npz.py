@@ -59,11 +59,11 @@ def read_npz(file: IO[bytes], keys: Collection[str] | None = None) -> dict[str, 
     archive = _checked("", "a file with arrays (.npz)", lambda: zipfile.ZipFile(file))
     members = {item.filename.removesuffix(".npy"): item for item in archive.infolist()}
     if len(archive.infolist()) > N_ARRAYS_MAX:
-        raise ArchiveError("", f"at most {N_ARRAYS_MAX} arrays", f"{len(members)}")
+        raise ArchiveError("", f"at most {N_ARRAYS_MAX} arrays", f"{len(members)} arrays")
     wanted = {name: item for name, item in members.items() if keys is None or name in keys}
     n_unpacked, most = sum(item.file_size for item in wanted.values()), UNPACKED_BYTES_FREE + UNPACKED_RATIO_MAX * size
     if n_unpacked > most:
-        raise ArchiveError("", f"at most {most} bytes of arrays in a file of {size} bytes", f"{n_unpacked}")
+        raise ArchiveError("", f"at most {most} bytes of arrays in a file of {size} bytes", f"{n_unpacked} bytes")
     what = "an array of numbers or text"
     return {name: _checked(name, what, partial(_read_member, archive, item)) for name, item in wanted.items()}
 
@@ -95,6 +95,6 @@ def _read_member(archive: zipfile.ZipFile, item: zipfile.ZipInfo) -> Any:
         shape, _, dtype = read_header(file, max_header_size=HEADER_BYTES_MAX)
         n_bytes = math.prod(shape) * dtype.itemsize
         if not dtype.hasobject and n_bytes != item.file_size - file.tell():
-            raise ArchiveError(name, f"the {n_bytes} bytes of an array of shape {shape}", f"{item.file_size}")
+            raise ArchiveError(name, f"the {n_bytes} bytes of an array of shape {shape}", f"{item.file_size} bytes")
     with archive.open(item) as file:
         return npy.read_array(file, allow_pickle=False, max_header_size=HEADER_BYTES_MAX)
