@@ -79,7 +79,7 @@ class Links:
 
 @dataclass(frozen=True)
 class Streets:
-    """The street graph ready for driving: positions, neighbours and shortest paths, all in whole millimetres.
+    """The street graph ready for driving, all in whole millimetres; ways are looked for when somebody drives them.
 
     A building is reached from the point of a street that is nearest to its centroid.
     """
@@ -87,8 +87,6 @@ class Streets:
     node_mm: Int32Array  # (m, 2)
     street: Int32Array  # (k, 2)
     street_length_mm: Int64Array  # (k,) at least 1
-    distance_mm: Int64Array  # (m, m) shortest way, -1 where there is none
-    next_node: Int32Array  # (m, m) [from, to] the next node on the shortest way (ties: lowest index), -1 none
     hydrant_node: Int32Array  # (h,)
     access_street: Int32Array  # (n,) street from which each building is reached
     access_offset_mm: Int64Array  # (n,) way from that street's first node to the access point

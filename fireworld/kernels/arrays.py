@@ -104,8 +104,6 @@ class StreetArrays(NamedTuple):
     first: Array  # (k,) int32, first node of each street
     second: Array  # (k,) int32
     length: Array  # (k,) int64
-    distance: Array  # (m, m) int64, -1 where there is no way
-    next_node: Array  # (m, m) int32
     arc_ptr: Array  # (m+1,) int32, streets at each node, as CSR
     arc_node: Array  # (2k,) int32, node at the other end
     arc_street: Array  # (2k,) int32
@@ -227,6 +225,23 @@ class SiteState(NamedTuple):
     building_civilian_square: Array  # (n,) float64, per burning building
 
 
+class WayState(NamedTuple):
+    """Shortest ways to some nodes, as far as a world has asked for them; m nodes, room for r of them. All zeros: empty.
+
+    They follow from the streets alone; nothing but speed depends on what is kept here. A complete one has a line for
+    every node, in their order, and its `line` is empty; it never changes and may be shared.
+    """
+
+    line: Array  # (m + 1,) int64, 1 + the line with the ways to each node, 0 none; last, how often lines were asked for
+    table: Array  # (r, 3 + m) int64, a line each: what it is, below; then mm, the shortest way from every node
+    heap: Array  # (2, m + arcs) int64, scratch: lengths and nodes
+
+
+GOAL, KNOWN, USED, WAYS = 0, 1, 2, 3
+"""Columns of a line: 1 + the node that its ways lead to, 0 none; up to which length, mm, they are final; how often any
+line had been asked for when this one was; the first of its ways."""
+
+
 class Outcome(NamedTuple):
     """What a step was worth, as one array each of float64; below, what is where in them."""
 
@@ -247,13 +262,14 @@ BURNING = COUNTS.index("n_burning")
 
 
 class WorldState(NamedTuple):
-    """Everything that a step may change."""
+    """Everything that a step may change; `ways` is no part of what the world is in, only of what it remembers."""
 
     fire: FireState
     civilians: CivilianState
     brigades: BrigadeState
     sites: SiteState
     outcome: Outcome
+    ways: WayState
 
 
 class PolicyArrays(NamedTuple):

@@ -5,18 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from fireworld.kernels.arrays import (
+    WAYS,
     Array,
     BrigadeConstants,
     BrigadeState,
     FireState,
     GeometryArrays,
     StreetArrays,
+    WayState,
 )
-from fireworld.kernels.jit import inner, kernel
+from fireworld.kernels.jit import inlined, inner, kernel
+from fireworld.kernels.ways import NOWHERE, lines_to, next_street, way
 
 IDLE, DRIVING, SPRAYING, TO_REFUGE, REFILLING, DEAD = 0, 1, 2, 3, 4, 5
 ACCEPTED, UNKNOWN_BRIGADE, OVER_POWER, TANK_TOO_LOW, OUT_OF_RANGE, NEGATIVE = 1, -1, -2, -3, -4, -5
-NOWHERE = np.int64(1) << 60
 NO_TARGET = np.int64(-1)
 
 
@@ -50,42 +52,6 @@ def locate(street: int, offset: int, streets: StreetArrays) -> tuple[float, floa
     part = offset / streets.length[street]
     x, y = streets.node_x[first], streets.node_y[first]
     return x + (streets.node_x[second] - x) * part, y + (streets.node_y[second] - y) * part
-
-
-@inner
-def way(
-    street: int, offset: int, goal_street: int, goal_offset: int, streets: StreetArrays
-) -> tuple[np.int64, np.int64, np.int64]:
-    """Return the shortest way to a point of another street: its length, the node to leave by, the node to arrive at.
-
-    Lengths in mm; NOWHERE and nodes -1 where there is no way. On the same street: the way along it, nodes -1.
-    """
-    if street == goal_street:
-        return np.int64(abs(goal_offset - offset)), np.int64(-1), np.int64(-1)
-    best, best_leave, best_arrive = NOWHERE, np.int64(-1), np.int64(-1)
-    for end in range(2):
-        leave = np.int64(streets.first[street] if end == 0 else streets.second[street])
-        out = offset if end == 0 else streets.length[street] - offset
-        for goal_end in range(2):
-            arrive = np.int64(streets.first[goal_street] if goal_end == 0 else streets.second[goal_street])
-            between = streets.distance[leave, arrive]
-            if between >= 0:
-                last = goal_offset if goal_end == 0 else streets.length[goal_street] - goal_offset
-                total = out + between + last
-                if total < best:
-                    best, best_leave, best_arrive = total, leave, arrive
-    return best, best_leave, best_arrive
-
-
-@inner
-def street_between(node: int, other: int, streets: StreetArrays) -> np.int64:
-    """Return the shortest street that joins two neighbouring nodes (ties: lowest index)."""
-    best, best_length = np.int64(-1), NOWHERE
-    for k in range(streets.arc_ptr[node], streets.arc_ptr[node + 1]):
-        street = np.int64(streets.arc_street[k])
-        if streets.arc_node[k] == other and streets.length[street] < best_length:
-            best, best_length = street, streets.length[street]
-    return best
 
 
 @inner
@@ -130,13 +96,14 @@ def stop_in_range(
     return goal
 
 
-@inner
+@inlined
 def drive(
     brigade: int,
     goal_building: int,
     target: int,
     brigades: BrigadeState,
     streets: StreetArrays,
+    ways: WayState,
     geometry: GeometryArrays,
     constants: BrigadeConstants,
 ) -> None:
@@ -147,8 +114,9 @@ def drive(
     goal_street, goal_offset = np.int64(streets.access_street[goal_building]), streets.access_offset[goal_building]
     left = constants.speed
     street, offset = np.int64(brigades.street[brigade]), brigades.offset[brigade]
+    to_first, to_second = lines_to(goal_street, street, streets, ways)
     while left > 0:
-        length, leave, arrive = way(street, offset, goal_street, goal_offset, streets)
+        length, leave, line = way(street, offset, goal_street, goal_offset, to_first, to_second, streets, ways)
         if length >= NOWHERE:
             break
         if length == 0:  # there, perhaps at a crossing that the goal's street shares
@@ -156,11 +124,10 @@ def drive(
             break
         goal = goal_offset if leave < 0 else end_offset(street, leave, streets)
         if goal == offset:  # at the node by which to leave: turn into the next street
-            if leave == arrive:
+            if ways.table[line, WAYS + leave] == 0:
                 street, goal = goal_street, goal_offset
             else:
-                node = np.int64(streets.next_node[leave, arrive])
-                street = street_between(leave, node, streets)
+                street, node = next_street(leave, line, streets, ways)
                 goal = end_offset(street, node, streets)
             offset = end_offset(street, leave, streets)
         ahead = min(left, abs(goal - offset))
@@ -190,12 +157,14 @@ def refuge_at(street: int, offset: int, streets: StreetArrays) -> np.int64:
 
 
 @inner
-def nearest_refuge(street: int, offset: int, streets: StreetArrays) -> np.int64:
+def nearest_refuge(street: int, offset: int, streets: StreetArrays, ways: WayState) -> np.int64:
     """Return the refuge building with the shortest way (ties: first listed), -1 if none can be reached."""
     best, best_length = np.int64(-1), NOWHERE
     for k in range(len(streets.refuge)):
         b = np.int64(streets.refuge[k])
-        length, _, _ = way(street, offset, np.int64(streets.access_street[b]), streets.access_offset[b], streets)
+        goal_street, goal_offset = np.int64(streets.access_street[b]), streets.access_offset[b]
+        to_first, to_second = lines_to(goal_street, street, streets, ways)
+        length, _, _ = way(street, offset, goal_street, goal_offset, to_first, to_second, streets, ways)
         if length < best_length:
             best, best_length = b, length
     return best
@@ -248,11 +217,10 @@ def fight(
     target: int,
     brigades: BrigadeState,
     fire: FireState,
-    streets: StreetArrays,
     geometry: GeometryArrays,
     constants: BrigadeConstants,
 ) -> int:
-    """Spray the target if it is in range, else drive towards it; return the litres sprayed."""
+    """Spray the target if it is in range, else set out for it; return the litres sprayed."""
     square = distance_square(brigades.x[brigade], brigades.y[brigade], geometry.x[target], geometry.y[target])
     litres = min(constants.power, brigades.tank[brigade])
     if litres > 0 and judge_request(litres, 0, brigades.tank[brigade], square, constants) == ACCEPTED:
@@ -261,8 +229,20 @@ def fight(
         return litres
     if square > constants.range_square:
         brigades.activity[brigade] = DRIVING
-        drive(brigade, target, target, brigades, streets, geometry, constants)
     return 0
+
+
+@inlined
+def seek_water(brigade: int, brigades: BrigadeState, streets: StreetArrays, ways: WayState) -> np.int64:
+    """Let a brigade fill its tank at its refuge, or return the one to drive to; -1 for none."""
+    if brigades.refuge[brigade] >= 0:
+        brigades.activity[brigade] = REFILLING
+        return np.int64(-1)
+    street, offset = np.int64(brigades.street[brigade]), brigades.offset[brigade]
+    refuge = nearest_refuge(street, offset, streets, ways)
+    if refuge >= 0:
+        brigades.activity[brigade] = TO_REFUGE
+    return refuge
 
 
 @inner
@@ -270,6 +250,7 @@ def act(
     brigades: BrigadeState,
     fire: FireState,
     streets: StreetArrays,
+    ways: WayState,
     geometry: GeometryArrays,
     constants: BrigadeConstants,
 ) -> int:
@@ -280,20 +261,19 @@ def act(
     for brigade in range(len(brigades.tank)):
         brigades.sprayed[brigade] = 0
         brigades.driven[brigade] = 0
-        target = np.int64(brigades.target[brigade])
+        target, goal = np.int64(brigades.target[brigade]), np.int64(-1)  # what to fight, and where to drive
         brigades.activity[brigade] = IDLE
         if brigades.hp[brigade] <= 0:
             brigades.activity[brigade] = DEAD
         elif brigades.refilling[brigade] != 0:
-            if brigades.refuge[brigade] >= 0:
-                brigades.activity[brigade] = REFILLING
-            else:
-                refuge = nearest_refuge(np.int64(brigades.street[brigade]), brigades.offset[brigade], streets)
-                if refuge >= 0:
-                    brigades.activity[brigade] = TO_REFUGE
-                    drive(brigade, refuge, NO_TARGET, brigades, streets, geometry, constants)
+            target = NO_TARGET
+            goal = seek_water(brigade, brigades, streets, ways)
         elif target >= 0:
-            total += fight(brigade, target, brigades, fire, streets, geometry, constants)
+            total += fight(brigade, target, brigades, fire, geometry, constants)
+            if brigades.activity[brigade] == DRIVING:
+                goal = target
+        if goal >= 0:
+            drive(brigade, goal, target, brigades, streets, ways, geometry, constants)
         if brigades.tank[brigade] == 0:
             brigades.refilling[brigade] = 1
         elif brigades.tank[brigade] == constants.tank:

@@ -126,7 +126,7 @@ def run_steps(  # noqa: C901, PLR0912, PLR0915 - handing all arrays to functions
             brigades.target[brigade] = target
         if step > last_step:
             break
-        finish_step(city, fire, people, brigades, outcome, constants, seed, step)
+        finish_step(city, fire, people, brigades, world.ways, outcome, constants, seed, step)
         if learning:
             take_reward(outcome.reward[TOTAL], learner)
             note_reward(step - 1, outcome.reward, learner)

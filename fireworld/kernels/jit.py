@@ -72,3 +72,13 @@ making_arrays = _compiler(_MakingArrays)
 """For the few kernels that make arrays."""
 inner = kernel if OPEN else _compiler(_Closed, _nrt=False, no_cpython_wrapper=True)
 """For functions that other kernels alone call: that spares a third of the compilation."""
+inlined = (
+    _compiler(_Kernel, _nrt=False, forceinline=True)
+    if OPEN
+    else _compiler(_Closed, _nrt=False, no_cpython_wrapper=True, forceinline=True)
+)
+"""As `inner`, but compiled into the code of those that call it, however long it is.
+
+For what is called often and hands groups of arrays on to what is called seldom. The compiler would leave it a function
+by itself, because of the many arrays, and to hand them over can take longer than the work.
+"""

@@ -12,6 +12,7 @@ from fireworld.kernels.arrays import (
     FireState,
     HealthConstants,
     Outcome,
+    WayState,
 )
 from fireworld.kernels.brigades import act, shelter
 from fireworld.kernels.fire import advance_fire, draw_burn_rates
@@ -30,6 +31,7 @@ def finish_step(
     fire: FireState,
     civilians: CivilianState,
     brigades: BrigadeState,
+    ways: WayState,
     outcome: Outcome,
     constants: Constants,
     seed: int,
@@ -39,7 +41,7 @@ def finish_step(
 
     Takes what it needs of the world, group by group: every array that Python hands over costs time.
     """
-    outcome.water[0] += act(brigades, fire, city.streets, city.geometry, constants.brigades)
+    outcome.water[0] += act(brigades, fire, city.streets, ways, city.geometry, constants.brigades)
     outcome.draws[0] = draw_burn_rates(city.buildings, fire, constants.fire, seed, step)
     advance_fire(city.buildings, city.cover, city.links, fire, constants.fire)
     outcome.draws[1] = hurt(fire, civilians, brigades, constants.health, seed, step)

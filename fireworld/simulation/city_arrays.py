@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from fireworld.city.city import City
+from fireworld.city.city import City, Streets
 from fireworld.kernels.arrays import (
     Array,
     BrigadeConstants,
@@ -92,9 +92,8 @@ def geometry_arrays(city: City) -> GeometryArrays:
     )
 
 
-def street_arrays(city: City) -> StreetArrays:
-    """Collect the street graph, with the streets at each node as CSR."""
-    streets = city.streets
+def street_arrays(streets: Streets, refuge: Array) -> StreetArrays:
+    """Collect the street graph, with the streets at each node as CSR, and the refuges on it, building indices."""
     first, second = streets.street[:, 0], streets.street[:, 1]
     node = np.concatenate([first, second])
     other = np.concatenate([second, first])
@@ -107,14 +106,12 @@ def street_arrays(city: City) -> StreetArrays:
         first=first.astype(np.int32),
         second=second.astype(np.int32),
         length=streets.street_length_mm.astype(np.int64),
-        distance=streets.distance_mm.astype(np.int64),
-        next_node=streets.next_node.astype(np.int32),
         arc_ptr=np.concatenate([[0], np.cumsum(np.bincount(node, minlength=n_nodes))]).astype(np.int32),
         arc_node=other[arcs].astype(np.int32),
         arc_street=street[arcs].astype(np.int32),
         access_street=streets.access_street.astype(np.int32),
         access_offset=streets.access_offset_mm.astype(np.int64),
-        refuge=np.flatnonzero(city.footprints.refuge).astype(np.int32),
+        refuge=refuge.astype(np.int32),
         hydrant_node=streets.hydrant_node.astype(np.int32),
     )
 
@@ -127,7 +124,7 @@ def city_arrays(city: City, fire: FireParameters) -> CityArrays:
         links=link_arrays(city),
         geometry=geometry_arrays(city),
         near=NearArrays(ptr=city.near.ptr.astype(np.uint32), building=city.near.building.astype(np.uint32)),
-        streets=street_arrays(city),
+        streets=street_arrays(city.streets, np.flatnonzero(city.footprints.refuge)),
     )
 
 

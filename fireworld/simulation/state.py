@@ -21,6 +21,7 @@ from fireworld.kernels.arrays import (
     Learner,
     Outcome,
     SiteState,
+    StreetArrays,
     Trace,
     WorldState,
 )
@@ -29,11 +30,14 @@ from fireworld.records import Rewards, Score
 from fireworld.rewards import TERMS
 from fireworld.simulation.city_arrays import air_shape
 from fireworld.simulation.placement import Placement
+from fireworld.simulation.ways import another, fresh_ways
 
 SCRATCH = {"fire.span", "fire.rate", "fire.emitted", "fire.scratch"} | {
     f"sites.{name}" for name in SiteState._fields if name not in {"counts", "label"}
 }
 """Arrays that no snapshot holds: what a step needs of them, it computes, or `restore_snapshot` makes it anew."""
+WAYS: Final = "ways"
+"""The group of what a world remembers of its streets: no part of a snapshot, a copy or a comparison."""
 REWARDS: Final = (*(term.name for term in TERMS), "total", "sum_so_far")
 """Fields of `Rewards` in the order of the outcome's array."""
 
@@ -146,8 +150,8 @@ NO_LEARNER: Final = fresh_learner(np.zeros((1, 1, 4)), 0)._replace(learning=np.z
 """Of a team that learns nothing."""
 
 
-def fresh_world(city: City, parameters: Parameters, placement: Placement) -> WorldState:
-    """Return the state before anything burns."""
+def fresh_world(city: City, streets: StreetArrays, parameters: Parameters, placement: Placement) -> WorldState:
+    """Return the state before anything burns, in a city and its streets."""
     hp, n_civilians = parameters.health.initial_hp, len(placement.civilian_building)
     x, y = placement.civilian_mm.astype(np.float64).T.copy()
     return WorldState(
@@ -170,6 +174,7 @@ def fresh_world(city: City, parameters: Parameters, placement: Placement) -> Wor
             water=np.zeros(1),
             draws=np.zeros(2),
         ),
+        ways=fresh_ways(streets, len(placement.brigade_refuge)),
     )
 
 
@@ -187,21 +192,23 @@ def score_of(world: WorldState) -> Score:
 
 
 def named_arrays(world: WorldState | CityArrays) -> Iterator[tuple[str, Array]]:
-    """Yield every array with its name, `group.field`."""
+    """Yield every array with its name, `group.field`, but for the ways: nothing depends on which of them are known."""
     groups: tuple[Any, ...] = world
     for group_name, group in zip(world._fields, groups, strict=True):
-        for name, array in zip(group._fields, group, strict=True):
-            yield f"{group_name}.{name}", array
+        if group_name != WAYS:
+            for name, array in zip(group._fields, group, strict=True):
+                yield f"{group_name}.{name}", array
 
 
 def copy_world(world: WorldState) -> WorldState:
-    """Copy all arrays."""
-    groups: list[Any] = [type(group)(*(array.copy() for array in group)) for group in world]
-    return WorldState(*groups)
+    """Copy all arrays; the copy looks for its own ways, so that the two can run side by side."""
+    groups: dict[str, Any] = {name: group for name, group in world._asdict().items() if name != WAYS}
+    copies = {name: type(group)(*(array.copy() for array in group)) for name, group in groups.items()}
+    return WorldState(**copies, ways=another(world.ways))
 
 
 def copy_into(world: WorldState, source: WorldState) -> None:
-    """Overwrite one world's arrays with another's of the same shapes."""
+    """Overwrite one world's arrays with another's of the same city and team; it keeps the ways that it knows."""
     for (_, array), (_, other) in zip(named_arrays(world), named_arrays(source), strict=True):
         array[...] = other
 

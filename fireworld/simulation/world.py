@@ -65,7 +65,7 @@ def prepare_start(
         observation=observation_constants(city, unit_volume_m3, in_turn=choices == "in-turn"),
         reward=reward if reward is not None else reward_of("stock"),
     )
-    state = fresh_world(city, parameters, placement)
+    state = fresh_world(city, arrays.streets, parameters, placement)
     for building in placement.ignited.tolist():
         ignite(building, arrays.buildings, state.fire)
     assess(state.fire, state.civilians, arrays.geometry, constants.reward, state.outcome)
@@ -158,6 +158,7 @@ class World:
             state.fire,
             state.civilians,
             state.brigades,
+            state.ways,
             state.outcome,
             self.constants,
             self.seed,

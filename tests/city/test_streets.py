@@ -1,4 +1,4 @@
-"""Shortest ways and access points."""
+"""Lengths of streets, access points and footpaths."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import pytest
 from fireworld.city.footpaths import footpaths
 from fireworld.city.streets import streets_of
 from tests.city.plans import footprints, rectangle, street_map
+from tests.reference.ways import shortest_ways
 
 NOWHERE = np.empty((0, 2), dtype=np.int32)
 #   2 --- 3
@@ -19,55 +20,9 @@ SQUARE = street_map(
 )
 
 
-def test_square_by_hand():
-    streets = streets_of(SQUARE, NOWHERE)
-    assert streets.street_length_mm.tolist() == [30_000] * 5
-    assert streets.distance_mm[0].tolist() == [0, 30_000, 30_000, 60_000, -1, -1]
-    assert streets.next_node[0].tolist() == [-1, 1, 2, 1, -1, -1]  # to 3 by 1 or 2: the lowest
-    assert streets.next_node[3].tolist() == [1, 1, 2, -1, -1, -1]
-    assert streets.distance_mm[4].tolist() == [-1, -1, -1, -1, 0, 30_000]
-
-
 def test_lengths_are_rounded_and_never_zero():
     streets = streets_of(street_map([(0, 0), (1, 1), (1, 1), (3, 4)], [(0, 1), (1, 2), (2, 3)]), NOWHERE)
     assert streets.street_length_mm.tolist() == [1, 1, 4]
-
-
-def test_of_parallel_streets_the_shorter_counts_and_detours_win():
-    # The direct street 0-2 is straight, so nothing beats it; two streets 0-1 are the same.
-    streets = streets_of(street_map([(0, 0), (3000, 4000), (6000, 0)], [(0, 1), (1, 0), (1, 2), (0, 2)]), NOWHERE)
-    assert streets.distance_mm.tolist() == [[0, 5000, 6000], [5000, 0, 5000], [6000, 5000, 0]]
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_agrees_with_dijkstra_and_the_next_nodes_lead_there(seed):
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import dijkstra
-
-    draw = np.random.default_rng(seed)
-    m = 60
-    nodes = draw.integers(0, 300_000, (m, 2))
-    pairs = draw.integers(0, m, (70, 2))
-    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
-    streets = streets_of(street_map(nodes.tolist(), pairs.tolist()), NOWHERE)
-    low, high = pairs.min(axis=1), pairs.max(axis=1)
-    _, single = np.unique(low * m + high, return_index=True)
-    graph = coo_array((streets.street_length_mm[single].astype(float), (low[single], high[single])), shape=(m, m))
-    expected = dijkstra(graph.tocsr(), directed=False)
-    np.testing.assert_array_equal(streets.distance_mm, np.where(np.isinf(expected), -1, expected))
-    assert (streets.distance_mm < 0).any()
-
-    length = {(int(a), int(b)): int(w) for (a, b), w in zip(pairs, streets.street_length_mm, strict=True)}
-    length |= {(b, a): w for (a, b), w in length.items()}
-    for start in range(m):
-        for goal in range(m):
-            step = int(streets.next_node[start, goal])
-            if streets.distance_mm[start, goal] <= 0:
-                assert step == -1
-                continue
-            onward = streets.distance_mm[:, goal]
-            usable = [n for n in range(m) if (start, n) in length and onward[n] + length[start, n] == onward[start]]
-            assert step == min(usable)
 
 
 def test_access_points_by_hand():
@@ -107,7 +62,7 @@ def test_footpaths_join_the_six_nearest_and_then_everything():
     between = [(a, b) for a, b in pairs if a < 8 <= b]
     assert between == [(0, 8)]  # the two rows are equally near at every column, so the lowest
     assert sum(b == 16 for _, b in pairs) == 6  # the lonely one has its six nearest
-    assert (streets_of(streets, NOWHERE).distance_mm >= 0).all()
+    assert (shortest_ways(streets_of(streets, NOWHERE))[0] >= 0).all()
 
 
 def test_footpaths_lead_to_hydrants():
@@ -126,4 +81,4 @@ def test_a_building_on_its_own_has_a_path_to_its_corner():
 
 def test_buildings_on_one_spot_are_joined_too():
     streets = footpaths(footprints(*[rectangle(0, 0, 4000, 4000)] * 9), [])
-    assert (streets_of(streets, NOWHERE).distance_mm >= 0).all()
+    assert (shortest_ways(streets_of(streets, NOWHERE))[0] >= 0).all()

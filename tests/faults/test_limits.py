@@ -133,11 +133,11 @@ def test_corners(here, fireworld):
 def test_streets_and_hydrants(here, refused):
     spot = [{"x": number, "y": 5} for number in range(20_000)]
     city(here, [{"id": 1, "apexes": SQUARE}], hydrants=spot)
-    assert "city.json: streets: expected at most 20000 nodes, got 20001" in refused("run", "a.yaml")
+    assert "city.json: streets: expected at most 1000000 nodes, got 1000001" in refused("run", "a.yaml")
     nodes = [[number, number] for number in range(20_001)]
     edges = [[0, number] for number in range(1, 20_001)]
     city(here, [{"id": 1, "apexes": SQUARE}], hydrants=spot, streets={"nodes": nodes, "edges": edges})
-    assert "city: streets: expected at most 20000 nodes, got 20001" in refused("run", "a.yaml")
+    assert "city: streets: expected at most 1000000 nodes, got 1000001" in refused("run", "a.yaml")
 
 
 def test_a_large_file_is_not_read(here, fireworld):

@@ -91,7 +91,7 @@ def assess(world: World) -> None:
 def act(world: World) -> None:
     """Let the brigades do what they have chosen."""
     state, city = world.state, world.city_arrays
-    water = act_kernel(state.brigades, state.fire, city.streets, city.geometry, world.constants.brigades)
+    water = act_kernel(state.brigades, state.fire, city.streets, state.ways, city.geometry, world.constants.brigades)
     state.outcome.water[0] += water
 
 

@@ -7,15 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fireworld.kernels.brigades import (
-    NO_TARGET,
-    NOWHERE,
-    drive,
-    locate,
-    stop_in_range,
-    street_between,
-    way,
-)
+from fireworld.kernels.brigades import NO_TARGET, drive, locate, stop_in_range
+from fireworld.kernels.ways import NOWHERE, lines_to, next_street, way
 from tests.kernels.small import METRE, make_city, make_world, square
 
 # a street east in four parts, one that branches off north at node 1, and an island
@@ -44,9 +37,17 @@ def go(world, building, *, target=NO_TARGET, speed_m=80.0):
     constants = world.constants.brigades._replace(speed=round(speed_m * METRE))
     brigades = world.state.brigades
     brigades.driven[0] = 0
-    drive(0, building, target, brigades, world.city_arrays.streets, world.city_arrays.geometry, constants)
+    city, ways = world.city_arrays, world.state.ways
+    drive(0, building, target, brigades, city.streets, ways, city.geometry, constants)
     x, y = brigades.x[0] / METRE, brigades.y[0] / METRE
     return int(brigades.street[0]), brigades.offset[0] / METRE, brigades.driven[0] / METRE, (x, y)
+
+
+def find_way(world, street, offset_m, goal_street, goal_offset_m):
+    """Length of the way, mm, node to leave by, node to arrive at: the line of a small city's node has its number."""
+    streets, ways = world.city_arrays.streets, world.state.ways
+    lines = lines_to(goal_street, street, streets, ways)
+    return way(street, offset_m * METRE, goal_street, goal_offset_m * METRE, *lines, streets, ways)
 
 
 def test_the_buildings_are_entered_where_the_tests_say(world):
@@ -69,7 +70,7 @@ def test_the_buildings_are_entered_where_the_tests_say(world):
 )
 def test_ways(world, start, goal, expected):
     (street, offset), (goal_street, goal_offset) = start, goal
-    length, leave, arrive = way(street, offset * METRE, goal_street, goal_offset * METRE, world.city_arrays.streets)
+    length, leave, arrive = find_way(world, street, offset, goal_street, goal_offset)
     assert (length // METRE, leave, arrive) == expected
 
 
@@ -77,13 +78,14 @@ def test_of_two_ways_of_one_length_the_one_by_the_first_nodes_is_taken():
     """Halfway along one side of a square, the goal halfway along the opposite one."""
     corners = [(0, 0), (100, 0), (100, 100), (0, 100)]
     city = make_city(square(50, 112), nodes_m=corners, streets=[(0, 1), (1, 2), (3, 2), (3, 0)])
-    streets = make_world(city).city_arrays.streets
-    assert way(0, 50 * METRE, 2, 50 * METRE, streets) == (200 * METRE, 0, 3)
+    assert find_way(make_world(city), 0, 50, 2, 50) == (200 * METRE, 0, 3)
 
 
 def test_of_two_streets_between_two_nodes_the_first_shortest_is_taken():
     city = make_city(square(50, 12), nodes_m=[(0, 0), (100, 0)], streets=[(0, 1), (1, 0)])
-    assert street_between(0, 1, make_world(city).city_arrays.streets) == 0
+    world = make_world(city)
+    assert next_street(0, 1, world.city_arrays.streets, world.state.ways) == (0, 1)
+    assert next_street(1, 0, world.city_arrays.streets, world.state.ways) == (0, 0)
 
 
 def test_a_way_through_several_streets(world):

@@ -17,6 +17,7 @@ from fireworld.parameters import BrigadeParameters
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.records import ACTIONS, ACTIVITIES
 from tests.reference import fire, sites
+from tests.reference.ways import shortest_ways
 
 IDLE, DRIVING, SPRAYING, TO_REFUGE, REFILLING, DEAD = range(len(ACTIVITIES))
 EASIEST, NEAREST_TO_CIVILIAN, NEAREST_TO_CENTER, NEAREST_TO_ME = range(len(ACTIONS))
@@ -41,7 +42,7 @@ class Way(NamedTuple):
 
 @dataclass(frozen=True)
 class StreetArrays:
-    """The street graph as plain numbers, but for the two tables of all pairs of nodes."""
+    """The street graph as plain numbers, but for the two tables of all pairs of nodes: the kernels look for ways."""
 
     node_mm: list[tuple[float, float]]
     ends: list[tuple[int, int]]  # nodes of each street
@@ -58,6 +59,7 @@ class StreetArrays:
     def of_city(cls, city: City) -> Self:
         """Prepare a city."""
         streets = city.streets
+        distance_mm, next_node = shortest_ways(streets)
         node_mm = [(float(x), float(y)) for x, y in streets.node_mm.tolist()]
         ends = [(a, b) for a, b in streets.street.tolist()]
         length_mm = streets.street_length_mm.tolist()
@@ -74,8 +76,8 @@ class StreetArrays:
             node_mm=node_mm,
             ends=ends,
             length_mm=length_mm,
-            distance_mm=streets.distance_mm,
-            next_node=streets.next_node,
+            distance_mm=distance_mm,
+            next_node=next_node,
             street_between=between,
             entrance=entrance,
             entrance_mm=[(float(x), float(y)) for x, y in streets.access_mm.tolist()],
