@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import IO, Final, Protocol, Self
 
 from fireworld.errors import OutputError, expected
-from fireworld.files import check_output
+from fireworld.files import check_output, give_name
 from fireworld.records import CityRecord, RunHeader, Snapshot, StepRecord
 from fireworld_recorder.chain import Chain, step_messages
 from fireworld_recorder.codec import encode, encode_snapshot
@@ -125,7 +125,7 @@ class StepFile:
             os.fsync(self._file.fileno())
             self._file.close()
             check_output(self._folder / self.path, force=self._force)
-            (self._folder / self.partial).replace(self._folder / self.path)
+            give_name(self._folder / self.partial, self._folder / self.path, free=not self._force)
             self._open = False
 
     def keep_partial(self) -> None:
@@ -228,6 +228,7 @@ class LogWriter(StepFile):
         city: the city it runs in.
         force: replace an existing log.
         scene: what else to write, for other tools.
+        scratch_suffix: as for `StepFile`.
 
     Raises:
         OutputError: the log exists, its folder does not, or it cannot be written.
@@ -241,6 +242,7 @@ class LogWriter(StepFile):
         *,
         force: bool = False,
         scene: Scene | None = None,
+        scratch_suffix: str = "",
     ) -> None:
         encoded_city = encode(city)
         self._chain = Chain(encoded_city)
@@ -253,6 +255,7 @@ class LogWriter(StepFile):
             channels=[*own_channels(), *(scene.channels if scene is not None else ())],
             city=encoded_city,
             force=force,
+            scratch_suffix=scratch_suffix,
         )
 
     @property
