@@ -87,7 +87,7 @@ fuzz: install  ## Try odd and altered files on all readers for FUZZ_SECONDS (60)
 	then $(BIN)/python -m tests.fuzz.with_atheris --seconds $(FUZZ_SECONDS); \
 	else echo "atheris does not install here: done without it"; fi
 
-# What is finished is kept in reports/faults; a second call goes on after it, unless the code has changed.
+# What is finished is kept in reports/faults; a second call continues after it, unless the code has changed.
 faults: install  ## Try faults of every kind for FAULT_SECONDS (600): kills, full disks, damaged logs, odd policies, ...
 	$(BIN)/python -m tests.faults.campaign --seconds $(FAULT_SECONDS) --seed $(FAULT_SEED) --resume $(if $(FAULT_KINDS),--only $(FAULT_KINDS))
 
