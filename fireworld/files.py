@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 import shutil
@@ -93,6 +94,11 @@ def _read_most(file: IO[bytes], n_bytes_max: int) -> bytes:
 def _without_waiting(path: str, flags: int) -> int:
     """Open a file; a pipe that nobody writes to must not hold it up."""
     return os.open(path, flags | os.O_NONBLOCK)
+
+
+SCRATCH: Final = ".fireworld-"
+"""What the names of scratch folders begin with; after a kill they can be removed."""
+PLACE_TRIES: Final = 100
 
 
 def check_output(path: Path, *, force: bool = False, endings: Collection[str] = ()) -> None:
@@ -194,7 +200,7 @@ def written_beside(path: Path) -> Iterator[Path]:
     """
     with _output_errors(path):
         path = path.absolute()  # whoever works meanwhile may change the current folder
-        scratch = path.parent / f".fireworld-{secrets.token_hex(8)}"
+        scratch = path.parent / f"{SCRATCH}{secrets.token_hex(8)}"
         partial = scratch / path.name
         try:
             scratch.mkdir(0o700)  # in here, so that an interrupt right after it leaves none
@@ -202,6 +208,27 @@ def written_beside(path: Path) -> Iterator[Path]:
             partial.replace(path)
         finally:
             _remove(scratch)
+
+
+def give_name(partial: Path, path: Path, *, free: bool) -> None:
+    """Give a file its final name; if the name must be free, of many that do so at the same time one succeeds.
+
+    Raises:
+        OutputError: the name is taken.
+        OSError: another fault of the output.
+    """
+    if not free:
+        partial.replace(path)
+        return
+    try:
+        path.hardlink_to(partial)
+    except FileExistsError:
+        check_output(path)
+    except OSError:  # a file system without links
+        check_output(path)
+        partial.replace(path)
+        return
+    partial.unlink()
 
 
 @contextmanager
@@ -213,25 +240,37 @@ def new_folder(folder: Path, *, own: Collection[str], force: bool = False) -> It
     Raises:
         OutputError: it cannot be written.
     """
-    partial, replaced = (folder.with_name(folder.name + suffix) for suffix in (".partial", ".replaced"))
     with _output_errors(folder):
+        folder = folder.absolute()
         check_folder(folder, own=own, force=force)
-        for leftover in (partial, replaced):
-            check_folder(leftover, own=own, force=True)
-            shutil.rmtree(leftover, ignore_errors=True)
+        scratch = folder.parent / f"{SCRATCH}{secrets.token_hex(8)}"
+        partial = scratch / folder.name
         try:
+            scratch.mkdir(0o700)
             partial.mkdir()
             yield partial
-            if folder.exists():
+            _take_place(partial, folder, scratch, own=own, force=force)
+        finally:
+            _remove(scratch)
+
+
+def _take_place(partial: Path, folder: Path, scratch: Path, *, own: Collection[str], force: bool) -> None:
+    """Give a folder its name; others may do the same at the same time, and the last one wins whole."""
+    for number in range(PLACE_TRIES):
+        replaced = scratch / f"replaced-{number}"
+        try:
+            check_folder(folder, own=own, force=force)
+            with suppress(FileNotFoundError):
                 folder.rename(replaced)
             partial.rename(folder)
-            shutil.rmtree(replaced, ignore_errors=True)
-        except BaseException:
+        except BaseException as error:
             if replaced.exists() and not folder.exists():
                 replaced.rename(folder)
-            raise
-        finally:
-            _remove(partial)
+            if not isinstance(error, OSError) or error.errno not in {errno.ENOTEMPTY, errno.EEXIST}:
+                raise
+        else:
+            return
+    raise OutputError(f"{folder}: cannot be written: others write it at the same time; try another name")
 
 
 @contextmanager

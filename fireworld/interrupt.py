@@ -12,6 +12,7 @@ from types import FrameType
 from typing import Final
 
 AGAIN_SECONDS: Final = 0.01
+_lost: Final = Event()
 
 
 class Interrupted(KeyboardInterrupt):
@@ -22,13 +23,26 @@ def end_like_ctrl_c() -> None:
     """Let SIGTERM, by which CI systems and `timeout` end a process, do what Ctrl-C does."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)
+        _lost.clear()
 
 
 def once_more() -> None:
     """Send Ctrl-C again, in a moment: it came where Python lets nothing raise, in a finalizer."""
-    timer = threading.Timer(AGAIN_SECONDS, _thread.interrupt_main)
+    _lost.set()
+    timer = threading.Timer(AGAIN_SECONDS, _send)
     timer.daemon = True
     timer.start()
+
+
+def no_more() -> None:
+    """Send no Ctrl-C again: the program is at its end."""
+    _lost.clear()
+
+
+def _send() -> None:
+    if _lost.is_set():
+        _lost.clear()
+        _thread.interrupt_main()
 
 
 def was_interrupted(error: BaseException) -> bool:

@@ -86,13 +86,13 @@ root.params.append(DEBUG)
 def main() -> None:
     """Run the command line; an error ends in one line and exit code 2, one of fireworld's own too, Ctrl-C in 130."""
     from fireworld.errors import FireworldError, described
-    from fireworld.interrupt import end_like_ctrl_c, was_interrupted
+    from fireworld.interrupt import end_like_ctrl_c, no_more, was_interrupted
     from fireworld.stdout import StandardOutputError, be_patient, leave
 
-    end_like_ctrl_c()
-    _say_what_is_ignored()
-    be_patient()
     try:
+        end_like_ctrl_c()
+        _say_what_is_ignored()
+        be_patient()
         code = root.main(standalone_mode=False)
         if sys.stdout is not None:
             sys.stdout.flush()
@@ -116,6 +116,7 @@ def main() -> None:
             code = INTERRUPTED
         else:
             code = _show(error, f"internal error: {described(error)}; run it again with --debug")
+    no_more()
     leave()
     sys.exit(code)
 

@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import IO, Any, Final, Protocol, Self
 
 from fireworld.errors import OutputError, expected
-from fireworld.files import check_output
+from fireworld.files import check_output, give_name
 from fireworld.records import CityRecord, RunHeader, Snapshot, StepRecord, absent_names
 from fireworld_recorder.chain import Chain, step_messages
 from fireworld_recorder.codec import encode, encode_snapshot
@@ -141,7 +141,7 @@ class StepFile:
             os.fsync(self._file.fileno())
             self._file.close()
             check_output(self._final, force=self._force)
-            self._scratch.replace(self._final)
+            give_name(self._scratch, self._final, free=not self._force)
             self._open = False
 
     def keep_partial(self) -> None:

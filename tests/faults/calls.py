@@ -27,8 +27,9 @@ MORE_MEMORY_BYTES: Final = 3_000_000_000
 """Address space that a call may add: enough to be measured as too much, not enough to bring down the machine."""
 FILE_BYTES_MAX: Final = 1 << 29
 _WRITES: Final = frozenset({"os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.link", "os.truncate", "os.chmod"})
-_COUNTERS: Final = mmap.mmap(-1, 16)
+_COUNTERS = mmap.mmap(-1, 16)
 """What the call under way has counted: file events, commits."""
+_ASKED: Final = {signal.SIGINT, signal.SIGTERM}
 _running: set[int] = set()
 
 
@@ -127,6 +128,12 @@ def process(
     return done
 
 
+def count_apart() -> None:
+    """Let this process count by itself, not with the one that it is a fork of."""
+    global _COUNTERS  # noqa: PLW0603 - memory that is shared with children, and with no other
+    _COUNTERS = mmap.mmap(-1, 16)
+
+
 def end_what_runs() -> None:
     """Kill the call under way, and what it started."""
     for pid in [*_running]:
@@ -147,9 +154,11 @@ def _limit(cpu_seconds_max: float) -> None:
 def _fork(texts: tuple[str, ...], folder: Path, io: Path, *how: Any) -> int:
     for name in ("out", "err"):
         (io / name).write_bytes(b"")
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _ASKED)  # until the child is the command
     child = os.fork()
     if child == 0:
         _become(texts, folder, io, *how)
+    signal.pthread_sigmask(signal.SIG_SETMASK, before)
     return child
 
 
@@ -192,8 +201,16 @@ def _become(
 
 def _end_of(act: Callable[[], object] | None) -> Any:
     """Do it, and return the exit code as the interpreter would."""
+    from fireworld import interrupt
     from fireworld.cli import main
 
+    def begin() -> None:
+        end_like_ctrl_c()
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ASKED)
+
+    end_like_ctrl_c, interrupt.end_like_ctrl_c = interrupt.end_like_ctrl_c, begin
+    if act is not None:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ASKED)
     try:
         (act or main)()
     except SystemExit as stop:

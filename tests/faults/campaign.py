@@ -65,7 +65,7 @@ def main(words: Sequence[str] | None = None) -> int:
         if arguments.case:
             return _repeat(arguments.case, place)
         only = f"-{'-'.join(arguments.only)}" if arguments.only else ""
-        ledger = Ledger.begin(REPORTS / f"{arguments.seed}{only}.jsonl", resume=arguments.resume)
+        ledger = Ledger.begin(arguments.reports / f"{arguments.seed}{only}.jsonl", resume=arguments.resume)
         if ledger.outcomes:
             _say(f"going on after {len(ledger.outcomes)} cases, in {ledger.path}")
         kinds = {name: KINDS[name] for name in arguments.only or KINDS}
@@ -84,6 +84,8 @@ def _parse(words: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--only", nargs="+", choices=list(KINDS), metavar="KIND", help=f"of {', '.join(KINDS)}")
     parser.add_argument("--resume", action="store_true", help="go on after what is finished, if the code is the same")
     parser.add_argument("--jobs", type=int, default=2, help="cases at a time")
+    parser.add_argument("--cases", type=int, default=NUMBERS, metavar="N", help="end after N cases of every kind")
+    parser.add_argument("--reports", type=Path, default=REPORTS, help="folder of what is finished")
     parser.add_argument("--light", action="store_true", help="leave out cases that take more than some seconds")
     parser.add_argument("--case", help="try this one alone, as in kills:1000017, and say what happens")
     return parser.parse_args(words)
@@ -110,10 +112,10 @@ def try_case(case: str, place: Path, *, light: bool = False) -> tuple[Outcome, l
     return outcome, bench.told
 
 
-def cases_of(name: str, seed: int, ledger: Ledger) -> Iterator[str]:
-    """Yield the cases of a kind: those that failed before, then those that were not tried."""
+def cases_of(name: str, seed: int, ledger: Ledger, *, n: int = NUMBERS) -> Iterator[str]:
+    """Yield the cases of a kind, the first n: those that failed before, then those that were not tried."""
     yield from [case for case in ledger.failed if case.startswith(f"{name}:")]
-    for number in range(NUMBERS):
+    for number in range(n):
         case = f"{name}:{seed * NUMBERS + number}"
         if case not in ledger.outcomes:
             yield case
@@ -121,7 +123,7 @@ def cases_of(name: str, seed: int, ledger: Ledger) -> Iterator[str]:
 
 def _campaign(kinds: dict[str, Kind], ledger: Ledger, place: Path, arguments: argparse.Namespace) -> None:
     end, said = time.monotonic() + arguments.seconds, time.monotonic()
-    waiting = {name: cases_of(name, arguments.seed, ledger) for name in kinds}
+    waiting = {name: cases_of(name, arguments.seed, ledger, n=arguments.cases) for name in kinds}
     spent = {name: (ledger.tallies()[name].seconds if name in ledger.tallies() else 0.0) for name in kinds}
     workers = [_hire(place, light=arguments.light) for _ in range(arguments.jobs)]
     try:
@@ -157,9 +159,13 @@ def _hand_out(
     for other in workers:
         if other.case:
             under_way[other.case.partition(":")[0]] += max(1.0, time.monotonic() - other.began)
-    name = min(kinds, key=lambda name: (spent[name] + under_way[name]) / kinds[name].SHARE)
-    worker.case, worker.began = next(waiting[name]), time.monotonic()
-    worker.pipe.send(worker.case)
+    for name in sorted(waiting, key=lambda name: (spent[name] + under_way[name]) / kinds[name].SHARE):
+        case = next(waiting[name], None)
+        if case is not None:
+            worker.case, worker.began = case, time.monotonic()
+            worker.pipe.send(case)
+            return
+        del waiting[name]
 
 
 def _take(worker: Worker, ledger: Ledger, spent: dict[str, float], place: Path) -> Worker:
@@ -199,6 +205,7 @@ def _work(pipe: Any, place: Path, light: bool) -> None:
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, leave)
+    calls.count_apart()
     with suppress(EOFError):
         while True:
             pipe.send(try_case(pipe.recv(), place, light=light)[0])

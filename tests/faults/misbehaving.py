@@ -1,8 +1,7 @@
 """Policies that misbehave, each in its own way; a campaign copies this file beside its cases.
-# ruff: noqa: ARG005, N818, NPY002, PLE0307, PTH109 - users write code like this
 
 `right` says what must come of one. "refused": a line and exit code 2, whatever the command. "harmless": as if it had
-behaved. "cheat": as refused where something is judged, `compare` and goldens; a run of its own may go through. "either".
+behaved. "cheat": refused where something is judged, in `compare` and goldens; its own run may go through. "either".
 
 Left out, because no program that runs a policy within itself can survive them: `os._exit`, signals that it sends to its
 own process, `ctypes` on any address. They are as good as pulling the plug; SECURITY.md says that policies are programs.

@@ -6,6 +6,7 @@ import ctypes
 import functools
 import os
 import resource
+import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
@@ -15,6 +16,8 @@ from typing import Final
 
 _CLONE_NEWNS: Final = 0x00020000
 NOBODY: Final = 65534
+MOUNT: Final = shutil.which("mount") or "/bin/mount"
+UMOUNT: Final = shutil.which("umount") or "/bin/umount"
 SMALLEST_BYTES: Final = 4096
 
 
@@ -23,20 +26,20 @@ def can_mount() -> bool:
     """Return whether this process may mount; from now on what it mounts is its own, and ends with it."""
     if os.geteuid() != 0 or ctypes.CDLL(None, use_errno=True).unshare(_CLONE_NEWNS) != 0:
         return False
-    if subprocess.run(["mount", "--make-rprivate", "/"], check=False, capture_output=True).returncode:
+    if subprocess.run([MOUNT, "--make-rprivate", "/"], check=False, capture_output=True).returncode:
         return False
     folder = tempfile.mkdtemp(prefix="fireworld-mount-")
     try:
         mounted = _mount(Path(folder), f"size={SMALLEST_BYTES}")
         if mounted:
-            subprocess.run(["umount", folder], check=False)
+            subprocess.run([UMOUNT, folder], check=False)
         return mounted
     finally:
         Path(folder).rmdir()
 
 
 def _mount(folder: Path, options: str) -> bool:
-    words = ["mount", "-t", "tmpfs", "-o", options, "none", str(folder)]
+    words = [MOUNT, "-t", "tmpfs", "-o", options, "none", str(folder)]
     return subprocess.run(words, check=False, capture_output=True).returncode == 0
 
 
@@ -47,12 +50,12 @@ def small_disk(folder: Path, n_bytes: int) -> Iterator[Callable[[str], None]]:
         raise OSError(f"{folder}: cannot be mounted")
 
     def again(options: str) -> None:
-        subprocess.run(["mount", "-o", f"remount,{options}", str(folder)], check=True)
+        subprocess.run([MOUNT, "-o", f"remount,{options}", str(folder)], check=True)
 
     try:
         yield again
     finally:
-        subprocess.run(["umount", "--lazy", str(folder)], check=True)
+        subprocess.run([UMOUNT, "--lazy", str(folder)], check=True)
 
 
 def limit_files(n_bytes: int) -> Callable[[], None]:

@@ -186,6 +186,7 @@ def _streets(document: Fields, footprints: Footprints) -> StreetMap:
     streets = Fields(document.where, "streets.", document.object()["streets"])
     streets.allow_only("nodes", "edges")
     nodes = streets.pairs("nodes", **span)
+    check_nodes(len(nodes), where=document.where)
     edges = streets.pairs("edges", low=0, high=len(nodes) - 1)
     for index, (start, end) in enumerate(edges):
         if start == end:

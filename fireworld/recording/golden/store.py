@@ -41,18 +41,24 @@ def text_path(path: Path) -> Path:
     return path.with_suffix(TEXT_SUFFIX)
 
 
-def store_golden(path: Path, fresh: Steps | TrainedAgain) -> None:
-    """Write a golden and its text, replacing what is there; each is written beside and renamed (OutputError)."""
-    store_recording(path, fresh)
+def store_golden(path: Path, fresh: Steps | TrainedAgain, *, free: bool = False) -> None:
+    """Write a golden and its text; each is written beside and renamed, replacing what is there (OutputError).
+
+    Args:
+        path: of the recording.
+        fresh: the run, or what is trained.
+        free: there must be no golden of that name.
+    """
+    store_recording(path, fresh, free=free)
     store_text(path)
 
 
-def store_recording(path: Path, fresh: Steps | TrainedAgain) -> None:
-    """Write a recording, replacing what is there; a training is trained for it (OutputError)."""
+def store_recording(path: Path, fresh: Steps | TrainedAgain, *, free: bool = False) -> None:
+    """Write a recording, `free` as for `store_golden`; a training is trained for it (OutputError)."""
     if isinstance(fresh, TrainedAgain):
         store_training(path, fresh)
         return
-    with LogWriter(path, fresh.header, fresh.city, force=True) as writer:
+    with LogWriter(path, fresh.header, fresh.city, force=not free, scratch_suffix=".storing") as writer:
         for record in fresh:
             writer.write(record)
 

@@ -71,7 +71,7 @@ def add_golden(
     fresh = run_again(prepare_golden(spec, folder))
     make_folder(folder)
     with gentle_interrupt():
-        store_golden(path, fresh)
+        store_golden(path, fresh, free=True)
     return path
 
 
@@ -107,7 +107,7 @@ def add_training(
     spec = make_training_spec(folder, curriculum=curriculum, method=method, seed=seed, stages=stages, settings=settings)
     again = prepare_training(spec, folder)
     make_folder(folder)
-    store_golden(path, again)
+    store_golden(path, again, free=True)
     return path
 
 

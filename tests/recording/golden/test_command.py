@@ -196,9 +196,9 @@ def test_update_interrupted_while_it_writes_finishes_that(kept, golden, change_p
     change_policy("EASIEST")
     store_recording = store.store_recording
 
-    def interrupted(path, fresh):
+    def interrupted(path, fresh, *, free):
         signal.raise_signal(signal.SIGINT)
-        store_recording(path, fresh)
+        store_recording(path, fresh, free=free)
 
     monkeypatch.setattr(store, "store_recording", interrupted)
     assert golden("update", "--reason", "The easiest fire first.").code == 0
