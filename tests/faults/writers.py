@@ -238,7 +238,7 @@ def _whole_call(name: str, material: Path) -> Whole:
     writer = WRITERS[name]
     found = []
     for _ in range(2):
-        place = Path(tempfile.mkdtemp(prefix="fireworld-whole-"))
+        place = Path(tempfile.mkdtemp(prefix="whole-", dir=material.parent))
         bench = Bench(place, material)
         bench.bring(writer.given)
         done = calls.forked(writer.words, bench.folder, io=place / "io", before=writer.before, cpu_seconds_max=60)
