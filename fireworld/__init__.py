@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from fireworld.errors import FireworldError as FireworldError
     from fireworld.evaluation.compare import compare as compare
     from fireworld.evaluation.comparison import Comparison as Comparison
+    from fireworld.maps.exporting import export_city as export_city
+    from fireworld.maps.importing import ImportedCity as ImportedCity
+    from fireworld.maps.importing import import_city as import_city
     from fireworld.outcome import Outcome as Outcome
     from fireworld.policy.names import policies as policies
     from fireworld.policy.protocol import Action as Action
@@ -62,6 +65,7 @@ _ROOMS = {
     "Explanation": "recording.explain",
     "FireworldError": "errors",
     "Imported": "recording.official_log.imported",
+    "ImportedCity": "maps.importing",
     "Observation": "policy.protocol",
     "Outcome": "outcome",
     "Policy": "policy.protocol",
@@ -76,7 +80,9 @@ _ROOMS = {
     "diff": "recording.difference",
     "explain": "recording.explain",
     "export": "recording.export",
+    "export_city": "maps.exporting",
     "fork": "recording.fork",
+    "import_city": "maps.importing",
     "import_log": "recording.official_log.importer",
     "load_team": "policy.teams.team",
     "open_log": "recording.run",

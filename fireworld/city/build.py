@@ -20,10 +20,12 @@ from fireworld.city.city import (
     Plan,
     freeze,
 )
+from fireworld.city.entrances import at_entrances
 from fireworld.city.links import radiation_links
 from fireworld.city.near import near_relation
 from fireworld.city.outlines import walls_of
 from fireworld.city.streets import streets_of
+from fireworld.city.table_order import table_order
 from fireworld.parameters import FireParameters
 from fireworld.records import MATERIALS
 
@@ -39,7 +41,10 @@ def build_city(plan: Plan, fire: FireParameters, *, seed: int) -> City:
     footprints = plan.footprints
     air = cover_cells(footprints, fire.air_cell_mm, where=plan.name)
     order = visiting_order(footprints.building_id)
-    links = radiation_links(footprints, order, fire, seed=seed, where=plan.name)
+    if plan.links is None:
+        links = radiation_links(footprints, order, fire, seed=seed, where=plan.name)
+    else:
+        links = _rising(plan.links)
     city = City(
         name=plan.name,
         footprints=footprints,
@@ -48,7 +53,7 @@ def build_city(plan: Plan, fire: FireParameters, *, seed: int) -> City:
         air=air,
         links=links,
         near=near_relation(footprints, links),
-        streets=streets_of(plan.streets, footprints.centroid_mm),
+        streets=at_entrances(streets_of(plan.streets, footprints.centroid_mm), plan.streets.entrance_node),
     )
     return freeze(city)
 
@@ -59,12 +64,19 @@ def with_links(city: City, *, ptr: Array, building: Array, share: Array) -> City
     As CSR: ptr (n+1,) start of each building's links, (links,) the buildings that they lead to, in any order, and
     shares.
     """
-    emitter = np.repeat(np.arange(city.n_buildings), np.diff(ptr))
-    rising = np.lexsort((building, emitter))
-    links = Links(
-        ptr=ptr.astype(np.int32), building=building[rising].astype(np.int32), share=share[rising].astype(np.float32)
-    )
+    links = _rising(Links(ptr=ptr, building=building, share=share))
     return freeze(replace(city, links=links, near=near_relation(city.footprints, links)))
+
+
+def _rising(links: Links) -> Links:
+    """Return links with the buildings that each leads to in rising order."""
+    emitter = np.repeat(np.arange(len(links.ptr) - 1), np.diff(links.ptr))
+    rising = np.lexsort((links.building, emitter))
+    return Links(
+        ptr=links.ptr.astype(np.int32),
+        building=links.building[rising].astype(np.int32),
+        share=links.share[rising].astype(np.float32),
+    )
 
 
 def with_order(city: City, order: Array) -> City:
@@ -75,14 +87,9 @@ def with_order(city: City, order: Array) -> City:
 def visiting_order(building_id: Int64Array) -> Int32Array:
     """Return the (n,) indices of the buildings in the order in which the official program visits them.
 
-    The air exchange depends on it. The program walks a hash table; the key is (id ^ id >> 16) modulo its size: the
-    smallest power of two from 16 on that is at most three quarters full. Ties stay in file order.
+    The air exchange depends on it. The program walks a hash table of the buildings; ties stay in file order.
     """
-    capacity = 16
-    while len(building_id) > 0.75 * capacity:
-        capacity *= 2
-    key = (building_id ^ (building_id >> 16)) & (capacity - 1)
-    return np.argsort(key, kind="stable").astype(np.int32)
+    return table_order(building_id)
 
 
 def physics_of(footprints: Footprints, fire: FireParameters) -> dict[str, Array]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -40,6 +40,23 @@ class StreetMap:
     node_mm: Int32Array  # (m, 2)
     street: Int32Array  # (k, 2) the two nodes of each street; straight between them
     hydrant_node: Int32Array  # (h,) nodes with a hydrant
+    entrance_node: Int32Array = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
+    """(n,) the node where each building is entered; -1, or empty for all: the nearest point of any street."""
+
+
+@dataclass(frozen=True)
+class RoadMap:
+    """Roads as official maps have them: r areas, and the p edges by which one gets from an area into another.
+
+    Nodes of the streets that are made of it: the r centroids, then the middles of the passages (`city.roads`).
+    """
+
+    road_id: Int64Array  # (r,)
+    outline_ptr: Int32Array  # (r+1,) start of each road's corners
+    outline_mm: Int32Array  # (corners, 2) as listed
+    centroid_mm: Int32Array  # (r, 2)
+    passage_area: Int64Array  # (p, 2) ids of the two areas, roads before buildings
+    passage_mm: Int32Array  # (p, 4) x1, y1, x2, y2 of the edge between them; a point where they only touch
 
 
 @dataclass(frozen=True)
@@ -49,6 +66,12 @@ class Plan:
     name: str
     footprints: Footprints
     streets: StreetMap
+    roads: RoadMap | None = None
+    """What the streets were made of, where they come from an official map."""
+    kind: UInt8Array | None = None
+    """(n,) index of each building's type in `json_plan.BUILDING_TYPES`; None: refuges and plain buildings."""
+    links: Links | None = None
+    """Radiation links measured elsewhere; None: rays are sent."""
     source: Mapping[str, Any] | None = None
     """Where it comes from: anything that JSON can hold. Nothing is computed from it."""
     notes: tuple[str, ...] = ()

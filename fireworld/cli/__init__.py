@@ -18,6 +18,7 @@ COMMANDS: Final = {
     "policy": "List policies; show what a team does, or how two differ.",
     "reproduce": "Repeat the paper: its tables beside ours.",
     "scenarios": "List the scenarios, or draw one.",
+    "city": "Import, export and draw cities of real maps.",
     "info": "Show what a recording holds and how far it is good.",
     "compare": "Compare two policies run by run, with a verdict.",
     "diff": "Compare two recordings step by step.",

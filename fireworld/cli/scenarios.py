@@ -63,11 +63,13 @@ def _draw(scenario: Scenario, path: Path, *, force: bool) -> None:
     from fireworld_viewer.pictures.maps import draw_map
 
     from fireworld.simulation.built import build_scenario
+    from fireworld.simulation.state import brigade_places
 
     built = build_scenario(scenario)
     fieryness = np.zeros(built.city.n_buildings, dtype=np.uint8)
     fieryness[built.placement.ignited] = 1
-    brigades_xy = built.city.streets.access_mm[built.placement.brigade_refuge] / 1000.0
+    placement = built.placement
+    brigades_xy = brigade_places(built.city, placement.brigade_refuge, placement.brigade_node)[2] / 1000.0
     title = ": ".join(part for part in (scenario.name, scenario.description) if part)
     figure = draw_map(built.city_record(), fieryness=fieryness, brigades_xy=brigades_xy, title=title)
     save_figure(figure, path, force=force)

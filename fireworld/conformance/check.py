@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 
 from fireworld.city.city import Array, City
+from fireworld.city.formats.official.keys import RAY_KEYS
 from fireworld.conformance.city_file import CityFile
-from fireworld.conformance.configuration import RAY_KEYS
 from fireworld.conformance.derived import RELATIVE_TOLERANCE, TableDifference, differing_tables
 from fireworld.conformance.replay import Moment, prepare, replay
 from fireworld.conformance.trace import Series, Trace, load_trace

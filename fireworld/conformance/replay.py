@@ -9,8 +9,8 @@ import numpy as np
 
 from fireworld.city.build import build_city, with_links, with_order
 from fireworld.city.city import Array, City
+from fireworld.city.formats.official.keys import BRIGADE_KEYS, BURN_KEYS, FIRE_KEYS, RAY_KEYS
 from fireworld.conformance.city_file import CityFile, Placement, Request
-from fireworld.conformance.configuration import BRIGADE_KEYS, BURN_KEYS, FIRE_KEYS, RAY_KEYS
 from fireworld.conformance.trace import Trace
 from fireworld.kernels.arrays import BrigadeState, CityArrays, FireState
 from fireworld.kernels.brigades import ACCEPTED, UNKNOWN_BRIGADE, distance_square, judge_request, refill, spray

@@ -16,7 +16,7 @@ Array = NDArray[Any]
 
 
 class BuildingArrays(NamedTuple):
-    """What is fixed of each building, (n,)."""
+    """What is fixed of each building, (n,); and the k fires that are lit later on."""
 
     building_id: Array  # int64, keys the building's random draws and breaks ties
     order: Array  # uint32, in which the air exchange visits the buildings
@@ -25,6 +25,8 @@ class BuildingArrays(NamedTuple):
     ignition_point: Array  # float64, degrees above ambient
     emission: Array  # float64, energy radiated a step per K^4: wall_area * coefficient * Stefan-Boltzmann
     inflammable: Array  # uint8
+    later_step: Array  # (k,) int64, rising: the step in which each later fire is lit
+    later_building: Array  # (k,) int64, the building that it is lit in
 
 
 class CoverArrays(NamedTuple):

@@ -17,6 +17,7 @@ from fireworld.kernels.arrays import (
     WorldState,
 )
 from fireworld.kernels.choice import RANK_ALL, RANK_NAMED, choose, explores, keeps_choice, table_state
+from fireworld.kernels.fire import is_over, light
 from fireworld.kernels.jit import inner, making_arrays
 from fireworld.kernels.learning import (
     EXPLORED,
@@ -72,6 +73,8 @@ def run_steps(  # noqa: C901, PLR0912, PLR0915 - handing all arrays to functions
     for step in range(first_step, last_step + 2):
         if step > last_step and not learning:
             break
+        if step <= last_step:
+            light(buildings, fire, step)
         find_sites(buildings, city.links, city.near, geometry, fire, people, brigades, sites)
         for brigade in range(n_brigades):
             before[brigade] = brigades.action[brigade]
@@ -130,7 +133,7 @@ def run_steps(  # noqa: C901, PLR0912, PLR0915 - handing all arrays to functions
         if learning:
             take_reward(outcome.reward[TOTAL], learner)
             note_reward(step - 1, outcome.reward, learner)
-        if outcome.counts[BURNING] == 0:
+        if is_over(outcome.counts[BURNING], buildings.later_step, step):
             if learning:
                 for brigade in range(n_brigades):
                     update(brigade, policy.table_of[brigade], 0.0, learner)

@@ -167,6 +167,20 @@ def ignite(b: int, buildings: BuildingArrays, fire: FireState) -> bool:
 
 
 @kernel
+def light(buildings: BuildingArrays, fire: FireState, step: int) -> None:
+    """Light the fires of a step, before everything else in it."""
+    for k in range(len(buildings.later_step)):
+        if buildings.later_step[k] == step:
+            ignite(buildings.later_building[k], buildings, fire)
+
+
+@kernel
+def is_over(n_burning: int, later_step: Array, step: int) -> bool:
+    """Return whether nothing burns after a step, and no fire is lit later; (k,) int64 steps, rising."""
+    return n_burning == 0 and (len(later_step) == 0 or later_step[-1] <= step)
+
+
+@kernel
 def advance_fire(
     buildings: BuildingArrays, cover: CoverArrays, links: LinkArrays, fire: FireState, constants: FireConstants
 ) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import fields, replace
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
 
 import msgspec
@@ -133,27 +133,52 @@ else:
 
 
 class CitySource(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where the city comes from: exactly one of `generated` and `file`."""
+    """Where the city comes from: exactly one of `generated`, `file` and `official`."""
 
     generated: Annotated[GeneratedCity | None, Meta(description="A synthetic city.")] = None
     file: Annotated[
         str | None, Meta(description="A city file (JSON), relative to the folder of the scenario file.")
     ] = None
+    official: Annotated[
+        str | None,
+        Meta(description="Folder of an official map (map.gml, *.cfg), relative to the folder of the scenario file."),
+    ] = None
+    scenario: Annotated[
+        str | None,
+        Meta(description="With `official`: the scenario.xml to read, relative to that folder; null is its own."),
+    ] = None
     sha256: Annotated[
         Annotated[str, Meta(pattern="^[0-9a-f]{64}$")] | None,
-        Meta(description="Digest that the city file must have; null accepts any."),
+        Meta(description="Digest that the city file (or what is read of an official map) must have; null: any."),
     ] = None
     ray_seed: Annotated[Seed, Meta(description="Seed of the random rays that measure radiation between buildings.")] = 1
+
+    refuges: Annotated[
+        BuildingIds | None, Meta(description="Ids of the buildings that are refuges; null: those of the map.")
+    ] = None
+    hydrants: Annotated[
+        tuple[int, ...] | None, Meta(description="Ids of the roads with a hydrant; null: those of the map.")
+    ] = None
+    gas_stations: Annotated[
+        tuple[int, ...] | None, Meta(description="Ids of the buildings that are gas stations; null: those of the map.")
+    ] = None
+
+    @property
+    def named_file(self) -> Path:
+        """The city file; of an official map the name that its city file would have."""
+        return Path(self.file or f"{self.official}.json")
 
     @property
     def summary(self) -> str:
         """What city it is, in a few words."""
         generated = self.generated
+        if self.official is not None:
+            return PurePath(self.official).name
         return PurePath(self.file or "").name if generated is None else f"{generated.columns} x {generated.rows} lots"
 
 
 class Fire(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Buildings that burn at the start: exactly one of `at` and `buildings`."""
+    """Buildings that burn, from the start or from a later step on: exactly one of `at` and `buildings`."""
 
     at: Annotated[Point | None, Meta(description="Centre of the fire: x, y as fractions of the city, y to north.")] = (
         None
@@ -163,16 +188,26 @@ class Fire(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Meta(description="With `at`: how many of the inflammable buildings nearest to it burn; null is 1."),
     ] = None
     buildings: Annotated[BuildingIds | None, Meta(description="Ids of the buildings that burn.")] = None
+    step: Annotated[
+        Annotated[int, Meta(ge=1, le=100_000)] | None,
+        Meta(description="Step at whose beginning it is lit; null: it burns at the start."),
+    ] = None
 
 
 class Civilians(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """People indoors, at most one in a building: exactly one of `n` and `buildings`."""
+    """People: exactly one of `n`, `buildings` and `at`."""
 
     n: Annotated[
         Annotated[int, Meta(ge=0, le=100_000)] | None,
         Meta(description="How many to place at random in inflammable buildings that do not burn at the start."),
     ] = None
-    buildings: Annotated[BuildingIds | None, Meta(description="Ids of the buildings they are in.")] = None
+    buildings: Annotated[
+        BuildingIds | None, Meta(description="Ids of the buildings they are in, one for each; repeats are several.")
+    ] = None
+    at: Annotated[
+        BuildingIds | None,
+        Meta(description="Ids of the buildings and roads they are in or on, one for each; repeats are several."),
+    ] = None
     around: Annotated[
         Point | None, Meta(description="With `n`: point they are placed around; null is the centre of the first fire.")
     ] = None
@@ -187,13 +222,17 @@ class Civilians(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     @property
     def count(self) -> int:
         """How many they are."""
-        return len(self.buildings or ()) + (self.n or 0)
+        return len(self.buildings or ()) + len(self.at or ()) + (self.n or 0)
 
 
 class BrigadeTeam(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The fire brigades; they start at the refuges in turn."""
+    """The fire brigades; they start at the refuges in turn, or at the places of `at`."""
 
     n: Annotated[int, Meta(ge=1, le=1000, description="How many brigades.")] = 4
+    at: Annotated[
+        BuildingIds | None,
+        Meta(description="Ids of the buildings and roads where they start, in turn; null: the refuges."),
+    ] = None
 
 
 class Document(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -269,10 +308,9 @@ def broken_rules(document: Document) -> Iterator[tuple[str, str, object]]:
             yield f"fires.{index}.n_buildings", "null without `at`", fire.n_buildings
         yield from _repeated(f"fires.{index}.buildings", fire.buildings or ())
     civilians = document.civilians
-    yield from _not_one("civilians", n=civilians.n, buildings=civilians.buildings)
+    yield from _not_one("civilians", n=civilians.n, buildings=civilians.buildings, at=civilians.at)
     if civilians.to_m is not None and civilians.to_m < civilians.from_m:
         yield "civilians.to_m", f"at least from_m ({civilians.from_m})", civilians.to_m
-    yield from _repeated("civilians.buildings", civilians.buildings or ())
     yield from _repeated("civilians.directions", civilians.directions)
     if not any(resolve_reward(document).weights):
         names = ", ".join(term.name for term in rewards.TERMS)
@@ -285,9 +323,13 @@ def broken_rules(document: Document) -> Iterator[tuple[str, str, object]]:
 
 def _broken_city_rules(city: CitySource) -> Iterator[tuple[str, str, object]]:
     """Yield the rules between the keys of a city that do not hold."""
-    yield from _not_one("city", generated=city.generated, file=city.file)
-    if city.file is None and city.sha256 is not None:
-        yield "city.sha256", "null without `file`", city.sha256
+    yield from _not_one("city", generated=city.generated, file=city.file, official=city.official)
+    if city.generated is not None and city.sha256 is not None:
+        yield "city.sha256", "null without `file` or `official`", city.sha256
+    if city.official is None and city.scenario is not None:
+        yield "city.scenario", "null without `official`", city.scenario
+    for key in ("refuges", "hydrants", "gas_stations"):
+        yield from _repeated(f"city.{key}", getattr(city, key) or ())
     if city.generated is None:
         return
     columns, rows = city.generated.columns, city.generated.rows
@@ -301,11 +343,12 @@ def _broken_city_rules(city: CitySource) -> Iterator[tuple[str, str, object]]:
 
 
 def _not_one(key: str, **options: object) -> Iterator[tuple[str, str, object]]:
-    """Check that exactly one of two keys has a value."""
+    """Check that exactly one of some keys has a value."""
     n_given = sum(value is not None for value in options.values())
     if n_given != 1:
-        one, other = options
-        yield key, f"exactly one of `{one}` and `{other}`", "both of them" if n_given else "none of them"
+        *others, last = (f"`{name}`" for name in options)
+        found = {0: "none", len(options): "both" if others[1:] == [] else "all"}.get(n_given, str(n_given)) + " of them"
+        yield key, f"exactly one of {', '.join(others)} and {last}", found
 
 
 def _repeated(key: str, values: tuple[object, ...]) -> Iterator[tuple[str, str, object]]:

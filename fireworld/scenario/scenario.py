@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
@@ -25,6 +26,9 @@ DEPTH_MAX: Final = 20
 DIGITS_MAX: Final = 18
 CITY_BYTES_MAX: Final = 1 << 28
 """Room for the outlines and streets of a city of half a million buildings."""
+OFFICIAL_READER: Final = "fireworld.city.formats.official.text"
+"""The module that makes a city file of an official map; named, for cities are built on scenarios."""
+
 
 _DEFAULTS: Final = dict(zip(Document.__struct_fields__, Document.__struct_defaults__, strict=True))
 """Defaults of a scenario's keys."""
@@ -84,8 +88,9 @@ class Scenario(Document, frozen=True, kw_only=True):
         """The scenario as plain values with nothing left to presets, defaults or the place of files."""
         content = self._document()
         content["parameters"] = asdict(self.resolved_parameters)
-        if self.city.file is not None:
-            content["city"] |= {"file": Path(self.city.file).name, "sha256": self.city_sha256}
+        if self.city.generated is None:  # an official map is recorded as the city file that it makes
+            content["city"] |= {"file": self.city.named_file.name, "sha256": self.city_sha256}
+            content["city"] |= {"official": None, "scenario": None}
         resolved: dict[str, Any] = _without_nulls(content)
         return resolved
 
@@ -193,8 +198,10 @@ def scenario_of(values: Mapping[str, Any], *, source: str, folder: Path | None) 
     city = document.city
     if city.file is not None and folder is not None:
         content["city"] = msgspec.structs.replace(city, file=str((folder / city.file).absolute()))
+    if city.official is not None and folder is not None:
+        content["city"] = msgspec.structs.replace(city, official=str((folder / city.official).absolute()))
     scenario = Scenario(**content, source=source, city_sha256=city.sha256)
-    if city.file is None or city.sha256 is not None:
+    if city.generated is not None or city.sha256 is not None:
         return scenario
     return msgspec.structs.replace(scenario, city_sha256=hashlib.sha256(read_city_file(scenario)).hexdigest())
 
@@ -215,7 +222,11 @@ def read_scenario(path: Path, *, source: str | None = None) -> Scenario:
 
 
 def read_city_file(scenario: Scenario) -> bytes:
-    """Read the city file that a scenario names."""
+    """Read the city file that a scenario names, or make it of the official map that it names."""
+    if scenario.city.official is not None:
+        folder = Path(scenario.city.official)
+        made: bytes = import_module(OFFICIAL_READER).city_file(folder, scenario=scenario.city.scenario)
+        return made
     path, source = Path(scenario.city.file or ""), scenario.source
     return read_input(
         path, what="a city file", n_bytes_max=CITY_BYTES_MAX, error=ScenarioError, source=source, key="city.file"

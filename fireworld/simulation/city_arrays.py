@@ -47,6 +47,8 @@ def building_arrays(city: City, fire: FireParameters) -> BuildingArrays:
         ignition_point=city.ignition_point.astype(np.float64),
         emission=city.wall_area_m2 * single(fire.radiation_coefficient) * STEFAN_BOLTZMANN,
         inflammable=city.footprints.inflammable.astype(np.uint8),
+        later_step=np.zeros(0, dtype=np.int64),
+        later_building=np.zeros(0, dtype=np.int64),
     )
 
 

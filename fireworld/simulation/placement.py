@@ -8,34 +8,40 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Final, NoReturn
 
 import msgspec
 import numpy as np
 
 from fireworld import draws
-from fireworld.city.city import Int32Array, Plan, freeze
+from fireworld.city.city import Int32Array, Int64Array, Plan, freeze
 from fireworld.city.formats import read_plan
 from fireworld.city.generator import generate_plan
+from fireworld.city.places import Place, find_buildings, find_places, in_building, with_places
 from fireworld.errors import CityError, ScenarioError, expected
 from fireworld.scenario.document import Civilians, Fire, Point
 from fireworld.scenario.scenario import Scenario, read_city_file
 
 SCENARIO_ATTACHMENT: Final = "scenario.yaml"
 CITY_ATTACHMENT: Final = "city.json"
-UNKNOWN_SHOWN_MAX: Final = 5
 
 
 @dataclass(frozen=True)
 class Placement:
     """Who and what is where at the start; buildings by index, read-only."""
 
-    ignited: Int32Array  # (k,) buildings that burn, rising
-    civilian_building: Int32Array  # (c,) building each civilian is in
-    civilian_mm: Int32Array  # (c, 2) where in it: its centroid
-    brigade_refuge: Int32Array  # (b,) refuge building where each brigade starts
+    ignited: Int32Array  # (k,) buildings that burn at the start, rising
+    civilian_building: Int32Array  # (c,) building each civilian is in, -1 on a road
+    civilian_mm: Int32Array  # (c, 2) where: the centroid of the building or the road
+    brigade_refuge: Int32Array  # (b,) building at which each brigade starts: a refuge, unless the scenario says where
+    brigade_node: Int32Array = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
+    """(b,) node of the streets at which a brigade starts, -1 for those at a building; empty if all are."""
+    later_step: Int64Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """(l,) step, rising, in which each later fire is lit."""
+    later_building: Int64Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """(l,) building that it is lit in."""
 
 
 def scenario_plan(scenario: Scenario, *, city_json: bytes | None = None) -> Plan:
@@ -43,9 +49,18 @@ def scenario_plan(scenario: Scenario, *, city_json: bytes | None = None) -> Plan
 
     Raises ScenarioError for figures that make no city or another city file, CityError for a file that makes none.
     """
+    source = scenario.city
+    plan = _plan_of_source(scenario, city_json)
+    refuse = partial(_refuse, scenario)
+    return with_places(
+        plan, refuges=source.refuges, hydrants=source.hydrants, gas_stations=source.gas_stations, refuse=refuse
+    )
+
+
+def _plan_of_source(scenario: Scenario, city_json: bytes | None) -> Plan:
     generated = scenario.city.generated
     if generated is None:
-        file = Path(scenario.city.file or "")
+        file = scenario.city.named_file
         text = _check_city_file(scenario, city_json if city_json is not None else read_city_file(scenario))
         return read_plan(text, file=file, where=file.name if city_json is not None else str(file))
     name = f"generated-{generated.columns}x{generated.rows}-{generated.seed}"
@@ -61,7 +76,7 @@ def attachments(scenario: Scenario) -> dict[str, bytes]:
     `parse_scenario` reads "scenario.yaml" back, and `scenario_plan` takes "city.json", there if the city is a file's.
     """
     files = {SCENARIO_ATTACHMENT: scenario.to_yaml().encode()}
-    if scenario.city.file is not None:
+    if scenario.city.generated is None:
         files[CITY_ATTACHMENT] = _check_city_file(scenario, read_city_file(scenario))
     return files
 
@@ -69,29 +84,52 @@ def attachments(scenario: Scenario) -> dict[str, bytes]:
 def place(scenario: Scenario, plan: Plan) -> Placement:
     """Place a scenario's fires, civilians and brigades in its city; ScenarioError if it has not what they need."""
     ignited: list[int] = []
+    later: list[tuple[int, int]] = []
     for index, fire in enumerate(scenario.fires):
-        ignited += _ignite(scenario, plan, fire, key=f"fires.{index}", taken=ignited)
+        taken = [*ignited, *(building for _, building in later)]
+        buildings = _ignite(scenario, plan, fire, key=f"fires.{index}", taken=taken)
+        if fire.step is None:
+            ignited += buildings
+        else:
+            later += [(fire.step, building) for building in buildings]
     ignited.sort()
-    civilian_building = _place_civilians(scenario, plan, ignited=ignited)
-    refuges = [int(building) for building in np.flatnonzero(plan.footprints.refuge)]
-    if not refuges:
-        _refuse(scenario, "city", "a city with a refuge, where brigades start and fill their tanks", "none of them")
-    starts = [refuges[brigade % len(refuges)] for brigade in range(scenario.brigades.n)]
+    later.sort()
+    people = _place_civilians(scenario, plan, ignited=ignited)
+    starts = _place_brigades(scenario, plan)
+    on_road = np.array([start.node for start in starts], dtype=np.int32)
     return freeze(
         Placement(
             ignited=np.array(ignited, dtype=np.int32),
-            civilian_building=np.array(civilian_building, dtype=np.int32),
-            civilian_mm=plan.footprints.centroid_mm[civilian_building],
-            brigade_refuge=np.array(starts, dtype=np.int32),
+            civilian_building=np.array([place.building for place in people], dtype=np.int32),
+            civilian_mm=np.array([place.point_mm for place in people], dtype=np.int32).reshape(-1, 2),
+            brigade_refuge=np.array([start.building for start in starts], dtype=np.int32),
+            brigade_node=on_road if (on_road >= 0).any() else on_road[:0],
+            later_step=np.array([step for step, _ in later], dtype=np.int64),
+            later_building=np.array([building for _, building in later], dtype=np.int64),
         )
     )
+
+
+def _place_brigades(scenario: Scenario, plan: Plan) -> list[Place]:
+    """Return where each brigade starts: at the places that are named, else at the refuges, in turn."""
+    team = scenario.brigades
+    if team.at is not None:
+        places = find_places(plan, team.at, refuse=partial(_refuse, scenario, "brigades.at"))
+    else:
+        refuges = np.flatnonzero(plan.footprints.refuge).tolist()
+        if not refuges:
+            hint = "try brigades.at"
+            _refuse(scenario, "city", "a city with a refuge, where brigades start and fill their tanks", "none", hint)
+        places = [in_building(plan, building) for building in refuges]
+    return [places[brigade % len(places)] for brigade in range(team.n)]
 
 
 def _check_city_file(scenario: Scenario, text: bytes) -> bytes:
     """Return the content of a city file if it is the one that the scenario was loaded with."""
     digest = hashlib.sha256(text).hexdigest()
     if digest != scenario.city_sha256:
-        _refuse(scenario, "city.file", f"a city file of SHA-256 {scenario.city_sha256}", f"one of {digest}")
+        key = "city.file" if scenario.city.official is None else "city.official"
+        _refuse(scenario, key, f"a city file of SHA-256 {scenario.city_sha256}", f"one of {digest}")
     return text
 
 
@@ -123,11 +161,21 @@ def _ignite_named(scenario: Scenario, plan: Plan, fire: Fire, *, key: str, taken
     return buildings
 
 
-def _place_civilians(scenario: Scenario, plan: Plan, *, ignited: list[int]) -> list[int]:
-    """Return the building of each civilian."""
+def _place_civilians(scenario: Scenario, plan: Plan, *, ignited: list[int]) -> list[Place]:
+    """Return where each civilian is."""
     civilians = scenario.civilians
+    if civilians.at is not None:
+        return find_places(plan, civilians.at, refuse=partial(_refuse, scenario, "civilians.at"))
     if civilians.buildings is not None:
-        return _find_buildings(scenario, plan, civilians.buildings, key="civilians.buildings")
+        buildings = _find_buildings(scenario, plan, civilians.buildings, key="civilians.buildings")
+    else:
+        buildings = _draw_buildings(scenario, plan, ignited=ignited)
+    return [in_building(plan, building) for building in buildings]
+
+
+def _draw_buildings(scenario: Scenario, plan: Plan, *, ignited: list[int]) -> list[int]:
+    """Return the building of each of the civilians that are placed at random."""
+    civilians = scenario.civilians
     n_civilians = civilians.n or 0
     if n_civilians == 0:
         return []
@@ -184,12 +232,7 @@ def _center_of_people(scenario: Scenario, plan: Plan) -> tuple[int, int]:
 
 def _find_buildings(scenario: Scenario, plan: Plan, building_ids: Sequence[int], *, key: str) -> list[int]:
     """Return the indices of buildings by their ids."""
-    index = {int(building_id): position for position, building_id in enumerate(plan.footprints.building_id)}
-    unknown = [building_id for building_id in building_ids if building_id not in index]
-    if unknown:
-        shown = ", ".join(str(building_id) for building_id in unknown[:UNKNOWN_SHOWN_MAX])
-        _refuse(scenario, key, f"ids of buildings of {plan.name}", f"unknown ids: {shown}")
-    return [index[building_id] for building_id in building_ids]
+    return find_buildings(plan, building_ids, refuse=partial(_refuse, scenario, key))
 
 
 def _locate(plan: Plan, point: Point) -> tuple[int, int]:

@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from fireworld.city.city import City
+from fireworld.city.entrances import place_of_node
 from fireworld.errors import LogError
 from fireworld.kernels.arrays import (
     COUNTS,
@@ -32,6 +33,7 @@ from fireworld.simulation.city_arrays import air_shape
 from fireworld.simulation.placement import Placement
 from fireworld.simulation.ways import another, fresh_ways
 
+NO_NODES: Final = np.zeros(0, dtype=np.int32)
 SCRATCH = {"fire.span", "fire.rate", "fire.emitted", "fire.scratch"} | {
     f"sites.{name}" for name in SiteState._fields if name not in {"counts", "label"}
 }
@@ -71,16 +73,31 @@ def fresh_fire(city: City) -> FireState:
     )
 
 
-def fresh_brigades(city: City, refuges: Array, tank_litres: int, hp: int) -> BrigadeState:
-    """Return healthy brigades with full tanks, each at the entrance of its refuge. refuges: (b,) building index."""
-    refuges = np.asarray(refuges, dtype=np.int64)
-    b = len(refuges)
-    access = city.streets.access_mm[refuges].astype(np.float64)
+def brigade_places(city: City, buildings: Array, nodes: Array) -> tuple[Array, Array, Array]:
+    """Return the street, the way along it (mm) and the point (mm) where each brigade starts, (b,), (b,), (b, 2).
+
+    `buildings`: (b,) indices, at whose entrances they are; `nodes`: (b,) nodes of streets, -1 for those at a building;
+    empty if all are.
+    """
+    buildings, streets = np.asarray(buildings, dtype=np.int64), city.streets
+    street = streets.access_street[buildings].astype(np.int64)
+    offset, point = streets.access_offset_mm[buildings].astype(np.int64), streets.access_mm[buildings].copy()
+    outdoors = np.flatnonzero(nodes >= 0)
+    if len(outdoors):
+        street[outdoors], offset[outdoors] = place_of_node(streets, nodes[outdoors])
+        point[outdoors] = streets.node_mm[nodes[outdoors]]
+    return street, offset, point
+
+
+def fresh_brigades(city: City, buildings: Array, tank_litres: int, hp: int, *, nodes: Array = NO_NODES) -> BrigadeState:
+    """Return healthy brigades with full tanks; `buildings` and `nodes` are as for `brigade_places`."""
+    street, offset, point = brigade_places(city, buildings, nodes)
+    b = len(street)
     return BrigadeState(
-        street=city.streets.access_street[refuges].astype(np.int32),
-        offset=city.streets.access_offset_mm[refuges].astype(np.int64),
-        x=access[:, 0].copy(),
-        y=access[:, 1].copy(),
+        street=street.astype(np.int32),
+        offset=offset,
+        x=point[:, 0].astype(np.float64),
+        y=point[:, 1].astype(np.float64),
         tank=np.full(b, tank_litres, dtype=np.int32),
         refilling=np.zeros(b, dtype=np.uint8),
         action=np.full(b, -1, dtype=np.int32),
@@ -164,7 +181,9 @@ def fresh_world(city: City, streets: StreetArrays, parameters: Parameters, place
             hp=np.full(n_civilians, hp, dtype=np.int32),
             damage=np.zeros(n_civilians),
         ),
-        brigades=fresh_brigades(city, placement.brigade_refuge, parameters.brigades.tank_litres, hp),
+        brigades=fresh_brigades(
+            city, placement.brigade_refuge, parameters.brigades.tank_litres, hp, nodes=placement.brigade_node
+        ),
         sites=fresh_sites(city.n_buildings),
         outcome=Outcome(
             reward=np.zeros(len(REWARDS)),

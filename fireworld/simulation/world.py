@@ -9,7 +9,7 @@ import numpy as np
 
 from fireworld.city.city import City
 from fireworld.kernels.arrays import BURNING, Array, CityArrays, Constants, Learner, PolicyArrays, WorldState
-from fireworld.kernels.fire import ignite
+from fireworld.kernels.fire import ignite, light
 from fireworld.kernels.observation import can_choose, observe
 from fireworld.kernels.outcome import assess
 from fireworld.kernels.sites import find_sites
@@ -58,6 +58,9 @@ def prepare_start(
     A reward of None is the paper's; the city's arrays are built unless they are given.
     """
     arrays = arrays if arrays is not None else city_arrays(city, parameters.fire)
+    if len(placement.later_step):
+        later = {"later_step": placement.later_step, "later_building": placement.later_building}
+        arrays = arrays._replace(buildings=arrays.buildings._replace(**later))
     constants = Constants(
         fire=fire_constants(parameters.fire),
         health=health_constants(parameters.health),
@@ -99,8 +102,9 @@ class World:
 
     @property
     def terminated(self) -> bool:
-        """Whether nothing burns any more."""
-        return bool(self.state.outcome.counts[BURNING] == 0)
+        """Whether nothing burns any more, and no fire is lit later on."""
+        n_burning, later = int(self.state.outcome.counts[BURNING]), self.city_arrays.buildings.later_step
+        return n_burning == 0 and (len(later) == 0 or int(later[-1]) <= self.step_number)
 
     @property
     def truncated(self) -> bool:
@@ -188,6 +192,8 @@ class World:
 
     def _look(self) -> None:
         city, state = self.city_arrays, self.state
+        if len(city.buildings.later_step):
+            light(city.buildings, state.fire, self.step_number)
         find_sites(
             city.buildings,
             city.links,

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from fireworld.city.formats.json_plan import BUILDING_KEYS, IGNORED_KEYS, READ_KEYS
-from fireworld.conformance.configuration import BRIGADE_KEYS, BURN_KEYS, FIRE_KEYS, RAY_KEYS
+from fireworld.city.formats.official.keys import BRIGADE_KEYS, BURN_KEYS, FIRE_KEYS, RAY_KEYS
 from fireworld.conformance.derived import DERIVED
 from fireworld.conformance.trace import INPUTS, LABELS, OUTPUTS
 

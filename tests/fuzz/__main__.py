@@ -23,6 +23,7 @@ def main() -> None:
     arguments = parser.parse_args()
     import tests.fuzz.test_files
     import tests.fuzz.test_logs
+    import tests.fuzz.test_maps
     import tests.fuzz.test_tables  # noqa: F401  # importing them fills TARGETS
 
     end = time.monotonic() + arguments.seconds

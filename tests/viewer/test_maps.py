@@ -107,6 +107,14 @@ def test_brigades_on_one_spot_stand_side_by_side(small):
     assert np.diff(x).min() > 0
 
 
+def test_many_brigades_on_one_spot_stand_in_rows(small):
+    axes = maps.draw_map(small.city, brigades_xy=np.array([[30.0, 30.0]] * 20)).axes[0]
+    balls = next(item for item in axes.collections if len(item.get_offsets()) == 20)
+    x, y = np.asarray(balls.get_offsets()).T
+    assert [int((y == height).sum()) for height in sorted(set(y), reverse=True)] == [8, 8, 4]
+    assert x[0] == x[8] == x[16] == 30.0
+
+
 def test_titles_say_what_when_and_how_well(small):
     figure = maps.draw_steps([small], [12])
     assert texts_of(figure) == [

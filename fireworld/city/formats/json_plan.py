@@ -11,15 +11,17 @@ from typing import Any, Final, Never
 
 import numpy as np
 
-from fireworld.city.city import Footprints, Int32Array, Int64Array, Plan, StreetMap, freeze
+from fireworld.city.city import Footprints, Int32Array, Int64Array, Plan, RoadMap, StreetMap, freeze
 from fireworld.city.crossings import crossing_outlines
 from fireworld.city.fields import Fields
 from fireworld.city.footpaths import footpaths
+from fireworld.city.formats.json_roads import read_links, read_roads
 from fireworld.city.outlines import Building, Corner, assemble, centroid_mm, doubled_area_mm2, without_repeats
+from fireworld.city.roads import streets_of_roads
 from fireworld.city.streets import check_nodes
 from fireworld.errors import CityError, expected
 
-READ_KEYS: Final = ("name", "source", "buildings", "streets", "hydrants")
+READ_KEYS: Final = ("name", "source", "buildings", "streets", "hydrants", "roads", "passages", "links")
 IGNORED_KEYS: Final = (
     "brigade_moves", "brigades", "civilians", "comment", "extinguish", "ignitions", "later_ignitions", "seed", "steps",
     "units", "water",
@@ -51,19 +53,29 @@ def parse_plan(text: bytes, *, where: str, name: str = "city") -> Plan:
     if len(items) > BUILDINGS_MAX:
         document.refuse("buildings", f"at most {BUILDINGS_MAX} buildings", f"{len(items)} of them")
     buildings: list[Building] = []
+    kinds: list[str] = []
     taken: set[int] = set()
     for index, item in enumerate(items):
-        building = _building(Fields(where, f"buildings.{index}.", item))
+        building, kind = _building(Fields(where, f"buildings.{index}.", item))
+        kinds.append(kind)
         if building.building_id in taken:
             document.refuse(f"buildings.{index}.id", "an identifier of its own", building.building_id)
         taken.add(building.building_id)
         buildings.append(building)
     footprints = assemble(buildings)
+    roads = None
+    if "roads" in document.object():
+        roads = read_roads(document, footprints, span_mm=COORDINATE_MAX_MM, id_max=ID_MAX)
+    elif "passages" in document.object():
+        document.refuse("passages", "roads that they join", "no roads")
     return freeze(
         Plan(
             name=document.text("name", default=name),
             footprints=footprints,
-            streets=_streets(document, footprints),
+            streets=_streets(document, footprints, roads),
+            roads=roads,
+            kind=np.array([BUILDING_TYPES.index(kind) for kind in kinds], dtype=np.uint8),
+            links=read_links(document, len(buildings)),
             source=_source(document),
             notes=_notes(footprints),
         )
@@ -95,8 +107,8 @@ def _parse_json(text: bytes, where: str) -> Any:
         raise CityError(expected(where, "", "JSON with numbers of sane size", "something larger")) from None
 
 
-def _building(item: Fields) -> Building:
-    """Read one building."""
+def _building(item: Fields) -> tuple[Building, str]:
+    """Read one building and its type."""
     building_id = item.integer("id", low=0, high=ID_MAX)
     item = Fields(item.where, f"building {building_id}: ", item.value)
     item.allow_only(*BUILDING_KEYS)
@@ -110,7 +122,7 @@ def _building(item: Fields) -> Building:
         item.refuse("apexes", "an area of at least 1 m2", f"{doubled_area / 2_000_000:.6f} m2")
     middle = (0, 0) if {"x", "y"} <= item.object().keys() else centroid_mm(corners)
     span = (-COORDINATE_MAX_MM, COORDINATE_MAX_MM)
-    return Building(
+    building = Building(
         building_id=building_id,
         corners_mm=corners,
         centroid_mm=(
@@ -125,6 +137,7 @@ def _building(item: Fields) -> Building:
         inflammable=item.flag("inflammable", default=not refuge),
         refuge=refuge,
     )
+    return building, kind
 
 
 def _corners(item: Fields) -> list[Corner]:
@@ -171,15 +184,23 @@ def _notes(footprints: Footprints) -> tuple[str, ...]:
     return (f"outlines that cross or touch themselves: {those}; the even-odd rule says what is inside",)
 
 
-def _streets(document: Fields, footprints: Footprints) -> StreetMap:
-    """Read the streets, or lay footpaths where the file has none."""
+def _streets(document: Fields, footprints: Footprints, roads: RoadMap | None) -> StreetMap:
+    """Read the streets, make them of roads, or lay footpaths where the file has neither."""
     span = {"low": -COORDINATE_MAX_MM, "high": COORDINATE_MAX_MM}
     hydrants: list[Corner] = []
+    places: list[int] = []
     for index, value in enumerate(document.array("hydrants", default=[])):
         item = Fields(document.where, f"hydrants.{index}.", value)
         item.allow_only("id", "x", "y")
-        item.integer("id", low=0, high=ID_MAX, default=0)
+        places.append(item.integer("id", low=0, high=ID_MAX, default=0))
         hydrants.append((item.integer("x", **span), item.integer("y", **span)))
+    if roads is not None:
+        if "streets" in document.object():
+            document.refuse("streets", "no streets beside roads, of which they are made", "both")
+        unknown = [place for place in places if place not in set(roads.road_id.tolist())]
+        if unknown:
+            document.refuse("hydrants", "ids of roads", unknown[0])
+        return streets_of_roads(roads, footprints, places)
     if "streets" not in document.object():
         check_nodes(len(footprints.building_id) + len(hydrants), where=document.where)
         return footpaths(footprints, hydrants)

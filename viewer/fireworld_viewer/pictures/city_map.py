@@ -27,6 +27,7 @@ WIDTH_INCHES: Final = 7.6
 """Of a map on which everything has its full size; on smaller ones, balls and letters are smaller too."""
 
 _SMALLEST_SCALE: Final = 0.7
+_ABREAST: Final = 8
 _BALL_POINTS: Final = 14.0
 _GAUGE_POINTS: Final = (3.6, 15.0)  # width and height of the gauge of a full tank
 _DRIVING: Final = ACTIVITIES.index("driving")
@@ -221,7 +222,7 @@ def _unit_rgb(rgb: Sequence[colors.Rgb]) -> NDArray[np.float64]:
 
 
 def _side_by_side(xy: NDArray[np.float64], apart_m: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Move eastward what would cover something of a lower number: (n, 2) to (n, 2)."""
+    """Move eastward what would cover something of a lower number, into a row below where a row is full: (n, 2) both."""
     placed = np.array(xy, dtype=np.float64).reshape(-1, 2)
     for index in range(1, len(placed)):
         while True:
@@ -229,6 +230,8 @@ def _side_by_side(xy: NDArray[np.float64], apart_m: NDArray[np.float64]) -> NDAr
             if not covers.any():
                 break
             placed[index, 0] = placed[:index][covers, 0].max() + apart_m[0]
+            if placed[index, 0] - xy[index, 0] > (_ABREAST - 0.5) * apart_m[0]:
+                placed[index] = xy[index, 0], placed[index, 1] - apart_m[1]
     return placed
 
 

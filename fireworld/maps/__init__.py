@@ -1,0 +1,1 @@
+"""Official maps to cities and scenarios of fireworld, and back."""

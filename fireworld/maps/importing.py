@@ -1,0 +1,121 @@
+"""Import: an official map as a city file, and its scenario as a scenario file."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from fireworld.arguments import path_of
+from fireworld.city.city import Plan
+from fireworld.city.formats.json_plan import parse_plan
+from fireworld.city.formats.official.folder import Imported, MapFiles, find_files, import_files
+from fireworld.city.formats.official.report import Report
+from fireworld.city.formats.official.text import city_text
+from fireworld.files import check_outputs, write_file
+from fireworld.maps.fire import scenario_text
+
+
+@dataclass(frozen=True)
+class ImportedCity:
+    """What an import made of a map."""
+
+    plan: Plan
+    city_text: str
+    """Content of the city file."""
+    scenario_text: str | None
+    """Content of the scenario file; None if none was asked for."""
+    report: Report
+    """What was repaired, inferred or left out."""
+    files: Sequence[Path]
+    """What was written."""
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """How large the map is, as JSON holds it."""
+        plan, roads = self.plan, self.plan.roads
+        low, high = plan.footprints.outline_mm.min(axis=0), plan.footprints.outline_mm.max(axis=0)
+        return {
+            "name": plan.name,
+            "n_buildings": len(plan.footprints.building_id),
+            "n_refuges": int(plan.footprints.refuge.sum()),
+            "n_roads": 0 if roads is None else len(roads.road_id),
+            "n_entrances": int((plan.streets.entrance_node >= 0).sum()),
+            "n_hydrants": len(plan.streets.hydrant_node),
+            "extent_m": [(int(high[axis]) - int(low[axis])) / 1000.0 for axis in (0, 1)],
+        }
+
+    def __repr__(self) -> str:
+        found = self.summary
+        return f"<ImportedCity {found['name']}: {found['n_buildings']} buildings, {found['n_roads']} roads>"
+
+
+def import_city(
+    map: str | os.PathLike[str],  # noqa: A002 - what it is called everywhere
+    *,
+    config: str | os.PathLike[str] | None = None,
+    scenario: str | os.PathLike[str] | None = None,
+    fires: Sequence[int] | None = None,
+    links: str | os.PathLike[str] | None = None,
+    attribution: str | None = None,
+    output: str | os.PathLike[str] | None = None,
+    write_scenario: str | os.PathLike[str] | None = None,
+    force: bool = False,
+) -> ImportedCity:
+    """Read a map of the RoboCup Rescue simulation exactly as the official reader does.
+
+    Args:
+        map: the folder of a map, or its map.gml, packed by gzip or not.
+        config: folder with *.cfg; by default those beside the map.
+        scenario: a scenario.xml; by default the one beside the map.
+        fires: ids of the buildings that burn in the scenario, instead of those of scenario.xml.
+        links: a file (.npz) with radiation links measured elsewhere, as a trace holds them; by default rays are sent.
+        attribution: who made the map, to be named wherever it is shown.
+        output: city file (.json) to write.
+        write_scenario: scenario file (.yaml) to write; it names the city file.
+        force: replace existing files.
+
+    Raises:
+        CityError: files that make no map.
+        ScenarioError: no fires, or fires where nothing can burn.
+        TraceError: links that do not fit.
+        OutputError: files that cannot be written. Nothing is written after an error.
+    """
+    given = {"map": map, "config": config, "scenario": scenario, "links": links}
+    paths = {name: path_of(name, value) for name, value in given.items() if value is not None}
+    outputs = [
+        path_of(name, value) for name, value in (("output", output), ("write_scenario", write_scenario)) if value
+    ]
+    check_outputs(outputs, force=force)
+    files = find_files(paths["map"], config=paths.get("config"), scenario=paths.get("scenario"))
+    imported = import_files(files)
+    text = _with_links(files, imported, paths.get("links"), attribution)
+    plan = parse_plan(text.encode(), where=str(output or files.map_file), name=files.name)
+    for line in plan.notes:
+        imported.report.note("outlines", line)
+    fire = None
+    if write_scenario is not None:
+        city = _relative(Path(output), Path(write_scenario)) if output else f"{files.name}.json"
+        digest = hashlib.sha256(text.encode()).hexdigest()
+        fire = scenario_text(files, imported, plan, fires=fires, city=city, city_sha256=digest)
+    for path, content in zip(outputs, [one for one in (text if output else None, fire) if one], strict=True):
+        write_file(path, content.encode())
+    return ImportedCity(plan=plan, city_text=text, scenario_text=fire, report=imported.report, files=outputs)
+
+
+def _with_links(files: MapFiles, imported: Imported, links: Path | None, attribution: str | None) -> str:
+    """Return the text of the city file, with links that are given."""
+    if links is None:
+        return city_text(files, imported, attribution=attribution)
+    from fireworld.conformance.links import load_links
+
+    given = load_links(links, imported.plan.footprints.building_id)
+    return city_text(files, replace(imported), links=given, attribution=attribution)
+
+
+def _relative(city: Path, scenario: Path) -> str:
+    """Name a city file as a scenario file does: relative to the scenario's folder."""
+    return Path(os.path.relpath(city.absolute(), scenario.absolute().parent)).as_posix()
