@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from fireworld.city import footpaths as module
 from fireworld.city.footpaths import footpaths
 from fireworld.city.streets import streets_of
 from tests.city.plans import footprints, rectangle, street_map
@@ -63,6 +66,50 @@ def test_footpaths_join_the_six_nearest_and_then_everything():
     assert between == [(0, 8)]  # the two rows are equally near at every column, so the lowest
     assert sum(b == 16 for _, b in pairs) == 6  # the lonely one has its six nearest
     assert (shortest_ways(streets_of(streets, NOWHERE))[0] >= 0).all()
+
+
+def plain_footpaths(points):
+    """The same paths, by looking at all pairs again and again."""
+
+    def square(a, b):
+        return (points[a][0] - points[b][0]) ** 2 + (points[a][1] - points[b][1]) ** 2
+
+    every = range(len(points))
+    paths = set()
+    for one in every:
+        nearest = sorted((square(one, other), other) for other in every if other != one)[:6]
+        paths |= {(min(one, other), max(one, other)) for _, other in nearest}
+    part_of = {one: {one} for one in every}
+    for a, b in paths:
+        both = part_of[a] | part_of[b]
+        part_of |= dict.fromkeys(both, both)
+    inside = sorted(part_of[0])
+    while len(inside) < len(points):
+        outside = [one for one in every if one not in inside]
+        _, newcomer, place = min((square(a, b), b, k) for k, a in enumerate(inside) for b in outside)
+        paths.add((min(newcomer, inside[place]), max(newcomer, inside[place])))
+        inside += sorted(part_of[newcomer])
+    return sorted(paths)
+
+
+@given(
+    points=st.integers(1, 10**6).flatmap(
+        lambda spread: st.lists(st.tuples(*[st.integers(0, spread)] * 2), min_size=2, max_size=40)
+    ),
+    apart=st.integers(0, 10**7),
+    large=st.sampled_from([1, 4, 500]),
+    at_once=st.sampled_from([1, 60, 1 << 19]),
+)
+@settings(max_examples=80, deadline=None)
+def test_footpaths_are_those_of_all_pairs(points, apart, large, at_once):
+    points = [(x + apart * (k % 3), y) for k, (x, y) in enumerate(points)]  # some of them in clusters far away
+    drawn = footprints(*[rectangle(x, y, 2, 2) for x, y in points])
+    centroids = [tuple(point) for point in drawn.centroid_mm.tolist()]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "LARGE_PART", large)
+        patch.setattr(module, "PAIRS_AT_ONCE", at_once)
+        paths = footpaths(drawn, [])
+    assert [tuple(path) for path in paths.street.tolist()] == plain_footpaths(centroids)
 
 
 def test_footpaths_lead_to_hydrants():

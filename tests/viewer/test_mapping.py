@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 import rerun
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh
-from fireworld_viewer.rerun_view import app, brigades, run_layers
+from fireworld_viewer.rerun_view import app, brigades, layers, run_layers
 from fireworld_viewer.rerun_view.plots import COUNTS, REWARDS, SCORES, first_burning
 
 from fireworld.errors import ViewError
@@ -203,14 +204,41 @@ def test_the_buildings_that_burn_first_are_plotted_if_none_are_named(small, tmp_
     assert sorted(began[chosen]) == sorted(began)[:4]
 
 
+def test_what_is_wide_is_taken_block_by_block(small, tmp_path: Path, monkeypatch):
+    """Each block of a large city can be compressed and written before the next one is made."""
+    monkeypatch.setattr(layers, "CHUNK_BYTES", 1)
+    stream = rerun.RecordingStream("test", recording_id="blocks", send_properties=False)
+    stream.save(tmp_path / "blocks.rrd")
+    sizes = list[int]()
+
+    def after_block() -> None:
+        stream.flush()
+        sizes.append((tmp_path / "blocks.rrd").stat().st_size)
+
+    run_layers.RunLayers(stream, small.city, after_block=after_block).add(small)
+    stream.disconnect()
+    assert len(sizes) > len(small.steps)
+    assert all(before < after for before, after in itertools.pairwise(sizes))
+
+
+def test_a_run_sent_in_parts_shows_the_same(small, saved, tmp_path: Path, monkeypatch):
+    monkeypatch.setattr(run_layers, "PART_BYTES", 7 * 21 * len(small.city.building_id))
+    app.save([small], tmp_path / "parts.rrd", focus=[121, 100])
+    found = rrd.read(tmp_path / "parts.rrd")
+    assert set(found) == set(saved)
+    for path, components in found.items():
+        for name, rows in components.items():
+            assert sorted(rows, key=str) == sorted(saved[path][name], key=str), (path, name)
+
+
 def test_steps_sent_one_by_one_show_the_same_as_all_at_once(small, saved, tmp_path: Path):
     stream = rerun.RecordingStream("test", recording_id="one-by-one", send_properties=False)
     stream.set_log_time_enabled(False)
     stream.set_log_tick_enabled(False)
     memory = stream.memory_recording()
-    layers = run_layers.RunLayers(stream, small.city, focus=[121, 100])
+    sent = run_layers.RunLayers(stream, small.city, focus=[121, 100])
     for record in small:
-        layers.add(MemoryRecording(small.header, small.city, [record]))
+        sent.add(MemoryRecording(small.header, small.city, [record]))
     (tmp_path / "parts.rrd").write_bytes(memory.drain_as_bytes())
     found = rrd.read(tmp_path / "parts.rrd")
     assert set(found) == {path for path in saved if not path.startswith(("/legend", "/help", "/__prop"))}
@@ -237,9 +265,9 @@ def test_a_fire_that_goes_out_leaves_no_box_when_steps_come_one_by_one(tmp_path:
     )  # fmt: skip
     stream = rerun.RecordingStream("test", recording_id="out", send_properties=False)
     memory = stream.memory_recording()
-    layers = run_layers.RunLayers(stream, recording.city)
+    sent = run_layers.RunLayers(stream, recording.city)
     for record in [*recording, out]:
-        layers.add(MemoryRecording(recording.header, recording.city, [record]))
+        sent.add(MemoryRecording(recording.header, recording.city, [record]))
     (tmp_path / "out.rrd").write_bytes(memory.drain_as_bytes())
     found = rrd.read(tmp_path / "out.rrd", timelines={"step", "log_time", "log_tick"})
     for path, name in (

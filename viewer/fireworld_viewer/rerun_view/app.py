@@ -15,7 +15,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Final
 
-from fireworld.errors import ViewError, expected
+from fireworld.errors import OutputError, ViewError, expected
 from fireworld.files import check_output, write_file
 from fireworld.records import Recording
 from fireworld_viewer.rerun_view.pages import OutcomePage
@@ -134,9 +134,10 @@ def new_stream(application_id: str = APPLICATION_ID, *, recording_id: str | None
 
 
 def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: OutcomePage | None) -> bytes:
-    """Make the Rerun file of one recording, or of two of the same city, in memory.
+    """Make the Rerun file of one recording, or of two of the same city.
 
-    Rerun can write files too, in a thread of its own that reports no error when the disk is full.
+    Rerun writes it to a temporary file as it is sent, block by block: a large city's colors would fill gigabytes of
+    memory before they are compressed. It does so in a thread of its own that reports no error, so the end is checked.
     """
     rerun = _import_rerun()
     from fireworld_viewer.rerun_view import blueprint
@@ -149,8 +150,16 @@ def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome
     if comparing:
         check_same_city(*(one.city for one in recordings))
     stream = new_stream(recording_id=_identity(recordings))
-    memory = stream.memory_recording()
-    with warnings.catch_warnings():
+    with tempfile.TemporaryDirectory(prefix="fireworld-") as folder, warnings.catch_warnings():
+        path = Path(folder) / "view.rrd"
+        stream.save(path)
+
+        def write_out() -> None:
+            try:
+                stream.flush()
+            except RuntimeError:  # the thread that writes has given up
+                raise _no_room(path) from None
+
         # Rerun warns of data it cannot take and continues; a view that lacks something is worse than none.
         warnings.simplefilter("error", rerun.error_utils.RerunWarning)
         plotted = focus or first_burning(recordings[0])
@@ -162,11 +171,25 @@ def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome
         if outcome is not None:
             log_page(stream, OUTCOME_PATH, outcome.markdown)
         if comparing:
-            log_comparison(stream, *recordings, focus=plotted, outcome=outcome)
+            log_comparison(stream, *recordings, focus=plotted, outcome=outcome, after_block=write_out)
         else:
-            RunLayers(stream, recordings[0].city, focus=plotted).add(recordings[0])
-    content: bytes = memory.drain_as_bytes()
+            RunLayers(stream, recordings[0].city, focus=plotted, after_block=write_out).add(recordings[0])
+        stream.disconnect()
+        content = path.read_bytes()
+        if not is_whole(content):
+            raise _no_room(path)
     return content
+
+
+def _no_room(path: Path) -> OutputError:
+    where, found = str(path.parents[1]), f"{path.stat().st_size} bytes of it"
+    return OutputError(expected(where, "", "room for a Rerun file", found, "try TMPDIR=another folder"))
+
+
+def is_whole(rrd: bytes) -> bool:
+    """Return whether a Rerun file is as long as its end says, by the place and the length of its table of contents."""
+    begins, length = int.from_bytes(rrd[-32:-24], "little"), int.from_bytes(rrd[-24:-16], "little")
+    return rrd[-12:-4] == b"RRF2FOOT" and begins + length + 32 == len(rrd)
 
 
 def _identity(recordings: Sequence[Recording]) -> str:
@@ -174,8 +197,11 @@ def _identity(recordings: Sequence[Recording]) -> str:
     digest = hashlib.sha256()
     for one in recordings:
         digest.update(f"{one.header.scenario_digest} {one.header.seed} {one.header.policy_digest}".encode())
-        for numbers in (one.steps, one.column("/buildings", _heat(one)), one.column("/brigades", "x_m")):
-            digest.update(numbers.tobytes())
+        digest.update(one.steps.tobytes())
+        heat = _heat(one)
+        for record in one:
+            digest.update(getattr(record.buildings, heat).tobytes())
+            digest.update(record.brigades.x_m.tobytes())
     return digest.hexdigest()[:32]
 
 

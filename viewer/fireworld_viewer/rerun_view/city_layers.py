@@ -80,11 +80,11 @@ def log_mesh(layers: Layers, mesh: CityMesh, codes: NDArray[np.uint8], table: ND
     path = "city/buildings"
     layers.static(path, rerun.Mesh3D(vertex_positions=mesh.vertex_xyz_m, triangle_indices=mesh.triangle))
     changed = layers.changed(path, codes)
-    entry = codes.astype(np.intp) * table.shape[1]
     flat = table.reshape(-1)
     n_vertices = len(mesh.vertex_building)
     for block in layers.blocks(4 * n_vertices, changed):
-        vertex_colors = flat[entry[block][:, mesh.vertex_building] + mesh.vertex_shade]
+        entry = codes[block].astype(np.intp) * table.shape[1]
+        vertex_colors = flat[entry[:, mesh.vertex_building] + mesh.vertex_shade]
         columns = rerun.Mesh3D.columns(vertex_colors=vertex_colors.reshape(-1))
         layers.rows(path, columns.partition(np.full(len(block), n_vertices)), steps=layers.steps[block])
 

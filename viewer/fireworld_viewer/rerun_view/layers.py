@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -24,11 +24,21 @@ class Layers:
     changes is compared with the last step of the part before.
 
     The prefix is an entity path, "" or like "/a"; `steps` are the (k,) steps of the first part, to be set before the
-    next one. A run beside another has a name, "" where it is alone.
+    next one. A run beside another has a name, "" where it is alone. `after_block` is called when a block of wide data
+    has been sent: a stream that is kept in memory can be taken out of it then.
     """
 
-    def __init__(self, stream: rerun.RecordingStream, prefix: str, steps: NDArray[np.int64], *, name: str = "") -> None:
+    def __init__(
+        self,
+        stream: rerun.RecordingStream,
+        prefix: str,
+        steps: NDArray[np.int64],
+        *,
+        name: str = "",
+        after_block: Callable[[], object] | None = None,
+    ) -> None:
         self.stream = stream
+        self._after_block = after_block
         self.prefix = prefix
         self.steps = steps
         self.name = name
@@ -71,6 +81,8 @@ class Layers:
         size = max(1, CHUNK_BYTES // max(1, bytes_per_step))
         for start in range(0, len(every), size):
             yield every[start : start + size]
+            if self._after_block is not None:
+                self._after_block()
 
     def numbers(self, path: str, archetype: str, columns: Mapping[str, NDArray[Any]]) -> None:
         """Send (k, width) numbers by name, in blocks, shown under a heading when an instance is selected."""

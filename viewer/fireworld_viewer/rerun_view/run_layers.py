@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
@@ -10,7 +10,7 @@ import rerun
 from numpy.typing import NDArray
 
 from fireworld.errors import ViewError, expected
-from fireworld.records import CityRecord, Recording
+from fireworld.records import CityRecord, MemoryRecording, Recording
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh
 from fireworld_viewer.rerun_view import brigades, city_layers
@@ -25,6 +25,10 @@ MARK_PATH: Final = "/diff/plots/first_difference"
 AGREEMENT: Final = ("the same", "buildings the same, something else not", "buildings differ")
 """States of the timeline of two runs."""
 
+PART_BYTES: Final = 64 << 20
+"""Size of the parts in which a long run of a large city is sent: their numbers are put together in memory."""
+_BYTES_OF_BUILDING: Final = 21  # numbers and colors of a building in a step
+
 _AGREEMENT_RGB: Final = (colors.HEALTHY_RGB, colors.MARK_RGB, colors.WORSE_RGB)
 _DIFFERENCE_COLORS: Final = colors.shaded_table(colors.DIFFERENCE_RGB, SHADES_PERCENT)
 
@@ -38,6 +42,7 @@ class RunLayers:
         prefix: entity path to put it below, "" or like "/a".
         name: of the run beside another, "" where it is alone.
         focus: ids of buildings whose temperatures are plotted.
+        after_block: called when a block of wide data has been sent.
 
     Raises:
         ViewError: a building of the focus is not in the city.
@@ -51,15 +56,25 @@ class RunLayers:
         prefix: str = "",
         name: str = "",
         focus: Sequence[int] = (),
+        after_block: Callable[[], object] | None = None,
     ) -> None:
         self._focus_index = _building_indices(city, focus)
-        self._layers = Layers(stream, prefix, np.zeros(0, dtype=np.int64), name=name)
+        self._layers = Layers(stream, prefix, np.zeros(0, dtype=np.int64), name=name, after_block=after_block)
         self._mesh = build_mesh(city)
         self._layers.static("", rerun.ViewCoordinates.RIGHT_HAND_Z_UP)
         city_layers.log_city(self._layers, city, self._mesh)
 
     def add(self, recording: Recording) -> None:
         """Send the next steps of the run, which are in a recording of this city: one, all, or any number of them."""
+        n_steps = max(1, PART_BYTES // (_BYTES_OF_BUILDING * max(1, len(recording.city.building_id))))
+        if len(recording.steps) <= n_steps:
+            self._add(recording)
+            return
+        records = list(recording)
+        for begin in range(0, len(records), n_steps):
+            self._add(MemoryRecording(recording.header, recording.city, records[begin : begin + n_steps]))
+
+    def _add(self, recording: Recording) -> None:
         layers, mesh = self._layers, self._mesh
         layers.steps = recording.steps
         city_layers.log_buildings(layers, recording, mesh)
@@ -102,17 +117,19 @@ def log_comparison(
     *,
     focus: Sequence[int] = (),
     outcome: OutcomePage | None = None,
+    after_block: Callable[[], object] | None = None,
 ) -> None:
     """Send two runs, below /a and /b, and their difference; where they first differ is marked if the outcome is given.
 
+    `after_block` is called when a block of wide data has been sent.
     ViewError if the runs are of different cities, one has no steps, or a building of the focus is unknown.
     """
     check_same_city(first.city, second.city)
     steps, rows_a, rows_b = common_steps(first.steps, second.steps)
-    RunLayers(stream, first.city, prefix="/a", name="A", focus=focus).add(first)
-    RunLayers(stream, second.city, prefix="/b", name="B", focus=focus).add(second)
+    RunLayers(stream, first.city, prefix="/a", name="A", focus=focus, after_block=after_block).add(first)
+    RunLayers(stream, second.city, prefix="/b", name="B", focus=focus, after_block=after_block).add(second)
 
-    layers = Layers(stream, "/diff", steps)
+    layers = Layers(stream, "/diff", steps, after_block=after_block)
     mesh = build_mesh(first.city)
     city_layers.log_city(layers, first.city, mesh)
     fieryness_a = first.column("/buildings", "fieryness")[rows_a]
