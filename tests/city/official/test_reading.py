@@ -75,6 +75,15 @@ def test_the_order_is_that_of_a_table_of_everything(tmp_path):
     assert many.plan.footprints.building_id.tolist() == [11, 12, 13, 16, 32, 33, 48]
 
 
+def test_a_table_that_becomes_a_tree_is_noted(tmp_path):
+    drawn = street_of_three()
+    for at in range(8):
+        drawn.area("building", 64 * (at + 1), rectangle(100 + 20 * at, 0, 10, 10))
+    assert "crowded-table" not in keys(read(tmp_path / "m", drawn.text()))
+    drawn.area("building", 64 * 9, rectangle(300, 0, 10, 10))
+    assert "crowded-table" in keys(read(tmp_path / "n", drawn.text()))
+
+
 def test_kinds_of_buildings(tmp_path):
     places = {"refuge": [11], "gasstation": [12], "firestation": [13], "hydrant": [2, 2]}
     plan = read(tmp_path / "m", street_of_three().text(), scenario=scenario_text(**places)).plan

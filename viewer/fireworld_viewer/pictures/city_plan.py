@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 MAP_INCHES: Final = 8.4
 """The longer side of the map."""
-LEGEND_INCHES: Final = 2.2
+LEGEND_INCHES: Final = 2.5
 HEAD_INCHES: Final = 0.62
 FOOT_INCHES: Final = 0.34
 MARGIN_SHARE: Final = 0.02

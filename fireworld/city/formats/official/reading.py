@@ -22,12 +22,15 @@ from fireworld.city.formats.official.report import Report
 from fireworld.city.formats.official.scenario_xml import BUILDING_KINDS, ScenarioXml, check_places
 from fireworld.city.outlines import Building, Corner, assemble
 from fireworld.city.roads import road_map, sizes_of_parts, streets_of_roads
+from fireworld.city.table_order import fullest_place
 from fireworld.errors import CityError, expected
 
 SPAN_MIN: Final = 5.0
 """A map less wide and less high than this is in degrees: no city is 5 m wide, and none 500 km."""
 MM: Final = 1000.0
 PLAIN: Final = "building"
+PLACE_MAX: Final = 8
+"""Entries that the official program lists in one place of a table; of more it makes a tree."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,11 @@ def build_plan(gml: GmlMap, config: Config, scenario: ScenarioXml | None, *, nam
     floors, codes = floors_and_codes([buildings[one] for one in table], config, report)
     n_people = scenario.n_people if scenario else 0
     plain = [one for one in table if one not in kinds]
-    order = world_order(plain, list(kinds), len(gml.buildings) + len(gml.roads) + n_people)
+    n_entities = len(gml.buildings) + len(gml.roads) + n_people
+    order = world_order(plain, list(kinds), n_entities)
+    if fullest_place(list(measured), n_entries=n_entities) > PLACE_MAX:
+        text = f"more than {PLACE_MAX} areas in one place of the table: their order may differ from the official one"
+        report.note("crowded-table", text)
 
     footprints = assemble(
         [
