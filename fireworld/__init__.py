@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from fireworld.maps.exporting import export_city as export_city
     from fireworld.maps.importing import ImportedCity as ImportedCity
     from fireworld.maps.importing import import_city as import_city
+    from fireworld.maps.osm import ImportedOsm as ImportedOsm
+    from fireworld.maps.osm import import_osm as import_osm
     from fireworld.outcome import Outcome as Outcome
     from fireworld.policy.names import policies as policies
     from fireworld.policy.protocol import Action as Action
@@ -66,6 +68,7 @@ _ROOMS = {
     "FireworldError": "errors",
     "Imported": "recording.official_log.imported",
     "ImportedCity": "maps.importing",
+    "ImportedOsm": "maps.osm",
     "Observation": "policy.protocol",
     "Outcome": "outcome",
     "Policy": "policy.protocol",
@@ -84,6 +87,7 @@ _ROOMS = {
     "fork": "recording.fork",
     "import_city": "maps.importing",
     "import_log": "recording.official_log.importer",
+    "import_osm": "maps.osm",
     "load_team": "policy.teams.team",
     "open_log": "recording.run",
     "open_training": "training.log.reader",

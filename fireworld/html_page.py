@@ -20,6 +20,7 @@ th { background: #f0ede6; font-weight: 600; } td.text, th.text { text-align: lef
 .bad { background: #f8d9d5; color: #86201a; } .open { background: #e6e6ea; color: #444; }
 .caveat { background: #fbeec3; padding: .6rem 1rem; border-radius: 4px; }
 .maps { display: grid; grid-template-columns: repeat(3, 1fr); gap: .6rem; } img { max-width: 100%; }
+.credit { font-size: 12.5px; color: #555; margin-top: 2.6rem; }
 figure { margin: 0; } figcaption { font-size: 13px; color: #555; }
 """
 """Marks are good, fair, bad or open."""
@@ -62,6 +63,12 @@ def compared_row(label: str, values: Sequence[str]) -> list[str]:
 def html_mark(text: str, kind: str) -> str:
     """Write a word on a colored ground: good, fair, bad or open."""
     return f'<span class="mark {kind}">{escape(text)}</span>'
+
+
+def html_credit(attributions: Iterable[str]) -> list[str]:
+    """Write whom the maps on a page are by, each once; nothing for maps that are by nobody else."""
+    named = dict.fromkeys(one for one in attributions if one)
+    return [f'<p class="credit">Map: {escape("; ".join(named))}</p>'] if named else []
 
 
 def html_figure(png: bytes, caption: str) -> str:

@@ -95,9 +95,10 @@ def column(
     return field(metadata=metadata, default_factory=lambda: np.zeros(0)) if optional else field(metadata=metadata)
 
 
-def value(number: int, wire: Wire, doc: str, *, unit: str = "") -> Any:
-    """Declare a single value, with its unit where its name does not end in it."""
-    return field(metadata={"number": number, "wire": wire, "doc": doc, "unit": unit})
+def value(number: int, wire: Wire, doc: str, *, unit: str = "", added: bool = False) -> Any:
+    """Declare a single value, with its unit where its name does not end in it; a text that was `added` is "" before."""
+    metadata = {"number": number, "wire": wire, "doc": doc, "unit": unit}
+    return field(metadata=metadata, default="") if added else field(metadata=metadata)
 
 
 _IF_ANY: Final = {"if_any": True}
@@ -196,6 +197,7 @@ class CityRecord:
     air_ny: int = value(38, "sfixed32", "air cells along y")
     middle_x_m: float = value(39, "double", "centre of the city, x")
     middle_y_m: float = value(40, "double", "centre of the city, y")
+    attribution: str = value(41, "string", "whom its map is by, to be named wherever it is shown; or empty", added=True)
 
 
 @dataclass(frozen=True)

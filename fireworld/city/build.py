@@ -54,6 +54,7 @@ def build_city(plan: Plan, fire: FireParameters, *, seed: int) -> City:
         links=links,
         near=near_relation(footprints, links),
         streets=at_entrances(streets_of(plan.streets, footprints.centroid_mm), plan.streets.entrance_node),
+        attribution=plan.attribution,
     )
     return freeze(city)
 

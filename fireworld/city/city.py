@@ -9,6 +9,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fireworld.errors import one_line
+
 Float64Array = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
 Int64Array = NDArray[np.int64]
@@ -16,6 +18,9 @@ Int32Array = NDArray[np.int32]
 UInt8Array = NDArray[np.uint8]
 Array = NDArray[Any]
 T = TypeVar("T")
+
+ATTRIBUTION_MAX = 200
+"""Letters of an attribution that are recorded and shown."""
 
 
 @dataclass(frozen=True)
@@ -72,10 +77,18 @@ class Plan:
     """(n,) index of each building's type in `json_plan.BUILDING_TYPES`; None: refuges and plain buildings."""
     links: Links | None = None
     """Radiation links measured elsewhere; None: rays are sent."""
+    source_id: tuple[str, ...] = ()
+    """What each building is called in its source, n texts; empty where they have no such names."""
     source: Mapping[str, Any] | None = None
     """Where it comes from: anything that JSON can hold. Nothing is computed from it."""
     notes: tuple[str, ...] = ()
     """What whoever reads the map should know of it, a sentence each; nothing is computed from them."""
+
+    @property
+    def attribution(self) -> str:
+        """Whom the map is by, to be named wherever it is shown: `attribution` of its source; "" where there is none."""
+        said = (self.source or {}).get("attribution")
+        return one_line(said)[:ATTRIBUTION_MAX] if isinstance(said, str) else ""
 
 
 @dataclass(frozen=True)
@@ -132,6 +145,8 @@ class City:
     links: Links
     near: Links  # pairs of one fire site: linked in either direction or outlines closer than 30 m
     streets: Streets
+    attribution: str = ""
+    """Whom its map is by, to be named wherever it is shown."""
 
     @property
     def n_buildings(self) -> int:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from fireworld.cli.city_osm import osm
+
 if TYPE_CHECKING:
     from fireworld_viewer.pictures.city_plan import CityPlan
 
@@ -31,7 +33,12 @@ def command() -> None:
     fireworld city show sakae.json -o sakae.png
     fireworld run sakae.yaml --record sakae.mcap
     fireworld render sakae.mcap -o sakae.gif
+
+    `fireworld city osm` does the same for an extract of OpenStreetMap.
     """
+
+
+command.add_command(osm)
 
 
 @command.command("import")
@@ -121,8 +128,9 @@ def _print_import(made: ImportedCity) -> None:
     found = made.summary
     wide, high = found["extent_m"]
     click.echo(f"{found['name']}: {found['n_buildings']} buildings, {wide:.0f} m by {high:.0f} m")
-    rest = f"{found['n_refuges']} refuges, {found['n_hydrants']} hydrants, {found['n_entrances']} entrances"
-    click.echo(f"{found['n_roads']} roads, {rest}")
+    words = (("roads", "road"), ("refuges", "refuge"), ("hydrants", "hydrant"), ("entrances", "entrance"))
+    counts = [(found[f"n_{plural}"], plural, single) for plural, single in words]
+    click.echo(", ".join(f"{n} {single if n == 1 else plural}" for n, plural, single in counts))
     for line in made.report.lines:
         _print_item(line)
     for path in made.files:
@@ -209,11 +217,10 @@ def _drawn(plan: Plan) -> CityPlan:
     wide, high = ((found.outline_mm.max(axis=0) - found.outline_mm.min(axis=0)) / 1000.0).tolist()
     outlines = np.split(found.outline_mm / 1000.0, found.outline_ptr[1:-1])
     entrances = streets.entrance_node[streets.entrance_node >= 0]
-    source = plan.source or {}
     return CityPlan(
         title=plan.name,
         subtitle=f"{len(outlines)} buildings, {wide:.0f} m by {high:.0f} m",
-        attribution=str(source.get("attribution", "")),
+        attribution=plan.attribution,
         outlines=outlines,
         material=[MATERIALS[material] for material in found.material.tolist()],
         kind=[BUILDING_TYPES[kind] for kind in kinds.tolist()],

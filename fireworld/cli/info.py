@@ -160,6 +160,7 @@ def _show(log: Log, summary: dict[str, Any]) -> None:
         "steps": f"{span}{most}; {summary['ending']}",
         "city": f"{log.city.name}: {summary['n_buildings']} buildings, {summary['n_brigades']} brigades,"
         f" {summary['n_civilians']} civilians",
+        "map by": log.city.attribution,
     }
     if steps["n"]:
         outcome = final_outcome(log)

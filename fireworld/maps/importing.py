@@ -89,8 +89,9 @@ def import_city(
     outputs = [
         path_of(name, value) for name, value in (("output", output), ("write_scenario", write_scenario)) if value
     ]
-    check_outputs(outputs, force=force)
     files = find_files(paths["map"], config=paths.get("config"), scenario=paths.get("scenario"))
+    read = [path for path in (files.map_file, files.scenario_file, paths.get("links")) if path is not None]
+    check_outputs(outputs, force=force, inputs=read)
     imported = import_files(files)
     text = _with_links(files, imported, paths.get("links"), attribution)
     plan = parse_plan(text.encode(), where=str(output or files.map_file), name=files.name)

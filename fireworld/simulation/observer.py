@@ -75,6 +75,7 @@ def city_record(city: City, placement: Placement, parameters: Parameters) -> Cit
         air_ny=air.shape[1],
         middle_x_m=middle_x / 1000.0,
         middle_y_m=middle_y / 1000.0,
+        attribution=city.attribution,
     )
 
 

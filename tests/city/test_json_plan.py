@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from fireworld.city.formats import json_plan
 from fireworld.city.formats.json_plan import parse_plan
+from fireworld.city.formats.json_text import plan_text
 from fireworld.city.generator import generate_plan
 from fireworld.conformance.city_file import load_city_file
 from fireworld.errors import CityError
@@ -273,3 +274,31 @@ def test_a_city_is_read_or_refused_but_never_fails(path, value):
 def test_no_bytes_make_it_fail(noise, place):
     text = json.dumps(CITY).encode()
     assert complaint(text[:place] + noise + text[place + len(noise) :]).isprintable()
+
+
+def test_buildings_keep_what_they_are_called_in_their_source():
+    named = parse(changed(("buildings", 1, "source"), "w9223372036854775807"))
+    assert named.source_id == ("", "w9223372036854775807")
+    assert parse_plan(plan_text(named).encode(), where="city.json").source_id == named.source_id
+    assert parse(CITY).source_id == ()
+    assert '"source":' not in plan_text(parse(CITY)).split('"buildings"')[1]
+
+
+@pytest.mark.parametrize("said", [5, "", "x" * 101, "a\nb", None, ["w1"]])
+def test_what_a_building_is_called_in_its_source_is_a_short_text(said):
+    assert complaint(json.dumps(changed(("buildings", 1, "source"), said)).encode()).startswith(
+        "city.json: building 9: source: expected a text of 1 to 100 printable characters, got "
+    )
+
+
+@pytest.mark.parametrize(
+    ("source", "attribution"),
+    [
+        ({"attribution": "© a\nb"}, "© a\\nb"),
+        ({"attribution": 5}, ""),
+        ({"attribution": "x" * 300}, "x" * 200),
+        ({}, ""),
+    ],
+)
+def test_whom_a_map_is_by(source, attribution):
+    assert parse(changed(("source",), source)).attribution == attribution

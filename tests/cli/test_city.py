@@ -21,7 +21,7 @@ def test_from_a_folder_to_a_picture_of_a_fire(town, here, fireworld):
     assert made.code == 0
     assert made.out.splitlines()[:2] == [
         "town: 3 buildings, 66 m by 32 m",
-        "2 roads, 1 refuges, 1 hydrants, 2 entrances",
+        "2 roads, 1 refuge, 1 hydrant, 2 entrances",
     ]
     assert "- 1 buildings without an entrance from a road: reached from the nearest point of" in made.out
     assert made.out.endswith("wrote town.json\nwrote town.yaml\n")

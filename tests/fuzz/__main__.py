@@ -24,6 +24,7 @@ def main() -> None:
     import tests.fuzz.test_files
     import tests.fuzz.test_logs
     import tests.fuzz.test_maps
+    import tests.fuzz.test_osm
     import tests.fuzz.test_tables  # noqa: F401  # importing them fills TARGETS
 
     end = time.monotonic() + arguments.seconds

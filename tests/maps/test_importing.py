@@ -110,6 +110,13 @@ def test_links_that_do_not_fit(town, tmp_path, change, line):
     assert not (tmp_path / "t.json").exists()
 
 
+def test_the_map_itself_is_never_replaced(town):
+    before = (town / "map.gml").read_bytes()
+    with pytest.raises(OutputError, match="a file of its own for every input and output"):
+        fw.import_city(town, output=town / "map.gml", force=True)
+    assert (town / "map.gml").read_bytes() == before
+
+
 def test_files_that_exist_stay(town, tmp_path):
     (tmp_path / "t.json").write_text("mine")
     with pytest.raises(OutputError, match="expected a name that is free"):

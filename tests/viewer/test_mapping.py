@@ -337,3 +337,11 @@ def test_an_unknown_focus_is_named(small, tmp_path: Path):
 def test_a_thousand_buildings_for_300_steps_stay_small(big, tmp_path: Path):
     app.save([big], tmp_path / "big.rrd")
     assert (tmp_path / "big.rrd").stat().st_size < 8_000_000
+
+
+def test_the_page_of_help_says_whom_the_map_is_by(small, saved, tmp_path: Path):
+    recording = MemoryRecording(small.header, replace(small.city, attribution="© mappers"), list(small)[:2])
+    app.save([recording], tmp_path / "a.rrd")
+    (text,) = [rows[0][1].as_py()[0] for name, rows in rrd.read(tmp_path / "a.rrd")["/help"].items() if "text" in name]
+    (before,) = [rows[0][1].as_py()[0] for name, rows in saved["/help"].items() if "text" in name]
+    assert text == f"{before}\nMap: © mappers\n"

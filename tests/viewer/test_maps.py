@@ -246,3 +246,31 @@ def test_what_cannot_be_drawn_is_a_line(monkeypatch):
     monkeypatch.setattr(figure, "savefig", fails)
     with pytest.raises(ViewError, match="these values cannot be drawn: RuntimeError: raster overflow"):
         figure_files.png_bytes(figure)
+
+
+def bottom_of(figure):
+    """The lowest edge of the maps, as a part of the figure's height."""
+    return min(axes.get_position().y0 for axes in figure.axes)
+
+
+def test_whom_a_map_is_by_stands_below_it_in_the_corner(small):
+    city = replace(small.city, attribution="© Some $mappers$, ODbL 1.0")
+    plain, credited = maps.draw_map(small.city), maps.draw_map(city)
+    (line,) = [text for text in credited.texts if text.get_text() == city.attribution]
+    x, y = line.get_position()
+    right = max(axes.get_position().x1 for axes in credited.axes)
+    assert x == pytest.approx(right, abs=0.002)
+    assert 0 < y < bottom_of(credited)
+    assert len(credited.texts) == len(plain.texts) + 1
+    long = maps.draw_map(replace(city, attribution="m" * 200))
+    (cut,) = [text for text in long.texts if text.get_text().startswith("mmm")]
+    assert len(cut.get_text()) < 150
+    assert cut.get_text().endswith("…")
+
+
+def test_strips_and_pairs_name_it_once(small):
+    city = replace(small.city, attribution="© mappers")
+    recording = MemoryRecording(small.header, city, list(small))
+    for recordings in ([recording], [recording, recording]):
+        for steps in ([3], [0, 5, LAST]):
+            assert texts_of(maps.draw_steps(recordings, steps)).count("© mappers") == 1

@@ -26,7 +26,7 @@ IGNORED_KEYS: Final = (
     "brigade_moves", "brigades", "civilians", "comment", "extinguish", "ignitions", "later_ignitions", "seed", "steps",
     "units", "water",
 )  # fmt: skip
-BUILDING_KEYS: Final = ("id", "type", "apexes", "floors", "code", "ground_area", "x", "y", "inflammable")
+BUILDING_KEYS: Final = ("id", "type", "apexes", "floors", "code", "ground_area", "x", "y", "inflammable", "source")
 BUILDING_TYPES: Final = ("building", "refuge", "firestation", "ambulancecentre", "policeoffice", "gasstation")
 """Official types, in any spelling of case, spaces and underscores; fireworld knows refuges from the rest."""
 COORDINATE_MAX_MM: Final = 1_000_000_000
@@ -54,10 +54,12 @@ def parse_plan(text: bytes, *, where: str, name: str = "city") -> Plan:
         document.refuse("buildings", f"at most {BUILDINGS_MAX} buildings", f"{len(items)} of them")
     buildings: list[Building] = []
     kinds: list[str] = []
+    sources: list[str] = []
     taken: set[int] = set()
     for index, item in enumerate(items):
         building, kind = _building(Fields(where, f"buildings.{index}.", item))
         kinds.append(kind)
+        sources.append(_source_id(document.where, building.building_id, item))
         if building.building_id in taken:
             document.refuse(f"buildings.{index}.id", "an identifier of its own", building.building_id)
         taken.add(building.building_id)
@@ -75,6 +77,7 @@ def parse_plan(text: bytes, *, where: str, name: str = "city") -> Plan:
             streets=_streets(document, footprints, roads),
             roads=roads,
             kind=np.array([BUILDING_TYPES.index(kind) for kind in kinds], dtype=np.uint8),
+            source_id=tuple(sources) if any(sources) else (),
             links=read_links(document, len(buildings)),
             source=_source(document),
             notes=_notes(footprints),
@@ -140,6 +143,11 @@ def _building(item: Fields) -> tuple[Building, str]:
     return building, kind
 
 
+def _source_id(where: str, building_id: int, item: dict[str, Any]) -> str:
+    """Read what a building is called in its source; "" where it is not said."""
+    return Fields(where, f"building {building_id}: ", item).text("source") if "source" in item else ""
+
+
 def _corners(item: Fields) -> list[Corner]:
     """Read an outline: [x0, y0, x1, y1, ...], just as it is listed."""
     n_numbers = len(item.array("apexes"))
@@ -197,7 +205,8 @@ def _streets(document: Fields, footprints: Footprints, roads: RoadMap | None) ->
     if roads is not None:
         if "streets" in document.object():
             document.refuse("streets", "no streets beside roads, of which they are made", "both")
-        unknown = [place for place in places if place not in set(roads.road_id.tolist())]
+        known = set(roads.road_id.tolist())
+        unknown = [place for place in places if place not in known]
         if unknown:
             document.refuse("hydrants", "ids of roads", unknown[0])
         return streets_of_roads(roads, footprints, places)

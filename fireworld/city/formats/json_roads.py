@@ -38,8 +38,6 @@ def read_roads(document: Fields, footprints: Footprints, *, span_mm: int, id_max
             item.refuse("apexes", "as many y as x, at least one", f"{len(numbers)} numbers")
         outlines.append(list(zip(numbers[::2], numbers[1::2], strict=True)))
         centroids.append((item.integer("x", **span), item.integer("y", **span)))
-    if not ids:
-        document.refuse("roads", "at least one road", "an empty array")
     passages = [
         _passage(document, index, value, ids, known, span)
         for index, value in enumerate(document.array("passages", default=[]))
@@ -56,7 +54,7 @@ def _passage(
     if len(numbers) != PASSAGE_NUMBERS:
         document.refuse(key, f"{PASSAGE_NUMBERS} numbers: two ids, x1, y1, x2, y2", f"{len(numbers)} of them")
     one, other, *edge = numbers
-    if one == other or not {one, other} <= roads.keys() | buildings:
+    if one == other or any(area not in roads and area not in buildings for area in (one, other)):
         document.refuse(key, "ids of two areas of the city", [one, other])
     if one in buildings and other in roads:
         document.refuse(key, "the road before the building", [one, other])

@@ -36,6 +36,7 @@ def _buildings(plan: Plan) -> Iterator[dict[str, Any]]:
     """Yield the object of each building."""
     footprints = plan.footprints
     corners, ptr = footprints.outline_mm.ravel().tolist(), (2 * footprints.outline_ptr.astype("int64")).tolist()
+    sources = plan.source_id
     kinds = (footprints.refuge if plan.kind is None else plan.kind).tolist()  # 0 building, 1 refuge in either
     columns = zip(
         footprints.building_id.tolist(),
@@ -57,6 +58,7 @@ def _buildings(plan: Plan) -> Iterator[dict[str, Any]]:
             "x": centroid[0],
             "y": centroid[1],
             "inflammable": bool(inflammable),
+            **({"source": sources[b]} if sources and sources[b] else {}),
         }
 
 

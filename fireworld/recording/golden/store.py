@@ -199,6 +199,6 @@ def _where_people_are(scenario: Scenario) -> str:
     civilians = scenario.civilians
     if civilians.count == 0:
         return "no civilians"
-    if civilians.buildings is not None:
+    if civilians.buildings is not None or civilians.at is not None:
         return "civilians by building"
     return "civilians all around" if set(civilians.directions) == set(DIRECTIONS) else "civilians on some sides"

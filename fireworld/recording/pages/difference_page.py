@@ -13,7 +13,7 @@ from fireworld_viewer.pictures.figure_files import png_bytes
 from fireworld_viewer.pictures.maps import draw_record
 from fireworld_viewer.story.series import LABELS
 
-from fireworld.html_page import compared_row, html_figure, html_mark, html_page, html_table, text_cell
+from fireworld.html_page import compared_row, html_credit, html_figure, html_mark, html_page, html_table, text_cell
 from fireworld.recording.difference_text import (
     SPREAD_HEADS,
     SPREAD_NOTE,
@@ -71,6 +71,7 @@ def difference_body(compared: Difference, images: Mapping[str, bytes]) -> list[s
         *(["<h2>Curves</h2>", html_figure(images["curves"], _CURVES_CAPTION)] if "curves" in images else []),
         *_maps("The last step of both", "last", images),
         *_topics(difference),
+        *html_credit(run.city.attribution for run in compared.runs),
     ]  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from fireworld_viewer.story.steps import evenly_spaced
 
 from fireworld.errors import one_line
 from fireworld.files import check_output, write_file
-from fireworld.html_page import compared_row, html_figure, html_page, html_table, text_cell
+from fireworld.html_page import compared_row, html_credit, html_figure, html_page, html_table, text_cell
 from fireworld.outcome import NOT_RECORDED, QUANTITIES
 from fireworld.recording.inputs import AnyRun, open_one_or_two, run_name
 from fireworld.records import ACTION_NAMES, EVENT_KINDS, StoredRun
@@ -86,6 +86,7 @@ def _run_page(logs: Sequence[StoredRun], images: Mapping[str, bytes]) -> str:
         f"<h2>{'Where it comes from' if imported else 'How to get the same again'}</h2>",
         *(part for log, name in zip(logs, names, strict=True) for part in _repetition(log, name)),
         *_scenarios(logs, names),
+        *html_credit(log.city.attribution for log in logs),
     ]  # fmt: skip
     return html_page(f"fireworld: {title}", body, style=_STYLE)
 

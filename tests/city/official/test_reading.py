@@ -112,6 +112,18 @@ def test_neighbours_are_inferred_where_a_map_names_none(tmp_path):
     assert imported.plan.roads.passage_mm.tolist() == named.plan.roads.passage_mm.tolist()
 
 
+def test_a_map_without_roads_gets_footpaths(tmp_path):
+    drawn = street_of_three()
+    drawn.areas["road"].clear()
+    gml = drawn.text().replace(' rcr:neighbour="1"', "").replace(' rcr:neighbour="2"', "")
+    write_map(tmp_path / "m", gml, scenario=scenario_text(refuge=[12]))
+    made = fw.import_city(tmp_path / "m", output=tmp_path / "m.json")
+    assert "no-streets" in [finding.key for finding in made.report.findings]
+    scenario = {"city": {"official": str(tmp_path / "m")}, "fires": [{"buildings": [11]}], "steps": 5}
+    assert len(fw.run(scenario)) > 1
+    assert list(fw.export_city(tmp_path / "m.json", tmp_path / "again").differences) == []
+
+
 def test_one_direction_is_enough(tmp_path):
     one_way = street_of_three().text().replace(' rcr:neighbour="1"', "")
     imported = read(tmp_path / "m", one_way)

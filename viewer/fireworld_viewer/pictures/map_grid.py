@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from fireworld.errors import one_line
 from fireworld.records import ACTIVITIES, FIERYNESS, CityRecord
 from fireworld_viewer import colors
 from fireworld_viewer.pictures.city_map import JET_EDGE, WIDTH_INCHES, CityMap, MapState, extent_m, hexadecimal
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 _LEGEND_INCHES: Final = 2.35
 _GAP_INCHES: Final = 0.14
 _LINE_INCHES: Final = 0.24
+_CREDIT_INCHES: Final = 0.13
+_CREDIT_POINTS: Final = 7.5
 _LEGEND_LINE_INCHES: Final = 0.205
 _POINTS_WIDE: Final = 0.56  # how wide a letter is on average, of its size
 _MAPS_COUNTED: Final = 2  # above this many maps, and in strips, the legend has no counts
@@ -90,7 +93,9 @@ class MapGrid:
         above = _GAP_INCHES / 2 + (1.7 * _LINE_INCHES if heading else 0.0)
         needed = above + n_lines * _LINE_INCHES + (len(self._labels) + 1) * _LEGEND_LINE_INCHES + 2 * _GAP_INCHES
         self._width = _GAP_INCHES + columns * (map_inches + _GAP_INCHES) + _LEGEND_INCHES
-        self._height = max(above + rows * row_height + _GAP_INCHES, needed)
+        credit = one_line(cells[0].city.attribution)
+        below = _CREDIT_INCHES / 2 if credit else 0.0
+        self._height = max(above + rows * row_height + _GAP_INCHES, needed) + below
         self.figure: Figure = new_figure(_even(self._width, dpi), _even(self._height, dpi), dpi=dpi)
         self._maps: list[CityMap] = []
         self._facts: list[Any] = []
@@ -102,6 +107,11 @@ class MapGrid:
             left = _GAP_INCHES + column * (map_inches + _GAP_INCHES)
             top = above + row * row_height + n_lines * _LINE_INCHES
             self._add(cell, left, top, map_height, alone=len(cells) == 1 and not heading, n_lines=n_lines)
+        if credit:
+            room = columns * (map_inches + _GAP_INCHES) - _GAP_INCHES
+            self._write_credit(
+                credit, _GAP_INCHES + room, above + rows * row_height - _GAP_INCHES + _CREDIT_INCHES, inches=room
+            )
         corner = self._maps[min(columns, len(self._maps)) - 1]
         self._counted = len(cells) <= _MAPS_COUNTED and not heading
         title = "how many: (A | B)" if self._counted and len(cells) > 1 else None
@@ -146,6 +156,14 @@ class MapGrid:
         title_at = top - (n_lines - 1) * _LINE_INCHES
         self._write(left, title_at, cell.title, points=size, inches=room)
         self._facts.append(self._write(left, top, cell.facts, points=size - 2.0, inches=room))
+
+    def _write_credit(self, text: str, right: float, bottom: float, *, inches: float) -> None:
+        """Write whom the map is by, below it in the corner; a longer text is cut."""
+        room = int(inches * 72.0 / (_POINTS_WIDE * _CREDIT_POINTS))
+        shown = text if len(text) <= room else f"{text[: room - 1]}…"
+        place = (right / self._width, 1.0 - bottom / self._height)
+        style: dict[str, Any] = {"ha": "right", "va": "baseline", "color": INK, "parse_math": False}
+        self.figure.text(*place, shown, fontsize=_CREDIT_POINTS, **style)
 
     def _write(self, left: float, bottom: float, text: str, *, points: float, inches: float) -> Any:
         """Write a line, in smaller letters if it would be too long; names in it come from files and are no formulas."""

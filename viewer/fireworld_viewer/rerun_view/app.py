@@ -167,7 +167,7 @@ def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome
         stream.send_blueprint(lay_out(*recordings, focus=bool(plotted), outcome=outcome))
         stream.send_recording_name(" | ".join(map(blueprint.title, recordings)))
         acting = any(not one.header.lacks("brigades.activity") for one in recordings)
-        log_legend(stream, comparing=comparing, acting=acting)
+        log_legend(stream, comparing=comparing, acting=acting, map_by=recordings[0].city.attribution)
         if outcome is not None:
             log_page(stream, OUTCOME_PATH, outcome.markdown)
         if comparing:

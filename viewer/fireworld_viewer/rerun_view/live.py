@@ -219,7 +219,7 @@ class RunEncoder:
             layout = blueprint.following(blueprint.single(recording, focus=False), listed=bool(self._title))
             self._stream.send_blueprint(layout)
             self._stream.send_recording_name(self._title or blueprint.title(recording))
-            log_legend(self._stream, comparing=False)
+            log_legend(self._stream, comparing=False, map_by=self._city.attribution)
             self._layers = RunLayers(self._stream, self._city)
         self._layers.add(recording)
         content: bytes = self._bytes.read(flush_timeout_sec=_ENCODE_SECONDS) or b""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from fireworld.errors import one_line
 from fireworld.records import ACTIVITIES, FIERYNESS
 from fireworld_viewer import colors
 
@@ -71,8 +72,8 @@ def bounds(*, comparing: bool) -> tuple[tuple[float, float], tuple[float, float]
     return (-_COLUMN_WIDTH / 2, _COLUMN_WIDTH * (n_columns - 0.5)), (-0.4, len(rows) - 0.1)
 
 
-def log_legend(stream: rerun.RecordingStream, *, comparing: bool, acting: bool = True) -> None:
-    """Send the legend, as dots in rows with their names below them, and the page of help."""
+def log_legend(stream: rerun.RecordingStream, *, comparing: bool, acting: bool = True, map_by: str = "") -> None:
+    """Send the legend, as dots in rows with their names below them, and the page of help with whom the map is by."""
     import rerun
 
     rows = entries(comparing=comparing, acting=acting)
@@ -91,7 +92,7 @@ def log_legend(stream: rerun.RecordingStream, *, comparing: bool, acting: bool =
     )
     stream.log(f"{LEGEND_PATH}/dots", dots, static=True)
     stream.log(f"{LEGEND_PATH}/names", names, static=True)
-    log_page(stream, HELP_PATH, HELP)
+    log_page(stream, HELP_PATH, f"{HELP}\nMap: {one_line(map_by)}\n" if map_by else HELP)
 
 
 def log_page(stream: rerun.RecordingStream, path: str, text: str) -> None:

@@ -18,8 +18,10 @@ class Finding:
     key: str
     """A name for programs."""
     text: str
-    ids: tuple[int, ...] = ()
-    """Areas that it is about, in the order of the file."""
+    ids: tuple[int | str, ...] = ()
+    """Areas that it is about, in the order of the file; numbers, or text where the map's ids are no numbers here."""
+    n: int | None = None
+    """How many it is about, which the text begins with; None where that is not counted."""
 
     def __str__(self) -> str:
         if not self.ids:
@@ -39,11 +41,16 @@ class Report:
         """Add a finding."""
         self.findings.append(Finding(key, text, tuple(ids)))
 
-    def note_areas(self, key: str, text: str, ids: Iterable[int]) -> None:
+    def note_number(self, key: str, text: str, n: int, *, always: bool = False) -> None:
+        """Add a finding about so many of something, if there are any or `always`; `text` follows the number."""
+        if n or always:
+            self.findings.append(Finding(key, f"{n} {text}", n=n))
+
+    def note_areas(self, key: str, text: str, ids: Iterable[int | str]) -> None:
         """Add a finding about areas, if there are any; `text` follows their number."""
         listed = tuple(ids)
         if listed:
-            self.findings.append(Finding(key, f"{len(listed)} {text}", listed))
+            self.findings.append(Finding(key, f"{len(listed)} {text}", listed, len(listed)))
 
     @property
     def lines(self) -> list[str]:
@@ -52,4 +59,4 @@ class Report:
 
     def as_json(self) -> list[dict[str, Any]]:
         """Return the findings as JSON holds them."""
-        return [{"key": one.key, "text": one.text, "ids": list(one.ids)} for one in self.findings]
+        return [{"key": one.key, "text": one.text, "n": one.n, "ids": list(one.ids)} for one in self.findings]
