@@ -3,13 +3,15 @@
 PYTHON ?= python3
 WORKERS ?= 2
 FUZZ_SECONDS ?= 60
+FAULT_SECONDS ?= 600
+FAULT_SEED ?= 1
 BIN := .venv/bin
 DEMO := recordings/demo
 PICTURE := recordings/picture-
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help install demo check test static check-format check-lint check-types check-imports check-tests format docs oldest pictures fuzz bench check-teams clean
+.PHONY: help install demo check test static check-format check-lint check-types check-imports check-tests format docs oldest pictures fuzz faults bench check-teams clean
 
 help:  ## List these targets.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -94,6 +96,10 @@ fuzz: install  ## Try odd and altered files on all readers for FUZZ_SECONDS (60)
 	if PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --editable '.[fuzz]'; \
 	then $(BIN)/python -m tests.fuzz.with_atheris --seconds $(FUZZ_SECONDS); \
 	else echo "atheris does not install here: done without it"; fi
+
+# What is finished is kept in reports/faults; a second call continues after it, unless the code has changed.
+faults: install  ## Try faults of every kind for FAULT_SECONDS (600): kills, full disks, damaged logs, odd policies, ...
+	$(BIN)/python -m tests.faults.campaign --seconds $(FAULT_SECONDS) --seed $(FAULT_SEED) --resume $(if $(FAULT_KINDS),--only $(FAULT_KINDS))
 
 bench: install  ## Measure speed against baselines; with AGAINST=COMMIT, this tree against that commit.
 	$(BIN)/python -m benchmarks.$(if $(AGAINST),against $(AGAINST),bench)

@@ -41,6 +41,8 @@ if TYPE_CHECKING:
     from fireworld.recording.export import export as export
     from fireworld.recording.export import recover as recover
     from fireworld.recording.fork import fork as fork
+    from fireworld.recording.official_log.imported import Imported as Imported
+    from fireworld.recording.official_log.importer import import_log as import_log
     from fireworld.recording.record import run as run
     from fireworld.recording.run import Run as Run
     from fireworld.recording.run import open_log as open_log
@@ -64,6 +66,7 @@ _ROOMS = {
     "Difference": "recording.difference",
     "Explanation": "recording.explain",
     "FireworldError": "errors",
+    "Imported": "recording.official_log.imported",
     "ImportedCity": "maps.importing",
     "ImportedOsm": "maps.osm",
     "Observation": "policy.protocol",
@@ -83,6 +86,7 @@ _ROOMS = {
     "export_city": "maps.exporting",
     "fork": "recording.fork",
     "import_city": "maps.importing",
+    "import_log": "recording.official_log.importer",
     "import_osm": "maps.osm",
     "load_team": "policy.teams.team",
     "open_log": "recording.run",

@@ -1,14 +1,104 @@
-"""Files and folders that a command or function is asked to write: checks, and nothing half-written bears a name."""
+"""Files: what is read is a regular file of bounded size; what is written is checked first, and never half-written."""
 
 from __future__ import annotations
 
+import errno
+import os
+import secrets
 import shutil
-import tempfile
+import stat
 from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import IO, Final
 
-from fireworld.errors import OutputError, expected
+from fireworld.errors import FireworldError, OutputError, expected
+
+KINDS: Final = {
+    stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device", stat.S_IFBLK: "a device",
+}  # fmt: skip
+"""What is at a path, where it is no regular file."""
+TEXT_BYTES_MAX: Final = 1 << 24
+PIECE_BYTES: Final = 1 << 20
+
+
+def read_input(
+    path: Path,
+    *,
+    what: str,
+    n_bytes_max: int,
+    error: type[FireworldError],
+    source: str = "",
+    key: str = "",
+    or_names: str = "",
+) -> bytes:
+    """Read a regular file that is not larger than such a file can be.
+
+    Args:
+        path: the file.
+        what: what it should be, as in "a city file".
+        n_bytes_max: its greatest size.
+        error: what is raised.
+        source: what names the file in errors, if not its path.
+        key: the key of the source that names the file.
+        or_names: what else could have been given, for the error of a file that is not there.
+
+    Raises:
+        FireworldError: of the kind given: it is no regular file, is larger, or cannot be read.
+    """
+    where, suffix = source or str(path), f": {path}" if key else ""
+    try:
+        with open(path, "rb", opener=_without_waiting) as file:
+            status = os.fstat(file.fileno())
+            size = status.st_size
+            kind = KINDS.get(stat.S_IFMT(status.st_mode))
+            content = b"" if kind or size > n_bytes_max else _read_most(file, n_bytes_max)
+    except (OSError, ValueError) as fault:  # a path with a null byte is a ValueError
+        reason = (fault.strerror if isinstance(fault, OSError) else None) or str(fault)
+        raise error(expected(where, key, or_names or what, f"{reason}{suffix}")) from None
+    if kind:
+        raise error(expected(where, key, f"{what}, a regular file", f"{kind}{suffix}"))
+    size = max(size, len(content))
+    if size > n_bytes_max:
+        raise error(expected(where, key, f"{what} of at most {n_bytes_max} bytes", f"{size} bytes{suffix}"))
+    return content
+
+
+def read_text_file(path: Path, *, strict: bool = False) -> str:
+    """Read a text that belongs to an output.
+
+    Args:
+        path: the file.
+        strict: raise for bytes that are no UTF-8, since the text is written again; else they are replaced.
+
+    Raises:
+        OutputError: it cannot be read, or is no such text.
+    """
+    content = read_input(path, what="a text", n_bytes_max=TEXT_BYTES_MAX, error=OutputError)
+    try:
+        return content.decode("utf-8", errors="strict" if strict else "replace")
+    except UnicodeDecodeError as error:
+        raise OutputError(expected(str(path), "", "UTF-8 text", f"another byte at offset {error.start}")) from None
+
+
+def _read_most(file: IO[bytes], n_bytes_max: int) -> bytes:
+    """Read a file, or a little more of it than it may have; piece by piece, since what is asked for takes memory."""
+    pieces, n_bytes = [], 0
+    while n_bytes <= n_bytes_max and (piece := file.read(PIECE_BYTES)):
+        pieces.append(piece)
+        n_bytes += len(piece)
+    return b"".join(pieces)
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Open a file; a pipe that nobody writes to must not hold it up."""
+    return os.open(path, flags | os.O_NONBLOCK)
+
+
+SCRATCH: Final = ".fireworld-"
+"""What the names of scratch folders begin with; after a kill they can be removed."""
+PLACE_TRIES: Final = 100
 
 
 def check_output(path: Path, *, force: bool = False, endings: Collection[str] = ()) -> None:
@@ -22,17 +112,20 @@ def check_output(path: Path, *, force: bool = False, endings: Collection[str] = 
     Raises:
         OutputError: it exists, it is no regular file, its ending is another, or there is no folder for it.
     """
-    if endings and path.suffix.lower() not in endings:
-        raise OutputError(expected(str(path), "", f"a file ending in {', '.join(endings)}", path.suffix or "no ending"))
-    _check_parent(path)
-    if path.is_dir():
-        raise OutputError(expected(str(path), "", "the name of a file", "a folder"))
-    if path.is_symlink() or (path.exists() and not path.is_file()):
-        raise OutputError(expected(str(path), "", "the name of a regular file", "a link or a device"))
-    if path.exists() and not force:
-        raise OutputError(
-            expected(str(path), "", "a name that is free", "an existing file", "use --force to replace it")
-        )
+    with _output_errors(path):
+        if endings and path.suffix.lower() not in endings:
+            raise OutputError(
+                expected(str(path), "", f"a file ending in {', '.join(endings)}", path.suffix or "no ending")
+            )
+        _check_parent(path)
+        if path.is_dir():
+            raise OutputError(expected(str(path), "", "the name of a file", "a folder"))
+        if path.is_symlink() or (path.exists() and not path.is_file()):
+            raise OutputError(expected(str(path), "", "the name of a regular file", "a link or a device"))
+        if path.exists() and not force:
+            raise OutputError(
+                expected(str(path), "", "a name that is free", "an existing file", "use --force to replace it")
+            )
 
 
 def check_outputs(paths: Sequence[Path], *, force: bool = False, inputs: Sequence[Path] = ()) -> None:
@@ -65,11 +158,11 @@ def check_folder(folder: Path, *, own: Collection[str], force: bool = False) -> 
     Raises:
         OutputError: it exists, it is no folder, it holds something else, or there is no folder for it.
     """
-    _check_parent(folder)
-    if not folder.exists() and not folder.is_symlink():
-        return
-    is_folder = folder.is_dir() and not folder.is_symlink()
     with _output_errors(folder):
+        _check_parent(folder)
+        if not folder.exists() and not folder.is_symlink():
+            return
+        is_folder = folder.is_dir() and not folder.is_symlink()
         found = sorted(path.name for path in folder.iterdir()) if is_folder else [folder.name]
     foreign = [name for name in found if name not in own or not is_folder]
     if foreign:
@@ -105,15 +198,37 @@ def written_beside(path: Path) -> Iterator[Path]:
     Raises:
         OutputError: it cannot be written.
     """
-    path = path.absolute()  # whoever works meanwhile may change the current folder
     with _output_errors(path):
-        scratch = Path(tempfile.mkdtemp(prefix=".fireworld-", dir=path.parent))
+        path = path.absolute()  # whoever works meanwhile may change the current folder
+        scratch = path.parent / f"{SCRATCH}{secrets.token_hex(8)}"
         partial = scratch / path.name
         try:
+            scratch.mkdir(0o700)  # in here, so that an interrupt right after it leaves none
             yield partial
             partial.replace(path)
         finally:
-            shutil.rmtree(scratch, ignore_errors=True)
+            _remove(scratch)
+
+
+def give_name(partial: Path, path: Path, *, free: bool) -> None:
+    """Give a file its final name; if the name must be free, of many that do so at the same time one succeeds.
+
+    Raises:
+        OutputError: the name is taken.
+        OSError: another fault of the output.
+    """
+    if not free:
+        partial.replace(path)
+        return
+    try:
+        path.hardlink_to(partial)
+    except FileExistsError:
+        check_output(path)
+    except OSError:  # a file system without links
+        check_output(path)
+        partial.replace(path)
+        return
+    partial.unlink()
 
 
 @contextmanager
@@ -125,32 +240,68 @@ def new_folder(folder: Path, *, own: Collection[str], force: bool = False) -> It
     Raises:
         OutputError: it cannot be written.
     """
-    partial, replaced = (folder.with_name(folder.name + suffix) for suffix in (".partial", ".replaced"))
     with _output_errors(folder):
+        folder = folder.absolute()
         check_folder(folder, own=own, force=force)
-        for leftover in (partial, replaced):
-            check_folder(leftover, own=own, force=True)
-            shutil.rmtree(leftover, ignore_errors=True)
-        partial.mkdir()
+        scratch = folder.parent / f"{SCRATCH}{secrets.token_hex(8)}"
+        partial = scratch / folder.name
         try:
+            scratch.mkdir(0o700)
+            partial.mkdir()
             yield partial
-            if folder.exists():
+            _take_place(partial, folder, scratch, own=own, force=force)
+        finally:
+            _remove(scratch)
+
+
+def _take_place(partial: Path, folder: Path, scratch: Path, *, own: Collection[str], force: bool) -> None:
+    """Give a folder its name; others may do the same at the same time, and the last one wins whole."""
+    for number in range(PLACE_TRIES):
+        replaced = scratch / f"replaced-{number}"
+        try:
+            check_folder(folder, own=own, force=force)
+            with suppress(FileNotFoundError):
                 folder.rename(replaced)
             partial.rename(folder)
-            shutil.rmtree(replaced, ignore_errors=True)
-        except BaseException:
+        except BaseException as error:
             if replaced.exists() and not folder.exists():
                 replaced.rename(folder)
-            raise
-        finally:
-            shutil.rmtree(partial, ignore_errors=True)
+            if not isinstance(error, OSError) or error.errno not in {errno.ENOTEMPTY, errno.EEXIST}:
+                raise
+        else:
+            return
+    raise OutputError(f"{folder}: cannot be written: others write it at the same time; try another name")
 
 
-def write_file(path: Path, data: bytes) -> None:
-    """Write a file, beside and renamed.
+@contextmanager
+def same_folder() -> Iterator[None]:
+    """Come back to the current folder at the end, wherever users' code has gone, if it is still there."""
+    try:
+        before = Path.cwd()
+    except OSError:
+        before = None
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            if before is not None and Path.cwd() != before:
+                os.chdir(before)
+
+
+def _remove(scratch: Path) -> None:
+    """Remove a folder, all of it even if an interrupt comes meanwhile."""
+    try:
+        shutil.rmtree(scratch, ignore_errors=True)
+    except BaseException:
+        shutil.rmtree(scratch, ignore_errors=True)
+        raise
+
+
+def write_file(path: Path, data: bytes | str) -> None:
+    """Write a file, beside and renamed; a text as UTF-8, with any bytes of names in it as Python writes them.
 
     Raises:
         OutputError: it cannot be written.
     """
     with written_beside(path) as partial:
-        partial.write_bytes(data)
+        partial.write_bytes(data if isinstance(data, bytes) else data.encode("utf-8", "backslashreplace"))

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import _thread
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Event
+from types import FrameType
+from typing import Final
+
+AGAIN_SECONDS: Final = 0.01
+_lost: Final = Event()
 
 
 class Interrupted(KeyboardInterrupt):
@@ -17,6 +23,38 @@ def end_like_ctrl_c() -> None:
     """Let SIGTERM, by which CI systems and `timeout` end a process, do what Ctrl-C does."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)
+        _lost.clear()
+
+
+def once_more() -> None:
+    """Send Ctrl-C again, in a moment: it came where Python lets nothing raise, in a finalizer."""
+    _lost.set()
+    timer = threading.Timer(AGAIN_SECONDS, _send)
+    timer.daemon = True
+    timer.start()
+
+
+def no_more() -> None:
+    """Send no Ctrl-C again: the program is at its end."""
+    _lost.clear()
+
+
+def _send() -> None:
+    if _lost.is_set():
+        _lost.clear()
+        _thread.interrupt_main()
+
+
+def was_interrupted(error: BaseException) -> bool:
+    """Return whether an error is what others made of Ctrl-C: compiled code, or a library under import, say."""
+    seen: set[int] = set()
+    cause: BaseException | None = error
+    while cause is not None and id(cause) not in seen:
+        if isinstance(cause, KeyboardInterrupt):
+            return True
+        seen.add(id(cause))
+        cause = cause.__cause__ or cause.__context__
+    return False
 
 
 @contextmanager
@@ -49,3 +87,50 @@ def gentle_interrupt(asked: Event | None = None) -> Iterator[Event]:
     finally:
         for one in numbers:
             signal.signal(one, previous)
+
+
+class Postponed:
+    """Ctrl-C that has to wait: foreign code is under way that would swallow it, or fail in other ways."""
+
+    def __init__(self) -> None:
+        self._previous: dict[int, Callable[[int, FrameType | None], object]] = {}
+        self._asked: list[int] = []
+
+    @contextmanager
+    def __call__(self) -> Iterator[None]:
+        """Keep signals back until the end, or until `let_through` is called."""
+        if self._previous or threading.current_thread() is not threading.main_thread():
+            yield  # within another such stretch; or in a thread, which gets no signals
+            return
+        for number in (signal.SIGINT, signal.SIGTERM):
+            handler = signal.getsignal(number)
+            if callable(handler):
+                self._previous[number] = handler
+                signal.signal(number, self._note)
+        try:
+            yield
+        finally:
+            for kept, handler in self._previous.items():
+                signal.signal(kept, handler)
+            self._previous = {}
+            self._deliver({})
+
+    def let_through(self) -> None:
+        """Do what the signals that came meanwhile ask for; may raise KeyboardInterrupt."""
+        if self._asked and threading.current_thread() is threading.main_thread():
+            self._deliver(self._previous)
+
+    def _deliver(self, handlers: dict[int, Callable[[int, FrameType | None], object]]) -> None:
+        asked, self._asked = self._asked, []
+        for number in asked:
+            handler = handlers.get(number) or signal.getsignal(number)
+            if callable(handler):
+                handler(number, None)
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        del frame
+        self._asked.append(number)
+
+
+postponed = Postponed()
+"""The one of this process."""

@@ -6,6 +6,7 @@ policies by it, a row to `METRICS`; and if it needs an attribute that results fi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -14,6 +15,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from fireworld.records import CityRecord, Rewards, Score, StepRecord
+
+NOT_RECORDED: Final = "not recorded"
+"""What stands in the place of a number that an imported log does not have."""
 
 Values = TypeVar("Values", float, "NDArray[Any]")
 
@@ -39,9 +43,9 @@ class Outcome:
     n_civilians: int
     n_civilians_alive: int
     total_reward: float
-    """Undiscounted return of the team."""
+    """Undiscounted return of the team; NaN where it was not recorded."""
     water_used_litres: float
-    """Sprayed by all brigades."""
+    """Sprayed by all brigades; NaN where it was not recorded."""
 
     @property
     def score_share(self) -> float:
@@ -104,14 +108,27 @@ class Quantity:
     """Decimals of a mean."""
     higher_is_better: bool | None
     """None: neither is better by itself."""
-    text: Callable[[Outcome], str]
-    """Returns it as text, with its unit."""
+    wording: Callable[[Outcome], str]
+    """Returns it as text, with its unit, where it is known."""
     field: str = ""
     """Where a log has it step by step, as in "score.n_burnt_out"; empty if it only follows from other fields."""
 
+    def text(self, outcome: Outcome) -> str:
+        """Return it as text, with its unit."""
+        return self.wording(outcome) if self.is_known(outcome) else NOT_RECORDED
+
+    def is_known(self, outcome: Outcome) -> bool:
+        """Return whether the log that the outcome is of has it."""
+        value = getattr(outcome, self.name)
+        return value is None or not math.isnan(value)
+
 
 def _time(outcome: Outcome) -> str:
-    return f"{outcome.steps} steps" if outcome.completed else f"not within {outcome.steps} steps"
+    if outcome.completed:
+        return f"{outcome.steps} steps"
+    if outcome.n_burning == 0:  # a kernel continues when nothing burns any more
+        return f"nothing burns after {outcome.steps} steps"
+    return f"not within {outcome.steps} steps"
 
 
 QUANTITIES: Final = (
@@ -121,7 +138,7 @@ QUANTITIES: Final = (
         unit="",
         digits=3,
         higher_is_better=True,
-        text=lambda outcome: f"{outcome.score:.3f} of {outcome.score_max:.0f}",
+        wording=lambda outcome: f"{outcome.score:.3f} of {outcome.score_max:.0f}",
         field="score.score",
     ),
     Quantity(
@@ -130,7 +147,7 @@ QUANTITIES: Final = (
         unit="steps",
         digits=1,
         higher_is_better=False,
-        text=_time,
+        wording=_time,
     ),
     Quantity(
         name="n_burnt_out",
@@ -138,7 +155,7 @@ QUANTITIES: Final = (
         unit="buildings",
         digits=1,
         higher_is_better=False,
-        text=lambda outcome: f"{outcome.n_burnt_out} of {outcome.n_buildings} buildings",
+        wording=lambda outcome: f"{outcome.n_burnt_out} of {outcome.n_buildings} buildings",
         field="score.n_burnt_out",
     ),
     Quantity(
@@ -147,7 +164,7 @@ QUANTITIES: Final = (
         unit="buildings",
         digits=1,
         higher_is_better=False,
-        text=lambda outcome: str(outcome.n_burning),
+        wording=lambda outcome: str(outcome.n_burning),
         field="score.n_burning",
     ),
     Quantity(
@@ -156,7 +173,7 @@ QUANTITIES: Final = (
         unit="buildings",
         digits=1,
         higher_is_better=None,
-        text=lambda outcome: str(outcome.n_water_damaged),
+        wording=lambda outcome: str(outcome.n_water_damaged),
         field="score.n_water_damaged",
     ),
     Quantity(
@@ -165,7 +182,7 @@ QUANTITIES: Final = (
         unit="civilians",
         digits=2,
         higher_is_better=True,
-        text=lambda outcome: f"{outcome.n_civilians_alive} of {outcome.n_civilians}",
+        wording=lambda outcome: f"{outcome.n_civilians_alive} of {outcome.n_civilians}",
         field="score.n_civilians_alive",
     ),
     Quantity(
@@ -174,7 +191,7 @@ QUANTITIES: Final = (
         unit="",
         digits=0,
         higher_is_better=True,
-        text=lambda outcome: f"{outcome.total_reward:,.0f}",
+        wording=lambda outcome: f"{outcome.total_reward:,.0f}",
         field="rewards.sum_so_far",
     ),
     Quantity(
@@ -183,7 +200,7 @@ QUANTITIES: Final = (
         unit="litres",
         digits=0,
         higher_is_better=None,
-        text=lambda outcome: f"{outcome.water_used_litres:,.0f} litres",
+        wording=lambda outcome: f"{outcome.water_used_litres:,.0f} litres",
         field="score.water_used_litres",
     ),
 )

@@ -81,20 +81,28 @@ def column(
     names: tuple[str, ...] = (),
     unit: str = "",
     added: bool = False,
+    imported: bool = False,
 ) -> Any:
     """Declare a packed repeated field: a one-dimensional array, with `width` entries for each of what it is `per`.
 
     `doc` says what its numbers mean, `names` what 0, 1, 2, ... stand for; the unit is there if the field's name does
-    not end in it. A field that was `added` later is empty in recordings made before, and so by default.
+    not end in it. A field that was `added` later is empty in recordings made before, and so by default; one of
+    `imported` logs is empty in all others, which do not declare it.
     """
     metadata = {"number": number, "wire": wire, "doc": doc, "unit": unit, "per": per, "width": width, "names": names}
-    return field(metadata=metadata, default_factory=lambda: np.zeros(0)) if added else field(metadata=metadata)
+    metadata |= {"imported": True} if imported else {}
+    optional = added or imported
+    return field(metadata=metadata, default_factory=lambda: np.zeros(0)) if optional else field(metadata=metadata)
 
 
 def value(number: int, wire: Wire, doc: str, *, unit: str = "", added: bool = False) -> Any:
     """Declare a single value, with its unit where its name does not end in it; a text that was `added` is "" before."""
     metadata = {"number": number, "wire": wire, "doc": doc, "unit": unit}
     return field(metadata=metadata, default="") if added else field(metadata=metadata)
+
+
+_IF_ANY: Final = {"if_any": True}
+"""Of a text that is written only where it is not empty, so that the headers of other logs are what they were."""
 
 
 @dataclass(frozen=True)
@@ -112,8 +120,34 @@ class RunHeader:
     """Digest and step of the recording this run branched off, "" for a run of its own."""
     simulator_digest: str = ""
     """Of the sources of all that computed the run, "" where nobody wrote it down."""
+    origin: str = field(default="", metadata=_IF_ANY)
+    """What an imported log was made from, "" for a run of fireworld."""
+    not_recorded: str = field(default="", metadata=_IF_ANY)
+    """Topics, and fields as in "buildings.energy", that an imported log does not have; separated by commas."""
     attachments: Mapping[str, bytes] = field(default_factory=dict)
     """Files that a replay needs, by name: scenario.yaml always, city.json, policy.npz where used."""
+
+    @property
+    def imported(self) -> bool:
+        """Whether this is the log of another program, which has no decisions to replay."""
+        return self.origin != ""
+
+    @property
+    def title(self) -> str:
+        """Scenario, policy and, if it is known, seed."""
+        seed = "" if self.lacks("seed") else f", seed {self.seed}"
+        return f"{self.scenario}, {self.policy}{seed}"
+
+    def lacks(self, name: str) -> bool:
+        """Return whether a field, as in "buildings.energy", a topic, or the "seed" was not recorded."""
+        absent = absent_names(self.not_recorded)
+        return name in absent or name.partition(".")[0] in absent
+
+
+@cache
+def absent_names(not_recorded: str) -> frozenset[str]:
+    """Return the names in the text of `RunHeader.not_recorded`."""
+    return frozenset(name for name in not_recorded.replace(" ", "").split(",") if name)
 
 
 @dataclass(frozen=True)
@@ -269,6 +303,14 @@ class Civilians:
     topic: ClassVar[str] = "/civilians"
     hp: Array = column(1, "sfixed32", "health points, 0 dead", per="civilian", unit="health points")
     damage: Array = column(2, "double", "health points lost per step", per="civilian", unit="health points per step")
+    x_m: Array = column(3, "double", "position, x; imported logs only", per="civilian", imported=True)
+    y_m: Array = column(4, "double", "position, y; imported logs only", per="civilian", imported=True)
+    in_building: Array = column(
+        5, "sfixed32", "building a civilian is in, -1 elsewhere; imported logs only", per="civilian", imported=True
+    )
+    buriedness: Array = column(
+        6, "sfixed32", "how deep a civilian is buried, 0 free; imported logs only", per="civilian", imported=True
+    )
 
 
 @dataclass(frozen=True)
@@ -481,8 +523,7 @@ class RecordingBase(ABC):
         return len(self.steps)
 
     def __repr__(self) -> str:
-        header = self.header
-        return f"<{type(self).__name__}: {header.scenario}, {header.policy}, seed {header.seed}, {len(self)} steps>"
+        return f"<{type(self).__name__}: {self.header.title}, {len(self)} steps>"
 
 
 class MemoryRecording(RecordingBase):

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from fireworld.city.city import Int32Array, Int64Array, StreetMap, Streets
+from fireworld.errors import CityError, expected
+
+NODES_MAX: Final = 1_000_000
+"""As many nodes as cities of half a million buildings have, and more."""
 
 
 def streets_of(street_map: StreetMap, centroid_mm: Int32Array) -> Streets:
@@ -29,6 +33,12 @@ def streets_of(street_map: StreetMap, centroid_mm: Int32Array) -> Streets:
         access_offset_mm=access_offset,
         access_mm=access_mm.astype(np.int32),
     )
+
+
+def check_nodes(n_nodes: int, *, where: str = "city") -> None:
+    """Raise CityError for a map of more nodes than a city can have."""
+    if n_nodes > NODES_MAX:
+        raise CityError(expected(where, "streets", f"at most {NODES_MAX} nodes", n_nodes))
 
 
 def _access_points(

@@ -11,15 +11,14 @@ import numpy as np
 
 from fireworld.city.city import Plan
 from fireworld.city.formats import read_plan
-from fireworld.errors import CityError, expected
+from fireworld.errors import CityError
+from fireworld.files import read_input
+from fireworld.scenario.scenario import CITY_BYTES_MAX
 
 
 def load_plan(path: Path) -> Plan:
     """Read the plan of a city from its file; CityError if it cannot be read or makes no city."""
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise CityError(expected(str(path), "", "a city file that can be read", error.strerror or str(error))) from None
+    content = read_input(path, what="a city file", n_bytes_max=CITY_BYTES_MAX, error=CityError)
     return read_plan(content, file=path, where=str(path))
 
 

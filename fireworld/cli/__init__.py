@@ -28,6 +28,7 @@ COMMANDS: Final = {
     "verify": "Replay a recording and compare every step.",
     "export": "Write a recording as tables for data tools.",
     "golden": "Run golden recordings again and compare.",
+    "import-log": "Make a recording of an official kernel's log.",
     "recover": "Rescue the committed steps of a damaged recording.",
     "view": "Open recordings in Rerun.",
     "render": "Draw recordings: pictures, strips, films.",
@@ -50,7 +51,7 @@ class LazyGroup(click.Group):
         del ctx
         if cmd_name not in COMMANDS:
             return None
-        module = importlib.import_module(f"fireworld.cli.{cmd_name}")
+        module = importlib.import_module(f"fireworld.cli.{cmd_name.replace('-', '_')}")
         return _with_debug(module.command)
 
     def invoke(self, ctx: click.Context) -> object:
@@ -86,14 +87,16 @@ root.params.append(DEBUG)
 def main() -> None:
     """Run the command line; an error ends in one line and exit code 2, one of fireworld's own too, Ctrl-C in 130."""
     from fireworld.errors import FireworldError, described
-    from fireworld.interrupt import end_like_ctrl_c
+    from fireworld.interrupt import end_like_ctrl_c, no_more, was_interrupted
     from fireworld.stdout import StandardOutputError, be_patient, leave
 
-    end_like_ctrl_c()
-    be_patient()
     try:
+        end_like_ctrl_c()
+        _say_what_is_ignored()
+        be_patient()
         code = root.main(standalone_mode=False)
-        sys.stdout.flush()
+        if sys.stdout is not None:
+            sys.stdout.flush()
     except FireworldError as error:
         code = _show(error, str(error))
     except click.ClickException as error:
@@ -104,20 +107,63 @@ def main() -> None:
         code = INTERRUPTED
     except StandardOutputError as error:
         code = _show(error, f"standard output: cannot be written: {error}")
-    except Exception as error:  # noqa: BLE001 - a fault of fireworld's own: never the exit code of a verdict
-        code = _show(error, f"internal error: {described(error)}; run it again with --debug")
+    except OSError as error:  # of a file that somebody named: its name is too long, say
+        code = _show(error, _of_a_file(error) or f"internal error: {described(error)}; run it again with --debug")
+    except BaseException as error:
+        if isinstance(error, SystemExit) and "_FIREWORLD_COMPLETE" in os.environ:
+            raise
+        if was_interrupted(error):
+            click.echo("interrupted", err=True)
+            code = INTERRUPTED
+        else:
+            code = _show(error, f"internal error: {described(error)}; run it again with --debug")
+    no_more()
     leave()
     sys.exit(code)
 
 
-def _show(error: Exception, line: str) -> int:
+def _say_what_is_ignored() -> None:
+    """Let what users' code raises in threads and finalizers, where nobody catches it, be a line too."""
+    import threading
+
+    from fireworld.errors import described
+    from fireworld.interrupt import once_more
+
+    def warn(error: BaseException | None, where: str) -> None:
+        if isinstance(error, KeyboardInterrupt):
+            once_more()
+        elif error is not None and not isinstance(error, SystemExit):
+            _trace(error)
+            click.echo(f"warning: what {where} raised is ignored: {described(error)}", err=True)
+
+    if sys.unraisablehook is sys.__unraisablehook__:
+        sys.unraisablehook = lambda fault: warn(fault.exc_value, "a finalizer")
+    if threading.excepthook is threading.__excepthook__:
+        threading.excepthook = lambda fault: warn(fault.exc_value, "a thread")
+
+
+def _of_a_file(error: OSError) -> str:
+    """Return the line of a file's error, "" if it is not a file's."""
+    from fireworld.errors import one_line
+
+    if not isinstance(error.filename, str | bytes | os.PathLike):
+        return ""
+    return one_line(f"{os.fsdecode(error.filename)}: {error.strerror}; try another name or folder")
+
+
+def _show(error: BaseException, line: str) -> int:
     """Write the line of an error, with --debug also its traceback; return the exit code."""
+    _trace(error)
+    click.echo(f"fireworld: {line}", err=True)
+    return USER_ERROR
+
+
+def _trace(error: BaseException) -> None:
+    """Write the traceback of an error, if it is asked for."""
     if "--debug" in sys.argv or os.environ.get("FIREWORLD_DEBUG", "0") not in {"", "0"}:
         import traceback
 
         traceback.print_exception(error)
-    click.echo(f"fireworld: {line}", err=True)
-    return USER_ERROR
 
 
 def _with_debug(command: click.Command) -> click.Command:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Final
 
@@ -94,7 +94,7 @@ def command(
         raise click.UsageError("--force goes with --junit or --plot.")
     from fireworld.evaluation.compare import compare
     from fireworld.executors import n_cores
-    from fireworld.files import check_output, check_outputs, write_file
+    from fireworld.files import check_output, check_outputs, written_beside
     from fireworld.scenario import split_settings
     from fireworld.scenario.yaml_text import read_yaml
 
@@ -118,10 +118,11 @@ def command(
         )
     for warning in comparison.warnings:
         click.echo(warning, err=True)
-    if junit is not None:
-        write_file(junit, comparison.junit())
-    if plot is not None:
-        comparison.save_figure(plot, force=force)
+    with ExitStack() as both:  # or none
+        if junit is not None:
+            both.enter_context(written_beside(junit)).write_bytes(comparison.junit())
+        if plot is not None:
+            comparison.save_figure(plot, force=force)
     if as_json:
         click.echo(json.dumps(comparison.to_dict(gate=gate), indent=2))
     else:

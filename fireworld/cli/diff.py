@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -14,6 +15,8 @@ from fireworld.cli.tables import print_blocks
 
 if TYPE_CHECKING:
     from fireworld_recorder.diff import RunComparison
+
+    from fireworld.recording.difference import Difference
 
 
 @click.command()
@@ -74,7 +77,7 @@ def command(
 
     Exit code: 0 the same, 1 different, 2 could not compare (no file is written).
     """
-    from fireworld.files import check_outputs, write_file
+    from fireworld.files import check_outputs
     from fireworld.recording.difference import diff
     from fireworld.recording.inputs import is_training
 
@@ -100,12 +103,7 @@ def command(
     for run, name in zip(difference.runs, difference.names, strict=True):
         if run.damage is not None:
             click.echo(f"{name}: {run.damage}; nothing is compared beyond", err=True)
-    if junit is not None:  # before anything is printed: a reader of the output may leave early
-        write_file(junit, difference.junit())
-        click.echo(f"wrote {junit}", err=True)
-    if html is not None:
-        difference.save_html(html, force=force)
-        click.echo(f"wrote {html}; open it in a browser", err=True)
+    _write(difference, junit=junit, html=html, force=force)
     if as_json:
         click.echo(json.dumps(difference.to_dict(), indent=2))
     elif difference.known_same and not outputs:
@@ -113,6 +111,21 @@ def command(
     else:
         show_difference(difference.found, names=difference.names)
     context.exit(0 if difference.same else 1)
+
+
+def _write(difference: Difference, *, junit: Path | None, html: Path | None, force: bool) -> None:
+    """Write the outputs that were asked for, both or none, before anything is printed: a reader may leave early."""
+    from fireworld.files import written_beside
+
+    with ExitStack() as both:
+        if junit is not None:
+            both.enter_context(written_beside(junit)).write_bytes(difference.junit())
+        if html is not None:
+            difference.save_html(html, force=force)
+    if junit is not None:
+        click.echo(f"wrote {junit}", err=True)
+    if html is not None:
+        click.echo(f"wrote {html}; open it in a browser", err=True)
 
 
 def _diff_trainings(

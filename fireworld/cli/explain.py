@@ -9,7 +9,7 @@ from typing import Final
 import click
 
 from fireworld.cli import INTERRUPTED
-from fireworld.cli.compiling import announce_compilation
+from fireworld.cli.opening import open_to_replay
 from fireworld.cli.progress import BAR, ELAPSED, bar
 from fireworld.cli.tables import print_table
 
@@ -52,12 +52,12 @@ def command(context: click.Context, *, first: Path, second: Path, budget: int, l
     Exit code: 0 explained, or the scores are equal; 2 could not explain (another scenario or seed, a run that has not
     ended, a recording that does not replay); 130 interrupted (what is known so far is shown).
     """
-    announce_compilation()
+    runs = [open_to_replay(path) for path in (first, second)]
     from fireworld.recording.explain import explain
     from fireworld.recording.explanation.text import HEADS, closing_lines, opening_lines, rows
 
     with bar("explain", budget, REPLAYS, BAR, ELAPSED) as advance:
-        explanation = explain(first, second, budget=budget, on_replay=advance)
+        explanation = explain(*runs, budget=budget, on_replay=advance)
     if as_json:
         click.echo(json.dumps(explanation.to_dict(), indent=2))
     else:

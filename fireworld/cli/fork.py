@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from fireworld.cli import INTERRUPTED
-from fireworld.cli.compiling import announce_compilation
+from fireworld.cli.opening import open_to_replay
 from fireworld.cli.options import record_options
 
 
@@ -75,12 +75,12 @@ def command(
     """
     if force and output is None:
         raise click.UsageError("--force goes with --record.")
-    announce_compilation()
+    recorded = open_to_replay(log)
     from fireworld.cli.run import play_and_watch
     from fireworld.recording.fork import prepare_fork
 
     run = prepare_fork(
-        log,
+        recorded,
         at=at,
         policy=policy,
         decide=_by_brigade(

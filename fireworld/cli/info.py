@@ -146,15 +146,18 @@ def _show(log: Log, summary: dict[str, Any]) -> None:
 
     header, steps = summary["header"], summary["steps"]
     span = f"{steps['n']}, from {steps['first']} to {steps['last']}" if steps["n"] else "none"
+    seed = "" if log.header.lacks("seed") else f", seed {header['seed']}"
+    most = f", of at most {header['n_steps_max']}" if log.header.n_steps_max else ""
     lines = {
         "recording": f"{log.path}, {summary['n_bytes']:,} bytes, {summary['format']}",
         "state": summary["damage"] or "complete",
-        "scenario": f"{header['scenario']} ({header['scenario_digest'][:12]}), seed {header['seed']}",
-        "policy": f"{header['policy']} ({header['policy_digest'][:12]})",
+        "scenario": f"{header['scenario']} ({header['scenario_digest'][:12]}){seed}",
+        "policy": header["policy"] + (f" ({header['policy_digest'][:12]})" if header["policy_digest"] else ""),
+        "origin": header.get("origin", ""),
         "fireworld": simulator_version(header["fireworld_version"], header["simulator_digest"]),
         "forked from": header["forked_from"],
         "digest": summary["digest"],
-        "steps": f"{span}, of at most {header['n_steps_max']}; {summary['ending']}",
+        "steps": f"{span}{most}; {summary['ending']}",
         "city": f"{log.city.name}: {summary['n_buildings']} buildings, {summary['n_brigades']} brigades,"
         f" {summary['n_civilians']} civilians",
         "map by": log.city.attribution,
@@ -162,6 +165,7 @@ def _show(log: Log, summary: dict[str, Any]) -> None:
     if steps["n"]:
         outcome = final_outcome(log)
         lines["outcome"] = ", ".join(f"{quantity.label} {quantity.text(outcome)}" for quantity in QUANTITIES)
+    lines["not recorded"] = header.get("not_recorded", "")
     lines["snapshots"] = ", ".join(map(str, summary["snapshots"])) or "none"
     lines["attachments"] = ", ".join(f"{name} ({n} bytes)" for name, n in summary["attachments"].items()) or "none"
     for label, text in lines.items():

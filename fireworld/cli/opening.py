@@ -45,6 +45,22 @@ def open_trainings(paths: Sequence[Path], *, doing: str) -> list[TrainingLog]:
     return logs
 
 
+def open_to_replay(path: Path) -> Log:
+    """Open a log that is to be replayed; then it may be announced that kernels are compiled.
+
+    Raises:
+        LogError: it is not a log, is cut off or damaged, or was imported and cannot be replayed.
+    """
+    from fireworld_recorder import reader
+
+    from fireworld.recording.inputs import check_replayable
+
+    log = reader.open_log(path)
+    check_replayable(log)
+    announce_compilation()
+    return log
+
+
 def open_one_or_two(paths: Sequence[Path], *, doing: str) -> list[Log]:
     """Open logs as far as they are good; where that is not to the end, print so and what is done with the rest.
 

@@ -45,7 +45,10 @@ def command(
         raise click.UsageError("Give either --episode or --every.")
     if episode is not None and scenario is None:
         raise click.UsageError("--episode needs --scenario.")
-    announce_compilation()
+    from fireworld_recorder.source import noun_of
+
+    if noun_of(log) == "training":  # else the error is the only line
+        announce_compilation()
     from fireworld.training.log.episode_run import replay_episode, replay_every
 
     if episode is not None and scenario is not None:

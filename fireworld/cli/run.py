@@ -127,8 +127,7 @@ class Ending:
         from fireworld.errors import one_line
         from fireworld.outcome import QUANTITIES
 
-        header = self.header
-        title = one_line(f"{header.scenario}, {header.policy}, seed {header.seed}")
+        title = one_line(self.header.title)
         table = Table(title=Text(title), show_header=False)
         table.add_column(style="bold")
         table.add_column(justify="right", overflow="fold")

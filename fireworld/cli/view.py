@@ -82,12 +82,17 @@ def command(
         view_trainings(trainings, save=output, force=force, web=web, port=port, announce=_announce)
         _say_written(output)
         return
+    runs = open_one_or_two(logs, doing="showing")
     if air:
+        from fireworld.recording.inputs import check_replayable
+
+        for run in runs:
+            check_replayable(run)
         announce_compilation()
     from fireworld.recording.pages.view import view
 
     view(
-        open_one_or_two(logs, doing="showing"),
+        runs,
         save=output,
         force=force,
         web=web,

@@ -2,28 +2,20 @@
 
 from __future__ import annotations
 
-import lzma
-import struct
-import tokenize
-import warnings
-import zipfile
-import zlib
+import io
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Never
+from typing import Final, Never
 
 import numpy as np
 
 from fireworld.city.city import Array, Float64Array, Int64Array
 from fireworld.errors import TraceError, expected
+from fireworld.files import read_input
+from fireworld.npz import ArchiveError, read_npz
 
-SHAPED: Final = "a file with arrays (.npz)"
-UNREADABLE: Final = (
-    ValueError, EOFError, LookupError, TypeError, MemoryError, OverflowError, RuntimeError, SyntaxError,
-    zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, tokenize.TokenError,
-)  # fmt: skip
-"""What zipfile and numpy raise on damaged, encrypted or malicious files."""
+N_BYTES_MAX: Final = 1 << 30
 
 
 @dataclass(frozen=True)
@@ -104,34 +96,8 @@ class Arrays:
 
 def read_arrays(path: Path, keys: Iterable[str]) -> Arrays:
     """Read those of the named arrays that a file has; others stay unread. Nothing in a file is ever executed."""
-    where = str(path)
+    content = read_input(path, what="a file that can be read", n_bytes_max=N_BYTES_MAX, error=TraceError)
     try:
-        with path.open("rb") as file:
-            stored = _opened(where, file)
-            return Arrays(where, {key: _member(where, stored, key) for key in keys if key in stored.files})
-    except OSError as error:
-        raise TraceError(expected(where, "", "a file that can be read", error.strerror or str(error))) from None
-
-
-def _opened(where: str, file: Any) -> Any:
-    """Open the archive."""
-    try:
-        archive = np.load(file, allow_pickle=False)
-    except UNREADABLE:
-        raise TraceError(expected(where, "", SHAPED, "a damaged one or something else")) from None
-    if not isinstance(archive, np.lib.npyio.NpzFile):
-        raise TraceError(expected(where, "", SHAPED, "a single array (.npy)"))
-    return archive
-
-
-def _member(where: str, archive: Any, key: str) -> Array:
-    """Read one array."""
-    try:
-        with warnings.catch_warnings(action="ignore"):  # arrays written by Python 2
-            found = archive[key]
-    except UNREADABLE as error:
-        got = "objects, which may hide programs" if "Object arrays" in str(error) else "a damaged one"
-        raise TraceError(expected(where, key, "an array of numbers or text", got)) from None
-    if not isinstance(found, np.ndarray):
-        raise TraceError(expected(where, key, "an array of numbers or text", "a file of another kind"))
-    return found
+        return Arrays(str(path), read_npz(io.BytesIO(content), set(keys)))
+    except ArchiveError as error:
+        raise TraceError(expected(str(path), error.key, error.wanted, error.got)) from None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +12,9 @@ from typing import Any, Final
 from fireworld.city.city import Plan
 from fireworld.city.fields import Fields
 from fireworld.city.formats.json_plan import COORDINATE_MAX_MM, ID_MAX, parse_plan
-from fireworld.errors import CityError, expected
+from fireworld.errors import CityError
+from fireworld.files import read_input
+from fireworld.scenario.scenario import CITY_BYTES_MAX
 
 STEP_MAX: Final = 100_000
 POURED_MAX_LITRES: Final = 1_000_000
@@ -65,10 +67,7 @@ class CityFile:
 
 def load_city_file(path: Path) -> CityFile:
     """Read a city file; CityError if it makes no city, or names something that the city does not have."""
-    try:
-        text = path.read_bytes()
-    except OSError as error:
-        raise CityError(expected(str(path), "", "a city file that can be read", error.strerror or str(error))) from None
+    text = read_input(path, what="a city file that can be read", n_bytes_max=CITY_BYTES_MAX, error=CityError)
     plan = parse_plan(text, where=str(path), name=path.stem)
     return CityFile(str(path), plan, _Reader(Fields(str(path), "", json.loads(text)), plan).inputs())
 
@@ -89,8 +88,9 @@ class _Reader:
         """Read everything."""
         rows = self._rows("brigades", "id", "x", "y", "pos", "water")
         taken = [row.integer("id", low=0, high=ID_MAX) for row in rows]
+        times = Counter(taken)
         for row, identifier in zip(rows, taken, strict=True):
-            if taken.count(identifier) > 1:
+            if times[identifier] > 1:
                 row.refuse("id", "an identifier of its own", identifier)
         self._brigade = {identifier: index for index, identifier in enumerate(sorted(taken))}
         rows.sort(key=lambda row: self._brigade[row.value["id"]])

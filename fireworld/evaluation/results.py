@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from fireworld.errors import OutputError, expected
 from fireworld.evaluation.runs import KINDS, Row
-from fireworld.files import write_file
+from fireworld.files import read_input, write_file
 
 FORMAT: Final = "fireworld-results/1"
 KEYS: Final[dict[str, type]] = {
@@ -22,6 +22,11 @@ KEYS: Final[dict[str, type]] = {
     "version": str,
 }
 """The first columns: which run it is. `outcome.COLUMNS` follow: how it came out."""
+N_BYTES_MAX: Final = 1 << 28
+N_ROWS_FREE: Final = 100_000
+ROW_BYTES_MIN: Final = 4
+"""A file of n bytes may hold that many rows more than n / 4: each takes more than 4 bytes, packed."""
+UNPACKED_BYTES_MAX: Final = 1 << 29
 N_FIRST: Final = 14
 """Columns of the first version, none of which may be empty; a later one is, in a row that is older."""
 
@@ -100,13 +105,16 @@ def read_results(path: Path) -> dict[RunKey, Result]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    content = read_input(path, what="a file of results", n_bytes_max=N_BYTES_MAX, error=OutputError)
     try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise _not_results(path, error.strerror or str(error)) from None
-    try:
-        with pq.ParquetFile(pa.BufferReader(content), page_checksum_verification=True) as file:
-            table = file.read()
+        data = pa.BufferReader(content)
+        schema = pq.read_schema(data)
+        texts = [name for name in schema.names if KEYS.get(name) is str]  # few different ones, again and again
+        with pq.ParquetFile(data, page_checksum_verification=True, read_dictionary=texts) as file:
+            _check_size(path, len(content), file.metadata)
+            table = _written_out(path, file.read(), schema)
+    except OutputError:
+        raise
     except Exception as error:  # noqa: BLE001 - pyarrow raises many kinds for a damaged file
         raise _not_results(path, " ".join(str(error).split())) from None
     wanted = _schema(len(table.schema))
@@ -121,6 +129,30 @@ def read_results(path: Path) -> dict[RunKey, Result]:
         if known.row != tuple(values):
             raise _not_results(path, f"two outcomes of {scenario}, {policy}, seed {seed}")
     return results
+
+
+def _check_size(path: Path, n_bytes: int, metadata: Any) -> None:
+    """Raise OutputError for a table that claims more than such a file holds, before it is unpacked."""
+    n_rows_max = N_ROWS_FREE + n_bytes // ROW_BYTES_MIN
+    if metadata.num_rows > n_rows_max:
+        raise _not_results(path, f"{metadata.num_rows} rows in {n_bytes} bytes, where {n_rows_max} are the most")
+    unpacked = sum(metadata.row_group(index).total_byte_size for index in range(metadata.num_row_groups))
+    if unpacked > UNPACKED_BYTES_MAX:
+        raise _not_results(path, f"{unpacked} bytes of rows, where {UNPACKED_BYTES_MAX} are the most")
+
+
+def _written_out(path: Path, table: Any, schema: Any) -> Any:
+    """Return a table with its texts written out, not as numbers of a list; OutputError for more than results have."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    n_bytes = 0
+    for column in table.columns:
+        for chunk in column.chunks if pa.types.is_dictionary(column.type) else ():
+            n_bytes += pc.sum(pc.take(pc.binary_length(chunk.dictionary), chunk.indices)).as_py() or 0
+    if n_bytes > UNPACKED_BYTES_MAX:
+        raise _not_results(path, f"{n_bytes} bytes of text, where {UNPACKED_BYTES_MAX} are the most")
+    return table.cast(schema)
 
 
 def _write(results: dict[RunKey, Result]) -> bytes:

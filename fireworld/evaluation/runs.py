@@ -12,6 +12,7 @@ from typing import Any, Final, get_type_hints
 import numpy as np
 
 from fireworld.executors import Workers
+from fireworld.files import same_folder
 from fireworld.interrupt import Interrupted
 from fireworld.kernels.arrays import Array
 from fireworld.outcome import COLUMNS, Outcome
@@ -75,10 +76,11 @@ def run_step_by_step(built: BuiltScenario, policy: Policy, *, seed: int) -> Outc
     Its decisions alone, in a world that it has never seen, must lead to the same outcome.
     """
     world, before = built.world(seed=seed), _checksum(built)
-    begin(policy, world.city_arrays, n_brigades=world.n_brigades, seed=seed)
     made = []
-    while not (world.terminated or world.truncated):
-        made.append(world.step(policy).decisions)
+    with same_folder():
+        begin(policy, world.city_arrays, n_brigades=world.n_brigades, seed=seed)
+        while not (world.terminated or world.truncated):
+            made.append(world.step(policy).decisions)
     again, decided = built.world(seed=seed), _Decided(made)
     while not (again.terminated or again.truncated):
         again.step(decided)

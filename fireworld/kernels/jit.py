@@ -2,45 +2,33 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from typing import Any, Final, NoReturn
 
 from numba import config, njit
 from numba.core.registry import CPUDispatcher
 
-OPEN: Final = os.environ.get("FIREWORLD_OPEN_KERNELS") == "1"
-"""Let Python call inner functions too. The tests do; it makes the first compilation half as long again."""
+from fireworld.interrupt import postponed, was_interrupted
+from fireworld.kernels.cache import OPEN, KernelCache
 
-# float64 as written, kept in the cache folder, without the interpreter's lock. numpy's error model, because a test for
-# zero before each division would keep loops from becoming vector instructions; no kernel divides by what can be zero.
-_how: Final = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+ROOM: Final = __name__.rpartition(".")[0] + "."
+"""Modules whose sources the name of the cache folder stands for; what is compiled elsewhere is not kept."""
 
-
-def _compiler(**more: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Return a decorator that compiles, whatever NUMBA_DISABLE_JIT says: plain Python computes other numbers."""
-
-    def decorate(function: Callable[..., Any]) -> Any:
-        before, config.DISABLE_JIT = config.DISABLE_JIT, 0
-        try:
-            return njit(**_how, **more)(function)
-        finally:
-            config.DISABLE_JIT = before
-
-    return decorate
+# float64 as written, without the interpreter's lock. numpy's error model, because a test for zero before each division
+# would keep loops from becoming vector instructions; no kernel divides by what can be zero.
+_how: Final = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
-# Without numba's runtime, `_nrt`, which counts the references to every array: that costs more than a small kernel does,
-# and a kernel makes no arrays. One that did would not compile.
-kernel = _compiler(_nrt=False)
-_closed = _compiler(_nrt=False, no_cpython_wrapper=True)
-_open_inlined = _compiler(_nrt=False, forceinline=True)
-_closed_inlined = _compiler(_nrt=False, no_cpython_wrapper=True, forceinline=True)
-making_arrays = _compiler()
-"""For the few kernels that make arrays."""
+class _Kernel(CPUDispatcher):  # type: ignore[misc]  # numba is untyped
+    """A function that is compiled when it is first called; Ctrl-C waits until LLVM is done with what it is at."""
+
+    def compile(self, sig: object) -> Any:
+        """Compile the function, or read it from the cache."""
+        with postponed():
+            return super().compile(sig)
 
 
-class _Closed(CPUDispatcher):  # type: ignore[misc]  # numba is untyped
+class _Closed(_Kernel):
     """An inner function: compiled code without the entry that Python would need, where numba itself would crash."""
 
     def __call__(self, *args: object, **kwargs: object) -> NoReturn:
@@ -48,20 +36,49 @@ class _Closed(CPUDispatcher):  # type: ignore[misc]  # numba is untyped
         raise TypeError(f"{self.py_func.__name__} is for kernels only; FIREWORLD_OPEN_KERNELS=1 opens it to Python")
 
 
-def inner(function: Callable[..., Any]) -> Any:
-    """Compile a function for other kernels alone: that spares a third of the compilation."""
-    return kernel(function) if OPEN else _close(_closed(function))
+class _MakingArrays(_Kernel):
+    """A kernel that makes arrays: Python code runs while they are handed out, and Ctrl-C may come just then."""
+
+    def __call__(self, *args: object) -> Any:
+        try:
+            return super().__call__(*args)
+        except SystemError as error:
+            if was_interrupted(error):
+                raise KeyboardInterrupt from None
+            raise
 
 
-def inlined(function: Callable[..., Any]) -> Any:
-    """Compile as `inner` does, into the code of those that call it, however long it is.
+def _compiler(kind: type[_Kernel], **more: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Return a decorator that compiles, whatever NUMBA_DISABLE_JIT says: plain Python computes other numbers."""
 
-    For what is called often and hands groups of arrays on to what is called seldom. The compiler would leave it a
-    function by itself, because of the many arrays, and to hand them over can take longer than the work.
-    """
-    return _open_inlined(function) if OPEN else _close(_closed_inlined(function))
+    def decorate(function: Callable[..., Any]) -> Any:
+        before, config.DISABLE_JIT = config.DISABLE_JIT, 0
+        try:
+            compiled = njit(**_how, **more)(function)
+        finally:
+            config.DISABLE_JIT = before
+        compiled.__class__ = kind
+        if function.__module__.startswith(ROOM):
+            compiled._cache = KernelCache(function)  # noqa: SLF001 - numba has no other way to give it a cache
+        return compiled
+
+    return decorate
 
 
-def _close(function: Any) -> Any:
-    function.__class__ = _Closed
-    return function
+# Without numba's runtime, `_nrt`, which counts the references to every array: that costs more than a small kernel does,
+# and a kernel makes no arrays. One that did would not compile.
+kernel = _compiler(_Kernel, _nrt=False)
+making_arrays = _compiler(_MakingArrays)
+"""For the few kernels that make arrays."""
+inner = kernel if OPEN else _compiler(_Closed, _nrt=False, no_cpython_wrapper=True)
+"""For functions that other kernels alone call: that spares a third of the compilation."""
+inlined = (
+    _compiler(_Kernel, _nrt=False, forceinline=True)
+    if OPEN
+    else _compiler(_Closed, _nrt=False, no_cpython_wrapper=True, forceinline=True)
+)
+"""As `inner`, but compiled into the code of those that call it, however long it is.
+
+For what is called often and hands groups of arrays on to what is called seldom. The compiler would leave it a function
+by itself, because of the many arrays, and to hand them over can take longer than the work.
+"""

@@ -4,31 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from fireworld import rewards
+from fireworld import rewards, scores
 from fireworld.kernels.arrays import SUM_SO_FAR, TOTAL, CivilianState, FireState, GeometryArrays, Outcome
 from fireworld.kernels.jit import inner, kernel
 from fireworld.rewards import Reward, Tally
 
 amounts, rewarded = inner(rewards.amounts), inner(rewards.rewarded)
 
-SAVED = np.array([1.0, 0.66, 0.33, 0.0, 0.9, 0.75, 0.5, 0.25, 0.0])
+exp_of_minus, unhealth, paper_score = inner(scores.exp_of_minus), inner(scores.unhealth), inner(scores.paper_score)
+
+SAVED = np.array(scores.SAVED)
 """Part of a building that counts as saved, by fieryness code."""
-
-
-@inner
-def exp_of_minus(x: float) -> float:
-    """Return exp(-x) for 0 <= x <= 8, to 3e-14 of it, from + - * / alone: libraries' exp differ between processors.
-
-    exp(-x) = (exp(-x/64))^64, the inner one as its power series.
-    """
-    small = x / 64.0
-    term, total = 1.0, 1.0
-    for k in range(1, 14):
-        term = -term * small / k
-        total += term
-    for _ in range(6):
-        total *= total
-    return total
 
 
 @kernel
@@ -60,9 +46,9 @@ def assess(
     counts, score = outcome.counts, outcome.score
     counts[0], counts[1], counts[2], counts[3] = n_burning, n_water_damaged, n_burnt_out, n_alive
     healthy = hp / full_hp if full_hp > 0 else 1.0
-    score[0] = (n_alive + healthy) * np.sqrt(saved / area)
+    score[0] = paper_score(n_alive, healthy, saved, area)
     score[1] = len(civilians.hp) + 1.0
-    score[2] = n_alive * exp_of_minus(5.0 * (1.0 - healthy))
+    score[2] = n_alive * exp_of_minus(unhealth(healthy))
     amount = amounts(Tally(n_burning, n_water_damaged, n_burnt_out, n_alive, hp, full_hp))
     total = 0.0
     for term in range(TOTAL):

@@ -100,11 +100,12 @@ class Adapted(Policy):
 
     def __init__(self, given: Any) -> None:
         self.given = given
-        self._choose = given.decide if isinstance(given, Policy) else given
-        for name in ("begin", "keeps", "stateless", "digest"):
-            own = getattr(given, name, None)
-            if own is not None:
-                setattr(self, name, own)
+        with users_code(given, "its attributes"):
+            self._choose = given.decide if isinstance(given, Policy) else given
+            for name in ("begin", "keeps", "stateless", "digest"):
+                own = getattr(given, name, None)
+                if own is not None:
+                    setattr(self, name, own)
 
     def decide(self, observation: Observation) -> Decision | str | int:
         """Return what the user's own answers, which may be anything."""
@@ -178,6 +179,13 @@ def changed_its_world(policy: object, seed: int) -> PolicyError:
     return PolicyError(expected(f"policy {name_of(policy)}", f"seed {seed}", wanted, "a world that it has changed"))
 
 
+def own_digest(policy: Policy) -> str:
+    """Return the digest that a policy says it has, "" for none, or what is no text; PolicyError if it cannot say."""
+    with users_code(policy, "digest"):
+        digest = policy.digest
+        return digest if isinstance(digest, str) else ""
+
+
 def name_of(policy: object) -> str:
     """Return a policy's name as on the command line: module:Class, or module:function."""
     given = policy.given if isinstance(policy, Adapted) else policy
@@ -221,6 +229,9 @@ def _checked(answer: Any, policy: Policy, observation: Observation) -> Decision:
         except (ArithmeticError, TypeError, ValueError):
             raise refusal(wanted, f"{name} {shown(value)}") from None
 
+    if inspect.iscoroutine(answer):
+        answer.close()
+        raise refusal(AN_ANSWER, "a coroutine", "decide without async")
     bare = not isinstance(answer, Decision)
     action = _action_index(answer if bare else answer.action)
     if action is None or (bare and isinstance(answer, bool)):

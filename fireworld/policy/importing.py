@@ -14,11 +14,13 @@ from types import CodeType, FunctionType, ModuleType
 from typing import Any, Final
 
 from fireworld.errors import PolicyError, expected, nearest
+from fireworld.files import read_input
 from fireworld.policy.asking import complete, users_code
 from fireworld.policy.parameter_text import Parameters, check_no_parameters, check_signature, takes
 from fireworld.policy.protocol import Policy
 
 CODE_SUFFIX: Final = ".py"
+N_BYTES_MAX: Final = 1 << 24
 _IMPORTED: Final[dict[Path, tuple[bytes, ModuleType]]] = {}
 """Files that were imported by their paths, and what was in them then."""
 
@@ -83,10 +85,10 @@ def _import_file(path: Path) -> ModuleType:
     where = f"--policy: {path}"
     try:
         path = path.resolve()
-        content = path.read_bytes()
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise PolicyError(expected(where, "", "a file of Python code", reason)) from None
+    content = read_input(path, what="a file of Python code", n_bytes_max=N_BYTES_MAX, error=PolicyError, source=where)
     _find_first_in(path.parent)
     known, loaded = _IMPORTED.get(path), sys.modules.get(path.stem)
     if known is not None and known[0] == content:

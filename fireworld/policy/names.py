@@ -15,7 +15,7 @@ from pkgutil import resolve_name
 from typing import Any, Final, NamedTuple
 
 from fireworld.errors import PolicyError, expected
-from fireworld.policy.asking import complete, name_of
+from fireworld.policy.asking import complete, name_of, own_digest
 from fireworld.policy.chief import chief
 from fireworld.policy.identity import NOTEBOOK, can_be_imported, covering, digest_of, digest_of_module
 from fireworld.policy.importing import CODE_SUFFIX, find_in, import_source, make_policy
@@ -93,7 +93,7 @@ class NamedPolicy:
     @property
     def identity(self) -> str:
         """What distinguishes the policy from every other one, parts of one file too; "" if nothing is known to."""
-        own = self.policy.digest
+        own = own_digest(self.policy)
         if own and not self.parameters:
             return own
         part = self.part or name_of(self.policy).partition(":")[2]
@@ -149,7 +149,7 @@ def find_policy(given: object, *, parameters: Parameters | None = None) -> Named
     where = f"policy: {name_of(given)}" if is_named else "policy"
     values = check_plain(parameters or {}, where=where)
     policy = make_policy(given, values, where=where, as_function=True)
-    name, source = name_of(given), policy.digest if isinstance(policy.digest, str) else ""
+    name, source = name_of(given), own_digest(policy)
     return NamedPolicy(
         _with_parameters(name, values),
         covering(source or digest_of(given), values),

@@ -138,7 +138,7 @@ class Difference:
             LogError: a recording changed since it was opened.
         """
         check_output(Path(path), force=force)
-        write_file(Path(path), self.page().encode())
+        write_file(Path(path), self.page())
 
     def __repr__(self) -> str:
         from fireworld.recording.difference_text import header_lines, totals_rows, verdict

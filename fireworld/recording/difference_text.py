@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from xml.etree.ElementTree import Element, SubElement
 
 from fireworld.junit import clean, report
-from fireworld.outcome import QUANTITIES
+from fireworld.outcome import NOT_RECORDED, QUANTITIES
 from fireworld.records import STEP_TOPICS, Snapshot
 
 if TYPE_CHECKING:
@@ -142,4 +143,6 @@ def _change(pair: ValuePair) -> str:
 def _number(value: Any) -> str:
     if value is None:
         return "-"
+    if isinstance(value, float) and math.isnan(value):
+        return NOT_RECORDED
     return f"{value:.6g}" if isinstance(value, float) else str(value)

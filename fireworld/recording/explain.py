@@ -20,7 +20,7 @@ from fireworld.recording.explanation.search import ScoreAll, SearchResult, SpanE
 from fireworld.recording.explanation.spans import DecisionSpan, find_spans
 from fireworld.recording.explanation.text import HEADS, closing_lines, opening_lines, rows
 from fireworld.recording.fork import RECORDED
-from fireworld.recording.inputs import AnyRun, open_run, run_name
+from fireworld.recording.inputs import AnyRun, check_replayable, open_run, run_name
 from fireworld.recording.replay import Replay, build_recorded, check_replay
 from fireworld.recording.resume import recorded_policy
 from fireworld.records import ACTION_NAMES, ACTIONS, RunHeader, StoredRun
@@ -162,7 +162,10 @@ def explain(
     """
     whole_number("budget", budget, least=2, most=BUDGET_MAX)
     workers_for(executor)  # raises for what is no executor
-    worse, better, scores = _sorted_by_score(open_run(a), open_run(b))
+    first, second = open_run(a), open_run(b)
+    check_replayable(first)
+    check_replayable(second)
+    worse, better, scores = _sorted_by_score(first, second)
     if scores[0] == scores[1]:
         return Explanation(worse, better, *scores, SearchResult())
     for run in (worse, better):

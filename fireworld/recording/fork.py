@@ -25,7 +25,7 @@ from fireworld.recording.decisions import (
     is_possible,
     read_decision,
 )
-from fireworld.recording.inputs import AnyRun, open_run, run_name
+from fireworld.recording.inputs import AnyRun, check_replayable, open_run, run_name
 from fireworld.recording.record import run_prepared
 from fireworld.recording.replay import build_recorded, check_replay
 from fireworld.recording.resume import Resumed, recorded_policy, resume
@@ -135,6 +135,7 @@ def prepare_fork(
 ) -> PreparedFork:
     """Prepare a fork; arguments and errors as for `fork`."""
     run = open_run(log)
+    check_replayable(run)
     beginning = _recorded_up_to(run, at)
     built = build_recorded(run.header)
     change = _read_change(run, built.n_brigades, policy, decide or {}, swap or {})
@@ -271,7 +272,7 @@ def _header(run: StoredRun, change: ForkChange, step: int) -> RunHeader:
     }
     try:
         before = json.loads(header.attachments.get(FORK_ATTACHMENT, b"[]"))
-    except ValueError:
+    except (ValueError, RecursionError):
         before = []
     forks = [*before, made] if isinstance(before, list) else [made]
     attachments = {name: data for name, data in header.attachments.items() if name not in OF_POLICY}

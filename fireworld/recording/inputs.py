@@ -49,6 +49,17 @@ def open_run(given: object, *, partial: bool = False) -> StoredRun:
     return given
 
 
+def check_replayable(run: Steps) -> None:
+    """Check that a run can be replayed at all.
+
+    Raises:
+        LogError: it was imported from an official log, which has no decisions.
+    """
+    if run.header.imported:
+        why = f"it was imported ({run.header.origin}), and has no decisions to replay"
+        raise LogError(f"{run_name(run)}: {why}; `fireworld info`, view, render, report, diff and export show it")
+
+
 def open_one_or_two(given: AnyRun | Sequence[AnyRun]) -> list[StoredRun]:
     """Return one run or two; those given as paths are opened as far as they are good.
 

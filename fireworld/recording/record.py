@@ -14,6 +14,7 @@ from fireworld_recorder.writer import PARTIAL_SUFFIX, LogWriter
 
 from fireworld.arguments import last_step_of, path_of, seed_of, settings_of
 from fireworld.errors import PolicyError
+from fireworld.files import same_folder
 from fireworld.interrupt import Interrupted, gentle_interrupt
 from fireworld.records import MemoryRecording, StepRecord, Steps
 
@@ -66,6 +67,7 @@ def play(
     try:
         with ExitStack() as stack:
             interrupted = stack.enter_context(gentle_interrupt())
+            stack.enter_context(same_folder())
             sink: LogWriter | Digest = Digest(prepared.city)
             if record is not None:
                 writer = LogWriter(record, prepared.header, prepared.city, force=force, scene=scene)

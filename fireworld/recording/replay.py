@@ -8,6 +8,7 @@ from itertools import islice
 
 from fireworld.errors import LogError, expected
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
+from fireworld.recording.inputs import check_replayable
 from fireworld.records import (
     AIR,
     Array,
@@ -102,8 +103,9 @@ class Replay:
             with_air: give every step a snapshot; steps recorded without one get a snapshot of the air alone.
 
         Raises:
-            LogError: the recording lacks its scenario.
+            LogError: the recording lacks its scenario, or was imported.
         """
+        check_replayable(recording)
         self._recording, self._with_air = recording, with_air
         self._built = build_recorded(recording.header)
         self.city: CityRecord = self._built.city_record()

@@ -224,8 +224,7 @@ class Run:
         return str(self.path) if self.path is not None else f"run of {self.header.scenario}"
 
     def __repr__(self) -> str:
-        header = self.header
-        who = f"{header.scenario}, {header.policy}, seed {header.seed}"
+        who = self.header.title
         if not len(self):
             return one_line(f"<Run {who}: no steps>")
         outcome = self.outcome
@@ -236,8 +235,7 @@ class Run:
         from fireworld.html_page import html_figure, html_table, text_cell
         from fireworld.recording.pages.pictures import map_png
 
-        header = self.header
-        title = f"{header.scenario}, {header.policy}, seed {header.seed}"
+        title = self.header.title
         rows = [[text_cell(escape(label)), escape(text)] for label, text in self._facts().items()]
         parts = [f"<p><b>{escape(title)}</b></p>", html_table(["", ""], rows)]
         png = map_png(self, self[-1]) if len(self) else None

@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from fireworld.errors import OutputError, TrainingError, expected
 from fireworld.evaluation.runs import Outcomes
-from fireworld.files import write_file
+from fireworld.files import read_input, write_file
 from fireworld.kernels.arrays import Array
 from fireworld.outcome import COLUMNS
 from fireworld.policy.teams.table_team import TableTeam
@@ -77,7 +77,7 @@ class ReproductionFolder:
 
     def write(self, name: str, content: bytes | str) -> None:
         """Write a file of the folder; errors as for `write_file`."""
-        write_file(self.path / name, content.encode() if isinstance(content, str) else content)
+        write_file(self.path / name, content)
 
     def repetition(self, number: int) -> Repetition | None:
         """Return a repetition that was trained before, or None; TrainingError if a file is damaged, or gone."""
@@ -192,10 +192,13 @@ class ReproductionFolder:
 
     def _read(self, path: Path, kind: type[Content]) -> Content | None:
         try:
-            return msgspec.json.decode(path.read_bytes(), type=kind, dec_hook=_array)
-        except FileNotFoundError:
-            return None
-        except (OSError, msgspec.DecodeError, UnicodeDecodeError) as error:
+            if not path.exists():
+                return None
+            content = read_input(
+                path, what="what an earlier call has written", n_bytes_max=1 << 28, error=TrainingError
+            )
+            return msgspec.json.decode(content, type=kind, dec_hook=_array)
+        except (OSError, msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             got = f"{type(error).__name__}: {error}"
             raise TrainingError(expected(str(path), "", "what an earlier call has written", got, _HINT)) from None
 

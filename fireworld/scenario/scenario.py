@@ -14,6 +14,7 @@ import msgspec
 import msgspec.inspect
 
 from fireworld.errors import ScenarioError, expected
+from fireworld.files import read_input
 from fireworld.parameters import Parameters
 from fireworld.rewards import paper_weights
 from fireworld.scenario.document import Document, broken_rules, resolve_parameters
@@ -21,6 +22,10 @@ from fireworld.scenario.explain import find_faults
 from fireworld.scenario.yaml_text import read_yaml, write_yaml
 
 SIZE_MAX_BYTES: Final = 1_000_000
+DEPTH_MAX: Final = 20
+DIGITS_MAX: Final = 18
+CITY_BYTES_MAX: Final = 1 << 28
+"""Room for the outlines and streets of a city of half a million buildings."""
 OFFICIAL_READER: Final = "fireworld.city.formats.official.text"
 """The module that makes a city file of an official map; named, for cities are built on scenarios."""
 
@@ -204,13 +209,14 @@ def scenario_of(values: Mapping[str, Any], *, source: str, folder: Path | None) 
 def read_scenario(path: Path, *, source: str | None = None) -> Scenario:
     """Read a scenario file; its name is the file's unless it has another. Errors name the source, else the path."""
     source = source or str(path)
-    try:
-        with path.open("rb") as file:
-            text = file.read(SIZE_MAX_BYTES + 1)
-    except (OSError, ValueError) as error:
-        raise ScenarioError(expected(source, "", "a scenario file", _reason(error))) from None
-    if len(text) > SIZE_MAX_BYTES:
-        raise ScenarioError(expected(source, "", f"a scenario of at most {SIZE_MAX_BYTES} bytes", "more of them"))
+    text = read_input(
+        path,
+        what="a scenario",
+        n_bytes_max=SIZE_MAX_BYTES,
+        error=ScenarioError,
+        source=source,
+        or_names="a scenario file",
+    )
     scenario = parse_scenario(text, source=source, folder=path.parent)
     return scenario if scenario.name else msgspec.structs.replace(scenario, name=path.stem)
 
@@ -221,11 +227,10 @@ def read_city_file(scenario: Scenario) -> bytes:
         folder = Path(scenario.city.official)
         made: bytes = import_module(OFFICIAL_READER).city_file(folder, scenario=scenario.city.scenario)
         return made
-    try:
-        return Path(scenario.city.file or "").read_bytes()
-    except (OSError, ValueError) as error:
-        got = f"{_reason(error)}: {scenario.city.file}"
-        raise ScenarioError(expected(scenario.source, "city.file", "a city file", got)) from None
+    path, source = Path(scenario.city.file or ""), scenario.source
+    return read_input(
+        path, what="a city file", n_bytes_max=CITY_BYTES_MAX, error=ScenarioError, source=source, key="city.file"
+    )
 
 
 def split_settings(settings: Iterable[str], *, example: str = "brigades.n=7") -> dict[str, str]:
@@ -244,6 +249,8 @@ def split_settings(settings: Iterable[str], *, example: str = "brigades.n=7") ->
 def _assign(document: dict[str, Any], key: str, value: object, *, source: str) -> None:
     """Set one value in a tree of dicts and lists by its dotted key."""
     at: Any = document
+    if key.count(".") >= DEPTH_MAX:
+        raise ScenarioError(expected(source, key, f"a key of at most {DEPTH_MAX} parts", key.count(".") + 1))
     *parents, last = key.split(".")
     for depth, name in enumerate(parents):
         index = _entry(at, name, key=".".join(parents[: depth + 1]), source=source)
@@ -259,7 +266,7 @@ def _entry(at: Any, name: str, *, key: str, source: str) -> str | int:
         return name
     if not isinstance(at, list):
         raise ScenarioError(expected(source, key, "a key of a scenario", "a part of a plain value"))
-    if not name.isdecimal() or int(name) > len(at):
+    if not name.isdecimal() or len(name) > DIGITS_MAX or int(name) > len(at):
         raise ScenarioError(expected(source, key, f"a number from 0 to {len(at)}", name))
     if int(name) == len(at):
         at.append(None)
@@ -271,8 +278,3 @@ def _without_nulls(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _without_nulls(content) for key, content in value.items() if content is not None}
     return [_without_nulls(item) for item in value] if isinstance(value, list) else value
-
-
-def _reason(error: OSError | ValueError) -> str:
-    """Return why a file cannot be read; a path with a null byte is a ValueError."""
-    return (error.strerror if isinstance(error, OSError) else None) or str(error)

@@ -20,6 +20,9 @@ INTEGER: Final = re.compile(r"[-+]?(?:0|[1-9][0-9]{0,17})$")
 FLOAT: Final = re.compile(r"[-+]?(?:\.[0-9]+|(?:0|[1-9][0-9]*)(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?$")
 BOOLEAN: Final = re.compile(r"(?:true|false)$")
 NULL: Final = re.compile(r"(?:null|~|)$")
+N_VALUES_MAX: Final = 100_000
+"""Of one document: far more than any scenario or curriculum says, and read within two seconds."""
+CHARACTERS_MAX: Final = 1_000_000
 CORE: Final = "tag:yaml.org,2002:"
 
 
@@ -35,6 +38,7 @@ class _Reader(yaml.SafeLoader):
     """PyYAML's safe loader with YAML 1.2 scalars, each key once, and nothing that refers to something else."""
 
     yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012 -- PyYAML's own class attribute, filled below
+    n_values = 0
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         """Raise for aliases and anchors: a scenario has each thing once, where it belongs."""
@@ -43,6 +47,9 @@ class _Reader(yaml.SafeLoader):
             raise _ForbiddenError("every value written out", f"the anchor or alias {event.anchor}", event.start_mark)
         if getattr(event, "tag", None):
             raise _ForbiddenError("values without tags", f"the tag {event.tag}", event.start_mark)
+        self.n_values += 1
+        if self.n_values > N_VALUES_MAX:
+            raise _ForbiddenError(f"at most {N_VALUES_MAX} keys and values", "more of them", event.start_mark)
         return super().compose_node(parent, index)
 
     def construct_scalar(self, node: Any) -> Any:
@@ -102,6 +109,8 @@ def read_yaml(text: bytes | str, *, source: str) -> Any:
 
     Raises ScenarioError, which names source, line and column, for what is not the YAML that a scenario may use.
     """
+    if len(text) > CHARACTERS_MAX:
+        raise ScenarioError(expected(source, "", f"at most {CHARACTERS_MAX} characters of YAML", len(text)))
     try:
         if isinstance(text, bytes):
             text = text.decode("utf-8")

@@ -15,7 +15,6 @@ from fireworld.kernels.brigades import REFILLING
 from fireworld.parameters import Parameters
 from fireworld.policy.words import FEATURES
 from fireworld.records import (
-    EVENT_KINDS,
     SNAPSHOT_EVERY_STEPS,
     Brigades,
     Buildings,
@@ -28,11 +27,10 @@ from fireworld.records import (
     Snapshot,
     StepRecord,
 )
+from fireworld.simulation.changes import BURNING, events_of, fire_changes, zero_against_more
 from fireworld.simulation.placement import Placement
 from fireworld.simulation.state import rewards_of, score_of, take_snapshot
 from fireworld.simulation.world import Choices, World
-
-KIND = {name: index for index, name in enumerate(EVENT_KINDS)}
 
 
 def city_record(city: City, placement: Placement, parameters: Parameters) -> CityRecord:
@@ -96,7 +94,7 @@ class Observer:
     def record(self, choices: Choices | None = None) -> StepRecord:
         """Return the record of the step just done, with what `World.step` returned; without that, of the start."""
         world = self.world
-        events = self._events() if choices is not None else _events([])
+        events = self._events() if choices is not None else events_of([])
         snapshot_due = world.step_number % SNAPSHOT_EVERY_STEPS == 0
         record = StepRecord(
             step=world.step_number,
@@ -208,39 +206,27 @@ class Observer:
     def _events(self) -> Events:
         """Return what changed, in the order of the phases."""
         before, now = self._before, self._watched()
-        refilled = _zero_against_more(now["refilling"], before["refilling"])
+        refilled = zero_against_more(now["refilling"], before["refilling"])
         activity = self.world.state.brigades.activity
-        return _events(
+        return events_of(
             [
                 ("refilled", [brigade for brigade in refilled if activity[brigade] == REFILLING]),
-                ("tank-empty", _zero_against_more(now["tank"], before["tank"])),
+                ("tank-empty", zero_against_more(now["tank"], before["tank"])),
                 *self._fire_events(),
-                ("civilian-hurt", _zero_against_more(before["civilian_damage"], now["civilian_damage"])),
-                ("civilian-died", _zero_against_more(now["civilian_hp"], before["civilian_hp"])),
-                ("brigade-hurt", _zero_against_more(before["brigade_damage"], now["brigade_damage"])),
-                ("brigade-died", _zero_against_more(now["brigade_hp"], before["brigade_hp"])),
+                ("civilian-hurt", zero_against_more(before["civilian_damage"], now["civilian_damage"])),
+                ("civilian-died", zero_against_more(now["civilian_hp"], before["civilian_hp"])),
+                ("brigade-hurt", zero_against_more(before["brigade_damage"], now["brigade_damage"])),
+                ("brigade-died", zero_against_more(now["brigade_hp"], before["brigade_hp"])),
             ]
         )
 
     def _fire_events(self) -> list[tuple[str, Sequence[int]]]:
-        """Return what happened to buildings and sites; most steps change few codes, so only those are looked at."""
+        """Return what happened to buildings and sites."""
         code, site = self.world.state.fire.fieryness, self.world.state.sites.label
-        before = self._before["fieryness"]
-        changed = (code != before).nonzero()[0]
-        if len(changed) == 0:
-            return []
-        changes = list(zip(changed.tolist(), before[changed].tolist(), code[changed].tolist(), strict=True))
-        stopped = [building for building, old, new in changes if old in BURNING and new not in BURNING]
-        return [
-            ("ignited", [building for building, old, new in changes if new in BURNING and old not in BURNING]),
-            ("extinguished", [building for building in stopped if code[building] != BURNT_OUT]),
-            ("burnt-out", [building for building, _, new in changes if new == BURNT_OUT]),
-            ("site-out", _sites_out(site, code, stopped) if stopped else []),
-        ]
+        found = fire_changes(self._before["fieryness"], code)
+        return [*found.events, ("site-out", _sites_out(site, code, found.stopped) if found.stopped else [])]
 
 
-BURNING = range(1, 4)
-BURNT_OUT = 8
 TEMPERATURE_STEPS = 64.0
 """Recorded temperatures are rounded to this part of a degree: noise in the last bits would not compress."""
 
@@ -252,17 +238,3 @@ def _sites_out(site: Array, code: Array, stopped: Sequence[int]) -> list[int]:
         site[(code >= BURNING.start) & (code < BURNING.stop)], minlength=max(touched, default=0) + 1
     )
     return [number for number in sorted(touched) if n_burning[number] == 0]
-
-
-def _zero_against_more(zero: Array, more: Array) -> list[int]:
-    """Return the indices where the one array holds zero and the other, of the same type, more."""
-    if zero.tobytes() == more.tobytes():  # as mostly; it takes a tenth of the time of looking closer
-        return []
-    indices: list[int] = ((zero == 0) & (more > 0)).nonzero()[0].tolist()
-    return indices
-
-
-def _events(found: Sequence[tuple[str, Sequence[int]]]) -> Events:
-    kinds = [KIND[name] for name, entities in found for _ in entities]
-    entities = [entity for _, entities in found for entity in entities]
-    return Events(kind=np.array(kinds, dtype=np.uint8), entity=np.array(entities, dtype=np.int32))

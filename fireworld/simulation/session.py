@@ -13,6 +13,7 @@ import numpy as np
 
 from fireworld.arguments import ArgumentError, last_step_of, seed_of, settings_of
 from fireworld.errors import LogError, PolicyError, expected
+from fireworld.npz import read_npz
 from fireworld.outcome import Outcome
 from fireworld.policy.asking import begin
 from fireworld.policy.names import find_policy
@@ -132,10 +133,9 @@ class Session:
             LogError: it is no snapshot, or one of another scenario.
         """
         try:
-            with np.load(io.BytesIO(snapshot), allow_pickle=False) as arrays:
-                head = _head(str(arrays["head"]))
-                held = {name: arrays[name] for name in arrays.files}
-        except (OSError, ValueError, KeyError, EOFError, TypeError) as error:
+            held = read_npz(io.BytesIO(snapshot))
+            head = _head(str(held["head"]))
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
             raise LogError(expected("snapshot", "", "the bytes of a snapshot", str(error) or "others")) from None
         if head["scenario"] != self.scenario.digest:
             wanted = f"one of this scenario ({self.scenario.digest[:12]})"

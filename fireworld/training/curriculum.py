@@ -16,6 +16,7 @@ import msgspec
 from msgspec import Meta, Struct
 
 from fireworld.errors import FireworldError, TrainingError, expected
+from fireworld.files import read_input
 from fireworld.scenario import Scenario, load_scenario, scenario_names
 from fireworld.scenario.shipped import shipped_folder
 from fireworld.scenario.yaml_text import read_yaml
@@ -159,16 +160,15 @@ def load_curriculum(name_or_path: str | Path) -> Curriculum:
 
 
 def _read_document(path: Path, *, source: str) -> Any:
-    try:
-        with path.open("rb") as file:
-            text = file.read(SIZE_MAX_BYTES + 1)
-    except (OSError, ValueError) as error:
-        names = ", ".join(curriculum_names())
-        reason = getattr(error, "strerror", None) or str(error)
-        wanted = f"a curriculum file or one of {names}, or a scenario"
-        raise TrainingError(expected(source, "", wanted, reason)) from None
-    if len(text) > SIZE_MAX_BYTES:
-        raise TrainingError(expected(source, "", f"a curriculum of at most {SIZE_MAX_BYTES} bytes", "more of them"))
+    names = f"a curriculum file or one of {', '.join(curriculum_names())}, or a scenario"
+    text = read_input(
+        path,
+        what="a curriculum",
+        n_bytes_max=SIZE_MAX_BYTES,
+        error=TrainingError,
+        source=source,
+        or_names=names,
+    )
     return read_yaml(text, source=source)
 
 

@@ -21,6 +21,12 @@ MAGIC: Final = b"\x89MCAP0\r\n"
 CHUNK_BYTES_MAX: Final = 1 << 28
 """A chunk holds a step, which is far below this even for a city of a million buildings."""
 
+UNPACKED_BYTES_FREE: Final = 1 << 30
+UNPACKED_RATIO_MAX: Final = 1000
+"""A log of n bytes may unpack to that many bytes more than 1000 n: a small one cannot take minutes to unpack."""
+MESSAGES_FREE: Final = 100_000
+MESSAGE_BYTES_MIN: Final = 8
+"""A log of n bytes may hold that many messages more than n / 8: the index alone takes more for each."""
 REGISTRATIONS_MAX: Final = 1 << 17
 """Schemas and channels of one chunk: their numbers have 16 bits."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -12,16 +12,22 @@ from fireworld.errors import LogError
 from fireworld.records import Brigades, Buildings, CityRecord, Civilians
 from fireworld_recorder.schema import Field, message_of
 
-ALWAYS: Final = (Brigades, Buildings, Civilians)
-"""Topics whose columns are there in every step; others have none in step 0."""
 _FLOATS: Final = frozenset({"double", "float"})
-NAMED: Final = (*ALWAYS, CityRecord)
-"""Topics whose numbers all have names; to others later versions may add some."""
-BUILDING: Final = frozenset({"link_building", "refuge_building", "civilian_building"})
+ALWAYS: Final = (Brigades, Buildings, Civilians, CityRecord)
+"""Topics whose columns are there in every step, and whose numbers all have names; others have no columns in step 0, and
+later versions may add names."""
+BUILDING: Final = frozenset({"link_building", "refuge_building", "civilian_building", "in_building"})
 """Fields that hold indices of buildings, -1 for none."""
 PLACES: Final = frozenset({"x_m", "y_m", "outline_x_m", "outline_y_m", "node_x_m", "node_y_m"})
 PLACE_MAX_M: Final = 1e8
 """Farther away is nothing: more than twice around the earth."""
+
+Lacks = Callable[[str], bool]
+"""Says whether a log does not have a field, as in "buildings.energy"."""
+
+
+def _lacks_nothing(_: str) -> bool:
+    return False
 
 
 def counts_of(city: CityRecord) -> dict[str, int]:
@@ -34,13 +40,15 @@ def counts_of(city: CityRecord) -> dict[str, int]:
     }
 
 
-def check_city(city: CityRecord) -> None:
-    """Raise LogError if the columns of a city do not fit each other."""
+def check_city(city: CityRecord, lacks: Lacks = _lacks_nothing) -> None:
+    """Raise LogError if the columns of a city do not fit each other; `lacks`: what the log does not have."""
     counts = counts_of(city)
     for item in _fields(CityRecord):
-        check_field(CityRecord, item, getattr(city, item.name), counts)
+        check_field(CityRecord, item, getattr(city, item.name), counts, lacks)
     for offsets, entries in (("outline_ptr", city.outline_x_m), ("link_ptr", city.link_building)):
         column = getattr(city, offsets)
+        if lacks(f"city.{offsets}") and not len(column) and not len(entries):
+            continue
         if column[0] != 0 or (np.diff(column) < 0).any() or column[-1] != len(entries):
             raise LogError(f"/city: {offsets}: it does not divide {len(entries)} entries")
     same = {"corners": (city.outline_x_m, city.outline_y_m), "links": (city.link_building, city.link_share)}
@@ -64,35 +72,38 @@ def _fields(kind: type[Any]) -> tuple[Field, ...]:
     return _FIELDS[kind]
 
 
-def check_record(record: Any, counts: Mapping[str, int]) -> None:
-    """Raise LogError if a topic of a step does not fit the city."""
+def check_record(record: Any, counts: Mapping[str, int], lacks: Lacks = _lacks_nothing) -> None:
+    """Raise LogError if a topic of a step does not fit the city; `lacks`: what the log does not have."""
     kind = type(record)
     lengths: dict[str, int] = {}
     for item in _fields(kind):
         value = getattr(record, item.name)
-        check_field(kind, item, value, counts)
+        check_field(kind, item, value, counts, lacks)
         if item.per in {"site", "event"}:
             first = lengths.setdefault(item.per, len(value))
             if len(value) != first:
                 raise LogError(f"{kind.topic}: {item.name}: {len(value)} entries, where others have {first}")
 
 
-def check_field(kind: type[Any], item: Field, value: Any, counts: Mapping[str, int]) -> None:
-    """Raise LogError if a field does not fit the city."""
+def check_field(
+    kind: type[Any], item: Field, value: Any, counts: Mapping[str, int], lacks: Lacks = _lacks_nothing
+) -> None:
+    """Raise LogError if a field does not fit the city; `lacks`: what the log does not have."""
     if not item.repeated:
         if item.wire in _FLOATS and not math.isfinite(value):
             raise LogError(f"{kind.topic}: {item.name}: {value} is no number")
         return
     if item.per in counts:
         wanted = counts[item.per] * item.width
-        if len(value) != wanted and (len(value) or kind in ALWAYS or kind is CityRecord):
+        always = kind in ALWAYS and not item.imported
+        if len(value) != wanted and (len(value) or (always and not lacks(f"{kind.topic[1:]}.{item.name}"))):
             raise LogError(f"{kind.topic}: {item.name}: {len(value)} entries, where the city has {wanted}")
     if not len(value):
         return
     if item.wire in _FLOATS:
         _check_numbers(kind, item, value)
         return
-    if item.names and kind in NAMED and not -1 <= int(value.min()) <= int(value.max()) < len(item.names):
+    if item.names and kind in ALWAYS and not -1 <= int(value.min()) <= int(value.max()) < len(item.names):
         raise LogError(f"{kind.topic}: {item.name}: {int(value.max())} is none of {len(item.names)} names")
     if item.name in BUILDING and not -1 <= int(value.min()) <= int(value.max()) < counts["building"]:
         raise LogError(f"{kind.topic}: {item.name}: a building that there is not")

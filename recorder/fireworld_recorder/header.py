@@ -27,7 +27,9 @@ class ForeignError(LogError):
 
 def to_metadata(header: Any, kind: LogKind = RUN) -> dict[str, str]:
     """Write a header as text, by rising key, with a checksum over all the rest (MCAP has none for metadata)."""
-    metadata = {item.name: str(getattr(header, item.name)) for item in _fields(kind)}
+    texts = {item.name: str(getattr(header, item.name)) for item in _fields(kind)}
+    if_any = {item.name for item in _fields(kind) if item.metadata.get("if_any")}
+    metadata = {name: text for name, text in texts.items() if text or name not in if_any}
     metadata["format"] = kind.format
     for name, data in header.attachments.items():
         metadata[_ATTACHMENT + name] = hashlib.sha256(data).hexdigest()

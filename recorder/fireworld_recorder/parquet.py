@@ -55,7 +55,7 @@ def export(
     own = {f"{name}{SUFFIX}" for name in TABLES}
     with new_folder(folder, own=own, force=force) as scratch, ExitStack() as stack:
         writers = {
-            name: stack.enter_context(_TableWriter(table, scratch, metadata, rows_per_group))
+            name: stack.enter_context(_TableWriter(table, scratch, metadata, rows_per_group, log.header.lacks))
             for name, table in TABLES.items()
             if table in chosen
         }
@@ -86,18 +86,26 @@ def _metadata(log: StoredRun) -> dict[str, str]:
 class _TableWriter:
     """Writes one table, a group of rows after the other."""
 
-    def __init__(self, table: ExportTable, folder: Path, metadata: Mapping[str, str], rows_per_group: int) -> None:
+    def __init__(
+        self,
+        table: ExportTable,
+        folder: Path,
+        metadata: Mapping[str, str],
+        rows_per_group: int,
+        lacks: Callable[[str], bool],
+    ) -> None:
         self.n_rows = 0
-        self._table = table
+        self._table, self._lacks = table, lacks
         self._rows_per_group = rows_per_group
         self._held: list[list[Array | None]] = []
         self._n_held = 0
         self._schema = schema_of(table, metadata)
-        self._writer = pq.ParquetWriter(folder / f"{table.name}{SUFFIX}", self._schema, compression="zstd")
+        self._file = (folder / f"{table.name}{SUFFIX}").open("wb")  # arrow itself takes no names of any bytes
+        self._writer = pq.ParquetWriter(self._file, self._schema, compression="zstd")
 
     def add(self, record: Any) -> None:
         """Add the rows of a step, or of the city."""
-        values = self._table.read(record)
+        values = self._table.read(record, self._lacks)
         n_rows = n_rows_of(values)
         if n_rows:
             self._held.append(values)
@@ -122,7 +130,8 @@ class _TableWriter:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._writer.close()
+        with self._file:
+            self._writer.close()
 
 
 def schema_of(table: ExportTable, metadata: Mapping[str, str]) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -78,11 +79,13 @@ class Log(RecordingBase):
         self.path = found.path
         self.found = found
         self.header: RunHeader = found.header
-        self.city: CityRecord = decode(CityRecord, found.first)
+        self._unknown = _unknown_values(self.header)
+        city = decode(CityRecord, found.first)
         try:
-            check_city(self.city)
+            check_city(city, self.header.lacks)
         except LogError as error:
             raise LogError(f"{self.path}: {error}") from None
+        self.city: CityRecord = self._without_invention(city)
         self._counts = counts_of(self.city)
         self.digest = found.hash.hex()
         """The hash of the last committed step: the identity of the run up to there, 64 hexadecimal digits."""
@@ -122,10 +125,10 @@ class Log(RecordingBase):
         for step, raw in zip(self.found.steps, self.raw_steps(), strict=False):
             value = decode_field(record_type, field.number, dict(raw).get(record_type.topic, b""))
             try:
-                check_field(record_type, field, value, self._counts)
+                check_field(record_type, field, value, self._counts, self.header.lacks)
             except LogError as error:
                 raise LogError(f"{self.path}: step {step}: {error}") from None
-            yield value
+            yield self._unknown.get(record_type, {}).get(item.name, value)
 
     def raw_steps(self, first: int = 0) -> Iterator[RawStep]:
         """Yield the committed steps as they lie in the file.
@@ -146,10 +149,33 @@ class Log(RecordingBase):
                 topic[1:]: decode(record_type, payloads.get(topic, b"")) for topic, record_type in _TYPES.items()
             }
             for record in topics.values():
-                check_record(record, self._counts)
+                check_record(record, self._counts, self.header.lacks)
             snapshot = decode_snapshot(payloads[Snapshot.topic]) if Snapshot.topic in payloads else None
         except LogError as error:
             raise LogError(f"{self.path}: step {commit.step}: {error}") from error
+        if self._unknown:
+            topics = {name: self._without_invention(record) for name, record in topics.items()}
         return StepRecord(
             step=commit.step, terminated=commit.terminated, truncated=commit.truncated, snapshot=snapshot, **topics
         )
+
+    def _without_invention(self, record: Any) -> Any:
+        """Return a record in which numbers that an imported log does not have are no numbers, instead of zero."""
+        unknown = self._unknown.get(type(record))
+        return dataclasses.replace(record, **unknown) if unknown else record
+
+
+def _unknown_values(header: RunHeader) -> dict[type[Any], dict[str, float]]:
+    """Return NaN for each single number of the record types that a log does not have; nothing for most logs.
+
+    Whole numbers stay 0: `header.lacks` says whether they mean anything.
+    """
+    if not header.not_recorded:
+        return {}
+    unknown: dict[type[Any], dict[str, float]] = {}
+    kinds: tuple[type[Any], ...] = (CityRecord, *STEP_TOPICS)
+    for kind in kinds:
+        single = [item for item in message_of(kind).fields if item.wire == "double" and not item.repeated]
+        absent = {item.name: math.nan for item in single if header.lacks(f"{kind.topic[1:]}.{item.name}")}
+        unknown |= {kind: absent} if absent else {}
+    return unknown

@@ -127,7 +127,10 @@ def holds_nothing(path: Path, kind: LogKind = RUN) -> bool:
     try:
         return not scan(path, kind).steps
     except LogError as error:
-        start = path.read_bytes()[: len(container.MAGIC)] if path.is_file() else None
+        start = None
+        if path.is_file():
+            with path.open("rb") as opened:
+                start = opened.read(len(container.MAGIC))
         if isinstance(error.__cause__, TruncatedError) or start in (b"", container.MAGIC[: len(start or b"")]):
             return True
         raise
@@ -247,6 +250,8 @@ class _Stream:
             hint = next((f"; {hint}" for start, hint in _HINTS.items() if found.startswith(start)), "")
             raise ForeignError(f"expected an MCAP recording, got {what}{hint}")
         checksum = zlib.crc32(container.MAGIC)
+        n_messages, n_messages_max = 0, container.MESSAGES_FREE + self.n_bytes // container.MESSAGE_BYTES_MIN
+        n_unpacked, n_unpacked_max = 0, container.UNPACKED_BYTES_FREE + container.UNPACKED_RATIO_MAX * self.n_bytes
         for record in container.records(self._file, self.n_bytes):
             if record.opcode == Opcode.DATA_END:
                 self._check_end(record, checksum)
@@ -254,8 +259,15 @@ class _Stream:
             checksum = zlib.crc32(record.body, zlib.crc32(record.head, checksum))
             self._take(record)
             n_registrations = 0
-            for position, opcode, body in container.split(_block(record, self._decompressor)):
+            block = _block(record, self._decompressor)
+            n_unpacked += len(block)
+            if n_unpacked > n_unpacked_max:
+                raise LogError(f"expected at most {n_unpacked_max} bytes in a log of {self.n_bytes}, got more")
+            for position, opcode, body in container.split(block):
                 if opcode == _MESSAGE:
+                    n_messages += 1
+                    if n_messages > n_messages_max:
+                        raise LogError(f"expected at most {n_messages_max} messages in {self.n_bytes} bytes, got more")
                     yield *_topic_and_payload(body, self.channels), Start(record.offset, position)
                 else:
                     n_registrations += 1

@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import inspect
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Final, NamedTuple
@@ -84,6 +84,8 @@ class Field:
     """Entries of an array for each of these."""
     names: tuple[str, ...] = ()
     """What the numbers 0, 1, 2, ... stand for."""
+    imported: bool = False
+    """Imported logs alone have it."""
 
     @property
     def repeated(self) -> bool:
@@ -130,9 +132,16 @@ def message_of(record_type: type[Any]) -> Message:
     )
 
 
-def channel_of(record_type: type[Any], package: str) -> Channel:
-    """Return the channel of a topic; its schema is a FileDescriptorSet, by protobuf's descriptor.proto."""
+def channel_of(record_type: type[Any], package: str, *, declared: Callable[[Field], bool] = lambda _: True) -> Channel:
+    """Return the channel of a topic; its schema is a FileDescriptorSet, by protobuf's descriptor.proto.
+
+    Args:
+        record_type: of the topic.
+        package: of the protobuf message.
+        declared: whether a field is part of the schema.
+    """
     message = message_of(record_type)
+    message = dataclasses.replace(message, fields=tuple(item for item in message.fields if declared(item)))
     body = _descriptor(message)
     if record_type is Snapshot:  # the only message that is made of others
         array = dataclasses.replace(message_of(NamedArray), name="Array")

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import atexit
 import stat
 import tempfile
 from pathlib import Path
-from typing import Final
+from typing import IO, Final
 
 from fireworld.errors import LogError, expected
 from fireworld_recorder.container import MAGIC, read_header, records
@@ -17,8 +16,11 @@ _PIECE_BYTES: Final = 1 << 20
 _HEADER_BYTES_MAX: Final = 256
 """Up to the end of the header of a log; those of other tools may be longer."""
 
+_OWN_FILES: Final = Path("/proc/self/fd")
+_copies: Final[list[IO[bytes]]] = []
+"""Copies of what came from pipes: files without a name, which no kill leaves behind."""
 _looked_at: Final[dict[Path, Path]] = {}
-"""Copies of what came from pipes, from `noun_of` to `take`."""
+"""Copies by pipe, from `noun_of` to `take`."""
 
 
 def noun_of(path: Path) -> str:
@@ -57,14 +59,14 @@ def take(path: Path) -> Path:
         if not (stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode)):
             what = "a folder" if stat.S_ISDIR(mode) else "a device"
             raise LogError(expected(str(path), "", "a recording", what))
-        with tempfile.NamedTemporaryFile(prefix="fireworld-", suffix=".mcap", delete=False) as copy:
-            atexit.register(Path(copy.name).unlink, missing_ok=True)
-            with path.open("rb") as pipe:
-                while data := pipe.read(_PIECE_BYTES):
-                    if copy.tell() > PIPE_BYTES_MAX:
-                        raise LogError(expected(str(path), "", f"at most {PIPE_BYTES_MAX} bytes from a pipe", "more"))
-                    copy.write(data)
-        return Path(copy.name)
+        copy = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - open as long as the process lives
+        with path.open("rb") as pipe:
+            while data := pipe.read(_PIECE_BYTES):
+                if copy.tell() > PIPE_BYTES_MAX:
+                    raise LogError(expected(str(path), "", f"at most {PIPE_BYTES_MAX} bytes from a pipe", "more"))
+                copy.write(data)
+        _copies.append(copy)
+        return _OWN_FILES / str(copy.fileno())
     except OSError as error:
         raise unreadable(path, error) from error
 

@@ -5,7 +5,7 @@ Which fields make which table follows from what they are declared to have entrie
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any, Final
@@ -66,8 +66,12 @@ class ExportTable:
     """What there is a row for in each step; empty for the step itself."""
     columns: tuple[ExportColumn, ...]
 
-    def read(self, record: Any) -> list[Array | None]:
+    def read(self, record: Any, lacks: Callable[[str], bool] = lambda _: False) -> list[Array | None]:
         """Return the rows that a step adds (or the city, to the table `city`).
+
+        Args:
+            record: the step, or the city.
+            lacks: whether the log does not have a field, as `RunHeader.lacks` does.
 
         Returns:
             An array for each column, all of one length; None for a field that is empty there.
@@ -77,7 +81,10 @@ class ExportTable:
         """
         values = [attrgetter(column.path)(record) if column.path else None for column in self.columns]
         if not self.per:
-            return [np.array([value], column.dtype) for value, column in zip(values, self.columns, strict=True)]
+            return [
+                None if lacks(column.path) else np.array([value], column.dtype)
+                for value, column in zip(values, self.columns, strict=True)
+            ]
         pairs = list(zip(self.columns, values, strict=True))
         n_rows = max(len(value) // column.width for column, value in pairs if isinstance(value, np.ndarray))
         return [self._rows(column, value, n_rows, record) for column, value in pairs]
@@ -130,7 +137,7 @@ def table_arrays(run: Steps, name: str) -> dict[str, Array]:
         LogError: there is no such table, or a step makes no sense.
     """
     table = find_table(name)
-    read = [table.read(record) for record in ([run.city] if name == "city" else run)]
+    read = [table.read(record, run.header.lacks) for record in ([run.city] if name == "city" else run)]
     lengths = [n_rows_of(values) for values in read]
     arrays: dict[str, Array] = {}
     for k, column in enumerate(table.columns):

@@ -22,7 +22,7 @@ JSON_KEYS: Final[Mapping[str, str]] = {
     "sum_of_rewards": "total_reward",
     "water_used_litres": "water_used_litres",
 }
-"""What JSON calls the quantities of an outcome; None without one."""
+"""What JSON calls the quantities of an outcome; None without one, and for what was not recorded."""
 
 
 @dataclass(frozen=True)
@@ -66,11 +66,17 @@ def final_outcome(run: Steps) -> Outcome:
     return outcome
 
 
+def _known(outcome: Outcome, name: str) -> Any:
+    """Return an attribute of an outcome, None for a number that was not recorded."""
+    value = getattr(outcome, name)
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
 def plain(value: Any) -> Any:
     """Turn dataclasses and mappings into dicts, sequences into lists, and NaN, which JSON lacks, into text."""
     if isinstance(value, Totals):
         outcome = value.outcome
-        quantities = {key: None if outcome is None else getattr(outcome, name) for key, name in JSON_KEYS.items()}
+        quantities = {key: None if outcome is None else _known(outcome, name) for key, name in JSON_KEYS.items()}
         return plain({"n_steps": value.n_steps, **quantities})
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {item.name: plain(getattr(value, item.name)) for item in dataclasses.fields(value)}

@@ -9,18 +9,18 @@ import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Final, Protocol, Self
+from typing import IO, Any, Final, Protocol, Self
 
 from fireworld.errors import OutputError, expected
-from fireworld.files import check_output
-from fireworld.records import CityRecord, RunHeader, Snapshot, StepRecord
+from fireworld.files import check_output, give_name
+from fireworld.records import CityRecord, RunHeader, Snapshot, StepRecord, absent_names
 from fireworld_recorder.chain import Chain, step_messages
 from fireworld_recorder.codec import encode, encode_snapshot
 from fireworld_recorder.container import CHUNK_BYTES_MAX
 from fireworld_recorder.container_writer import ContainerWriter
 from fireworld_recorder.header import PROFILE, to_metadata
 from fireworld_recorder.kind import RUN, LogKind
-from fireworld_recorder.schema import PACKAGE, TOPICS, Channel, Commit, channel_of
+from fireworld_recorder.schema import PACKAGE, TOPICS, Channel, Commit, Field, channel_of
 
 PARTIAL_SUFFIX: Final = ".partial"
 CHUNK_PAYLOAD_MAX: Final = CHUNK_BYTES_MAX - (1 << 20)
@@ -40,9 +40,25 @@ class Scene(Protocol):
 
 
 @functools.cache
-def own_channels() -> tuple[Channel, ...]:
-    """Return the channels of a new log, in their fixed order."""
-    return tuple(channel_of(topic, PACKAGE) for topic in TOPICS)
+def own_channels(*, imported: bool = False, not_recorded: str = "") -> tuple[Channel, ...]:
+    """Return the channels of a new log, in their fixed order.
+
+    Args:
+        imported: whether it is made from the log of another program.
+        not_recorded: topics and fields that it does not have, as in `RunHeader.not_recorded`.
+    """
+    absent = absent_names(not_recorded)
+
+    def channel(topic: type[Any]) -> Channel:
+        """Return the channel of a topic with the fields that the log can have."""
+        prefix = topic.topic[1:]
+
+        def declared(item: Field) -> bool:
+            return (imported or not item.imported) and f"{prefix}.{item.name}" not in absent
+
+        return channel_of(topic, PACKAGE, declared=declared)
+
+    return tuple(channel(topic) for topic in TOPICS if topic.topic[1:] not in absent)
 
 
 class StepFile:
@@ -81,12 +97,12 @@ class StepFile:
         self._open = False
         replace_partial = force or not self._keep_partial
         check_output(path, force=force)
-        if not replace_partial and self.partial.exists():
-            raise OutputError(
-                f"{self.partial}: a {self.kind.noun} that did not end left this, or one is under way;"
-                f" try {self.kind.rescue}"
-            )
         with self._guard():
+            if not replace_partial and self.partial.exists():
+                raise OutputError(
+                    f"{self.partial}: a {self.kind.noun} that did not end left this, or one is under way;"
+                    f" try {self.kind.rescue}"
+                )
             self._file = _begin_file(self.partial, replace=replace_partial)
             self._open = True
             self._writer = ContainerWriter(self._file, profile=PROFILE, library=kind.format)
@@ -125,7 +141,7 @@ class StepFile:
             os.fsync(self._file.fileno())
             self._file.close()
             check_output(self._final, force=self._force)
-            self._scratch.replace(self._final)
+            give_name(self._scratch, self._final, free=not self._force)
             self._open = False
 
     def keep_partial(self) -> None:
@@ -247,6 +263,7 @@ class LogWriter(StepFile):
         city: the city it runs in.
         force: replace an existing log.
         scene: what else to write, for other tools.
+        scratch_suffix: as for `StepFile`, for a log that is made anew where its making is cut short.
 
     Raises:
         OutputError: the log exists, its folder does not, or it cannot be written.
@@ -260,6 +277,7 @@ class LogWriter(StepFile):
         *,
         force: bool = False,
         scene: Scene | None = None,
+        scratch_suffix: str = "",
     ) -> None:
         encoded_city = encode(city)
         self._chain = Chain(encoded_city)
@@ -269,9 +287,13 @@ class LogWriter(StepFile):
             Path(path),
             metadata=to_metadata(header),
             attachments=header.attachments,
-            channels=[*own_channels(), *(scene.channels if scene is not None else ())],
+            channels=[
+                *own_channels(imported=header.imported, not_recorded=header.not_recorded),
+                *(scene.channels if scene is not None else ()),
+            ],
             city=encoded_city,
             force=force,
+            scratch_suffix=scratch_suffix,
         )
 
     @property
@@ -283,7 +305,7 @@ class LogWriter(StepFile):
         """Write one step; when this returns a kill cannot lose it. Errors are those of `commit`."""
         if record.step <= self._last_step:
             raise ValueError(f"steps are written in rising order, got {record.step} after {self._last_step}")
-        messages = step_messages(record)
+        messages = [(topic, data) for topic, data in step_messages(record) if topic in self._channel_ids]
         for topic, data in messages:
             self._chain.add(topic, data)
         if record.snapshot is not None:

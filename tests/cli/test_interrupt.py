@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import signal
+import subprocess
+import sys
 
 import pytest
 from fireworld_recorder.reader import open_log
@@ -86,3 +88,61 @@ def test_a_killed_run_loses_the_step_under_way_and_no_more(here, fireworld, fire
     assert fireworld(*RECORD, "policies:Near", "--force", "--steps", 4).code == 0
     assert fireworld("diff", "a.mcap", "b.mcap").code == 1, "one ended there, the other was cut off"
     assert files() == ["a.mcap", "b.mcap"]
+
+
+def test_ctrl_c_that_others_made_something_else_of(here, fireworld, monkeypatch):
+    """Compiled code and libraries under import raise their own errors when it comes at the wrong moment."""
+
+    def wrapped(*_, **__):
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+    monkeypatch.setattr("fireworld.scenario.load_scenario", wrapped)
+    done = fireworld("run", "quick")
+    assert (done.code, done.err) == (130, "interrupted\n")
+
+
+LOST = """
+import signal, sys, time
+from fireworld.cli import _say_what_is_ignored
+_say_what_is_ignored()
+class Finalized:
+    def __del__(self):
+        signal.raise_signal(signal.SIGINT)
+        for _ in range(1000):
+            pass
+try:
+    Finalized()
+    time.sleep(20)
+except KeyboardInterrupt:
+    sys.exit(130)
+"""
+
+
+def test_ctrl_c_within_a_finalizer_is_not_lost():
+    done = subprocess.run([sys.executable, "-c", LOST], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "")
+
+
+@pytest.mark.parametrize("event", ["os.mkdir", "open", "os.rename"])
+def test_ctrl_c_while_a_file_is_written_leaves_no_scratch_folder(tmp_path, event):
+    seen = subprocess.run([sys.executable, "-c", WRITING, event], cwd=tmp_path, check=False).returncode
+    assert seen == 130
+    assert [path.name for path in tmp_path.iterdir()] == ["policies.py"]
+
+
+WRITING = """
+import signal, sys
+from pathlib import Path
+from fireworld.files import write_file
+def note(event, arguments):
+    global left
+    if event == sys.argv[1] and left:
+        left = False
+        signal.raise_signal(signal.SIGINT)
+left = True
+sys.addaudithook(note)
+try:
+    write_file(Path("a.txt"), b"a")
+except KeyboardInterrupt:
+    sys.exit(130)
+"""

@@ -24,7 +24,8 @@ def main() -> None:
     import tests.fuzz.test_files
     import tests.fuzz.test_logs
     import tests.fuzz.test_maps
-    import tests.fuzz.test_osm  # noqa: F401  # importing them fills TARGETS
+    import tests.fuzz.test_osm
+    import tests.fuzz.test_tables  # noqa: F401  # importing them fills TARGETS
 
     end = time.monotonic() + arguments.seconds
     for turn in itertools.count(arguments.first_seed):

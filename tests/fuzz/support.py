@@ -30,6 +30,8 @@ FUZZ = settings(
     suppress_health_check=list(HealthCheck),
 )
 FOLDER = tempfile.TemporaryDirectory(prefix="fireworld-fuzz-")
+tried = {"n": 0}
+"""How many inputs were tried by this process."""
 TARGETS: dict[str, Callable[[], None]] = {}
 """Every fuzz test by its name, for `python -m tests.fuzz`."""
 
@@ -43,6 +45,7 @@ def target(test: Callable[[], None]) -> Callable[[], None]:
 @contextmanager
 def only_complaints() -> Iterator[None]:
     """Let nothing come out but a FireworldError of one printable line, within a second and little memory."""
+    tried["n"] += 1
     began, memory = time.process_time(), _peak_bytes()
     message = ""
     try:

@@ -22,7 +22,8 @@ def main() -> int:
 
     with atheris.instrument_imports(include=["fireworld", "recorder"]):
         import tests.fuzz.test_files
-        import tests.fuzz.test_logs  # noqa: F401  # importing them fills TARGETS
+        import tests.fuzz.test_logs
+        import tests.fuzz.test_tables  # noqa: F401  # importing them fills TARGETS
         from tests.fuzz.support import TARGETS
 
     names = arguments.names or list(TARGETS)

@@ -2,6 +2,8 @@
 
 import json
 import sys
+import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -116,3 +118,85 @@ def test_the_digest_covers_what_was_brought_in(here, fireworld):
     assert find_policy("brought:P").digest != first
     header = json.loads(fireworld("info", "a.mcap", "--json").out)["header"]
     assert header["policy_digest"] == first
+
+
+ODD = """
+import os
+import sys
+import threading
+from pathlib import Path
+import threading
+
+
+class Good:
+    def decide(self, observation):
+        return 0
+
+
+class DigestExits(Good):
+    @property
+    def digest(self):
+        sys.exit(0)
+
+
+class Async:
+    async def decide(self, observation):
+        return 0
+
+
+class Moves(Good):
+    def begin(self, city, n_brigades, seed):
+        os.chdir("/")
+
+
+class Ignored(Good):
+    def decide(self, observation):
+        if observation.step == 1 and observation.brigade == 0:
+            thread = threading.Thread(target=lambda: 1 // 0)
+            thread.start()
+            thread.join()
+        return 0
+"""
+
+
+@pytest.fixture
+def odd(here):
+    (here / "odd.py").write_text(ODD)
+    return here
+
+
+def test_a_digest_that_exits_turns_no_gate_green(odd, fireworld):
+    done = fireworld("compare", "chief", "odd.py:DigestExits", "--scenarios", "quick", "--seeds", 1, "--gate")
+    assert (done.code, done.out) == (2, "")
+    assert done.err == "fireworld: policy odd:DigestExits: its attributes: SystemExit: 0 (odd.py, line 17)\n"
+
+
+def test_whatever_comes_to_the_top_is_an_error(fireworld, monkeypatch):
+    class OwnError(BaseException):
+        pass
+
+    for error in (SystemExit(0), OwnError("own"), GeneratorExit()):
+        monkeypatch.setattr("fireworld.scenario.load_scenario", lambda _, error=error: (_ for _ in ()).throw(error))
+        done = fireworld("run", "quick")
+        assert (done.code, len(done.err.splitlines())) == (2, 1)
+        assert done.err.startswith("fireworld: internal error: ")
+
+
+def test_an_answer_to_wait_for_is_refused(odd, fireworld):
+    done = fireworld("run", "quick", "--policy", "odd.py:Async", "--steps", 2)
+    assert done.code == 2
+    assert "got a coroutine; decide without async" in done.err
+
+
+def test_outputs_are_written_where_they_were_asked_for(odd, fireworld):
+    words = ("compare", "odd.py:Moves", "chief", "--scenarios", "quick", "--seeds", 1, "--jobs", 1, "--junit", "a.xml")
+    assert fireworld(*words).code == 0
+    assert (odd / "a.xml").exists()
+    assert Path.cwd() == odd
+
+
+def test_what_threads_raise_is_a_line(odd, fireworld, monkeypatch):
+    monkeypatch.setattr(threading, "excepthook", threading.__excepthook__)
+    done = fireworld("run", "quick", "--policy", "odd.py:Ignored", "--steps", 2)
+    assert done.code == 0
+    assert "warning: what a thread raised is ignored: ZeroDivisionError" in done.err

@@ -53,7 +53,7 @@ def protobuf_types():
     """The protobuf library's message class of every record type, from the descriptors of a log."""
     pool = descriptor_pool.DescriptorPool()
     types = {}
-    for channel in own_channels():
+    for channel in own_channels(imported=True):
         pool.Add(descriptor_pb2.FileDescriptorSet.FromString(channel.schema).file[0])
     for topic in TOPICS:
         descriptor = pool.FindMessageTypeByName(f"{schema.PACKAGE}.{message_of(topic).name}")

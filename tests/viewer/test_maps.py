@@ -235,6 +235,19 @@ def test_a_state_has_what_the_record_says(small):
     assert state.brigades.tank_share.tolist() == pytest.approx((record.brigades.tank_litres / 15000).tolist())
 
 
+def test_what_cannot_be_drawn_is_a_line(monkeypatch):
+    from fireworld_viewer.pictures import figure_files
+
+    figure = figure_files.new_figure(1, 1)
+
+    def fails(*_, **__):
+        raise RuntimeError("raster overflow")
+
+    monkeypatch.setattr(figure, "savefig", fails)
+    with pytest.raises(ViewError, match="these values cannot be drawn: RuntimeError: raster overflow"):
+        figure_files.png_bytes(figure)
+
+
 def bottom_of(figure):
     """The lowest edge of the maps, as a part of the figure's height."""
     return min(axes.get_position().y0 for axes in figure.axes)

@@ -50,6 +50,8 @@ ACTIVITY_RGB: Final[tuple[Rgb, ...]] = (
     (10, 10, 10),  # dead
 )
 """By index into records.ACTIVITIES."""
+BRIGADE_UNKNOWN_RGB: Final = ACTIVITY_RGB[2]
+"""Of a brigade of which a log does not have what it does."""
 
 ACTION_RGB: Final[tuple[Rgb, ...]] = (
     (86, 180, 233),  # easiest

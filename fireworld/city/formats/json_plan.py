@@ -11,13 +11,14 @@ from typing import Any, Final, Never
 
 import numpy as np
 
-from fireworld.city.city import Footprints, Int64Array, Plan, RoadMap, StreetMap, freeze
+from fireworld.city.city import Footprints, Int32Array, Int64Array, Plan, RoadMap, StreetMap, freeze
 from fireworld.city.crossings import crossing_outlines
 from fireworld.city.fields import Fields
 from fireworld.city.footpaths import footpaths
 from fireworld.city.formats.json_roads import read_links, read_roads
 from fireworld.city.outlines import Building, Corner, assemble, centroid_mm, doubled_area_mm2, without_repeats
 from fireworld.city.roads import streets_of_roads
+from fireworld.city.streets import check_nodes
 from fireworld.errors import CityError, expected
 
 READ_KEYS: Final = ("name", "source", "buildings", "streets", "hydrants", "roads", "passages", "links")
@@ -31,6 +32,8 @@ BUILDING_TYPES: Final = ("building", "refuge", "firestation", "ambulancecentre",
 COORDINATE_MAX_MM: Final = 1_000_000_000
 """A thousand kilometres from the origin: squares of distances still fit 64 bits."""
 ID_MAX: Final = 2**31 - 1
+CORNERS_MAX: Final = 4_000
+"""Of one outline; twice what a way of OpenStreetMap can have."""
 FLOORS_MAX: Final = 500
 GROUND_AREA_MAX_M2: Final = 10_000_000
 BUILDINGS_MAX: Final = 500_000
@@ -147,6 +150,9 @@ def _source_id(where: str, building_id: int, item: dict[str, Any]) -> str:
 
 def _corners(item: Fields) -> list[Corner]:
     """Read an outline: [x0, y0, x1, y1, ...], just as it is listed."""
+    n_numbers = len(item.array("apexes"))
+    if n_numbers > 2 * CORNERS_MAX:
+        item.refuse("apexes", f"at most {CORNERS_MAX} corners", f"{n_numbers // 2} of them")
     numbers = item.integers("apexes", low=-COORDINATE_MAX_MM, high=COORDINATE_MAX_MM)
     if len(numbers) % 2:
         item.refuse("apexes", "as many y as x", f"{len(numbers)} numbers")
@@ -205,10 +211,12 @@ def _streets(document: Fields, footprints: Footprints, roads: RoadMap | None) ->
             document.refuse("hydrants", "ids of roads", unknown[0])
         return streets_of_roads(roads, footprints, places)
     if "streets" not in document.object():
+        check_nodes(len(footprints.building_id) + len(hydrants), where=document.where)
         return footpaths(footprints, hydrants)
     streets = Fields(document.where, "streets.", document.object()["streets"])
     streets.allow_only("nodes", "edges")
     nodes = streets.pairs("nodes", **span)
+    check_nodes(len(nodes), where=document.where)
     edges = streets.pairs("edges", low=0, high=len(nodes) - 1)
     for index, (start, end) in enumerate(edges):
         if start == end:
@@ -217,11 +225,23 @@ def _streets(document: Fields, footprints: Footprints, roads: RoadMap | None) ->
     return StreetMap(
         node_mm=node.astype(np.int32),
         street=np.array(edges, dtype=np.int32),
-        hydrant_node=np.array([_nearest_node(node, hydrant) for hydrant in hydrants], dtype=np.int32),
+        hydrant_node=_nearest_nodes(node, np.array(hydrants, dtype=np.int64).reshape(-1, 2)),
     )
 
 
-def _nearest_node(node: Int64Array, point: Corner) -> int:
-    """Find the street node nearest to a point; ties go to the lowest."""
-    away = node - np.array(point, dtype=np.int64)
-    return int(np.argmin((away * away).sum(axis=1)))
+def _nearest_nodes(node: Int64Array, points: Int64Array) -> Int32Array:
+    """Find the street node nearest to each point; ties go to the lowest."""
+    import shapely
+
+    places, first = np.unique(node, axis=0, return_index=True)
+    at: Any = shapely.points(places)
+    tree = shapely.STRtree(at)
+    (point, _), distance = tree.query_nearest(shapely.points(points), return_distance=True)
+    reach = np.zeros(len(points))
+    reach[point] = distance
+    # Distances are rounded there; among all that are as near within a millimetre, whole numbers decide.
+    point, candidate = tree.query(shapely.points(points), predicate="dwithin", distance=reach + 1.0)
+    away = places[candidate] - points[point]
+    best = np.lexsort((first[candidate], (away * away).sum(axis=1), point))
+    best = best[np.unique(point[best], return_index=True)[1]]
+    return np.asarray(first[candidate[best]], dtype=np.int32)

@@ -12,12 +12,15 @@ from typing import IO, Any, Final
 import numpy as np
 
 from fireworld.errors import TrainingError, expected
+from fireworld.files import read_input
+from fireworld.npz import ArchiveError, read_npz
 from fireworld.records import Array
 
 SUFFIX: Final = ".npz"
 FIXED_TIME: Final = (1980, 1, 1, 0, 0, 0)
 SIZE_MAX_BYTES: Final = 300_000_000
 """Above the tables of a thousand brigades, which are the most that a scenario can have."""
+HEADER_BYTES_MAX: Final = 1 << 24
 
 
 def pack_arrays(place: Path | IO[bytes], header: Mapping[str, Any], arrays: Mapping[str, Array]) -> None:
@@ -31,31 +34,20 @@ def pack_arrays(place: Path | IO[bytes], header: Mapping[str, Any], arrays: Mapp
 
 def read_bytes(path: Path) -> bytes:
     """Read a file that is meant to be a team file; TrainingError if it cannot be read, or is too large."""
-    try:
-        if path.stat().st_size > SIZE_MAX_BYTES:
-            wanted = f"a team file of at most {SIZE_MAX_BYTES} bytes"
-            raise TrainingError(expected(str(path), "", wanted, "a larger one"))
-        return path.read_bytes()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise TrainingError(expected(str(path), "", "a team file", reason)) from None
+    return read_input(path, what="a team file", n_bytes_max=SIZE_MAX_BYTES, error=TrainingError)
 
 
 def parse_arrays(content: bytes, *, source: str) -> tuple[dict[str, Any], dict[str, Array]]:
     """Return the header and the arrays of such a file; TrainingError, which names the source, if it is none."""
-    arrays = {}
     try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            size = sum(item.file_size for item in archive.infolist())
-            if size > SIZE_MAX_BYTES:
-                raise ValueError(f"{size} bytes of arrays")  # noqa: TRY301 - reported as all damage is
-            for item in archive.namelist():
-                with archive.open(item) as file:
-                    arrays[item.removesuffix(".npy")] = np.lib.format.read_array(file, allow_pickle=False)
-    except Exception as error:  # noqa: BLE001 - zipfile and numpy raise many kinds for a damaged file
-        raise TrainingError(expected(source, "", "a team file (.npz)", f"{type(error).__name__}: {error}")) from None
+        arrays = read_npz(io.BytesIO(content))
+    except ArchiveError as error:
+        raise TrainingError(expected(source, "", "a team file (.npz)", error.detail)) from None
     if "header" not in arrays:
         raise TrainingError(expected(source, "", "a team file", "no header in it"))
+    if arrays["header"].nbytes > HEADER_BYTES_MAX:
+        wanted = f"at most {HEADER_BYTES_MAX} bytes"
+        raise TrainingError(expected(source, "header", wanted, arrays["header"].nbytes))
     try:
         header = json.loads(arrays.pop("header").tobytes())
     except (ValueError, RecursionError) as error:

@@ -14,7 +14,7 @@ from fireworld_recorder.reader import Log, open_log
 from fireworld_recorder.totals import plain
 
 from fireworld.errors import FireworldError, OutputError, expected
-from fireworld.files import check_output
+from fireworld.files import check_output, read_text_file
 from fireworld.junit import clean, report
 from fireworld.recording.difference_text import change_lines
 from fireworld.recording.golden.again import run_again
@@ -221,7 +221,7 @@ def compare_golden(path: Path, fresh: Run | TrainedAgain) -> GoldenResult:
 
 def _text_beside(path: Path) -> str:
     beside = text_path(path)
-    return beside.read_text(encoding="utf-8", errors="replace") if beside.is_file() else ""
+    return read_text_file(beside) if beside.is_file() else ""
 
 
 def goldens_junit(results: Sequence[GoldenResult]) -> bytes:

@@ -12,6 +12,7 @@ from fireworld_recorder.reader import open_log
 from fireworld_recorder.writer import PARTIAL_SUFFIX
 
 from fireworld.errors import FireworldError, OutputError
+from fireworld.files import read_text_file
 from fireworld.recording.golden.check import FOLDER, find_goldens
 from fireworld.recording.golden.store import SUFFIX, TEXT_SUFFIX, text_path
 from fireworld.recording.inputs import is_training
@@ -68,7 +69,7 @@ def leftovers_of(folder: Path = FOLDER) -> list[Path]:
 
 
 def _is_golden_text(path: Path) -> bool:
-    lines = path.read_text(encoding="utf-8", errors="replace").splitlines() if path.is_file() else []
+    lines = read_text_file(path).splitlines() if path.is_file() else []
     return bool(lines) and lines[-1].startswith("hash ")
 
 

@@ -11,7 +11,7 @@ from fireworld_recorder.totals import final_outcome
 from fireworld_recorder.writer import LogWriter
 
 from fireworld.errors import OutputError
-from fireworld.files import write_file
+from fireworld.files import read_text_file, write_file
 from fireworld.parameters import PRESETS
 from fireworld.recording.golden.spec import GoldenSpec, hash_line, spec_of
 from fireworld.recording.golden.training import store_training, training_text
@@ -41,18 +41,24 @@ def text_path(path: Path) -> Path:
     return path.with_suffix(TEXT_SUFFIX)
 
 
-def store_golden(path: Path, fresh: Steps | TrainedAgain) -> None:
-    """Write a golden and its text, replacing what is there; each is written beside and renamed (OutputError)."""
-    store_recording(path, fresh)
+def store_golden(path: Path, fresh: Steps | TrainedAgain, *, free: bool = False) -> None:
+    """Write a golden and its text; each is written beside and renamed, replacing what is there (OutputError).
+
+    Args:
+        path: of the recording.
+        fresh: the run, or what is trained.
+        free: there must be no golden of that name.
+    """
+    store_recording(path, fresh, free=free)
     store_text(path)
 
 
-def store_recording(path: Path, fresh: Steps | TrainedAgain) -> None:
-    """Write a recording, replacing what is there; a training is trained for it (OutputError)."""
+def store_recording(path: Path, fresh: Steps | TrainedAgain, *, free: bool = False) -> None:
+    """Write a recording, `free` as for `store_golden`; a training is trained for it (OutputError)."""
     if isinstance(fresh, TrainedAgain):
         store_training(path, fresh)
         return
-    with LogWriter(path, fresh.header, fresh.city, force=True) as writer:
+    with LogWriter(path, fresh.header, fresh.city, force=not free, scratch_suffix=".storing") as writer:
         for record in fresh:
             writer.write(record)
 
@@ -66,7 +72,7 @@ def store_text(path: Path) -> bool:
     """
     text = training_text(open_training(path)) if is_training(path) else golden_text(open_log(path))
     beside, content = text_path(path), text.encode()
-    if beside.is_file() and beside.read_bytes() == content:
+    if beside.is_file() and read_text_file(beside).encode() == content:
         return False
     write_file(beside, content)
     return True

@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 from fireworld_recorder.reader import open_log
 
 from fireworld.errors import FireworldError, LogError, OutputError, expected
-from fireworld.files import write_file
+from fireworld.files import read_text_file, write_file
 from fireworld.interrupt import gentle_interrupt
 from fireworld.recording.golden.again import run_again
 from fireworld.recording.golden.check import FOLDER, GoldenResult, check_goldens, compare_golden
@@ -71,7 +71,7 @@ def add_golden(
     fresh = run_again(prepare_golden(spec, folder))
     make_folder(folder)
     with gentle_interrupt():
-        store_golden(path, fresh)
+        store_golden(path, fresh, free=True)
     return path
 
 
@@ -107,7 +107,7 @@ def add_training(
     spec = make_training_spec(folder, curriculum=curriculum, method=method, seed=seed, stages=stages, settings=settings)
     again = prepare_training(spec, folder)
     make_folder(folder)
-    store_golden(path, again)
+    store_golden(path, again, free=True)
     return path
 
 
@@ -146,7 +146,7 @@ def update_goldens(
     changed = [result for result in results if result.differs]
     with gentle_interrupt():  # what begins here takes a moment, and belongs together
         if changed:
-            write_file(folder / REASONS, _reasons(folder / REASONS, reason, changed).encode())
+            write_file(folder / REASONS, _reasons(folder / REASONS, reason, changed))
         return [_update(result) for result in results]
 
 
@@ -206,7 +206,7 @@ def _reasons(path: Path, reason: str, changed: Sequence[GoldenResult]) -> str:
 
     Where the last entry has this reason it is the same update, which was killed: what it lacks is added to it.
     """
-    before = path.read_text(encoding="utf-8") if path.is_file() else REASONS_TITLE
+    before = read_text_file(path, strict=True) if path.is_file() else REASONS_TITLE
     head, lines = f"\n* {reason}\n", [f"  * {result.name}: {result.sentence}\n" for result in changed]
     last = before.rpartition("\n* ")[2]
     if not f"\n* {last}".startswith(head):

@@ -22,7 +22,7 @@ ENDINGS: Final = (*STILLS, *FILMS)  # of files that can be rendered
 
 def map_of(run: Recording, record: StepRecord) -> Picture:
     """Return a map of the city after a step; ViewError if matplotlib is not installed."""
-    title = f"{run.header.scenario}, {run.header.policy}, seed {run.header.seed}: step {record.step}"
+    title = f"{run.header.title}: step {record.step}"
     with plain_style():
         return Picture(title, png_bytes(draw_record(run.city, record, title=title)))
 

@@ -21,14 +21,14 @@ from fireworld_viewer.story.steps import evenly_spaced
 from fireworld.errors import one_line
 from fireworld.files import check_output, write_file
 from fireworld.html_page import compared_row, html_credit, html_figure, html_page, html_table, text_cell
-from fireworld.outcome import QUANTITIES
+from fireworld.outcome import NOT_RECORDED, QUANTITIES
 from fireworld.recording.inputs import AnyRun, open_one_or_two, run_name
 from fireworld.records import ACTION_NAMES, EVENT_KINDS, StoredRun
 from fireworld.version import simulator_version
 
 _STYLE: Final = """
 pre { background: #f0ede6; padding: .7rem 1rem; overflow-x: auto; font-size: 13px; }
-td.text { overflow-wrap: anywhere; } summary { cursor: pointer; }
+td.text { overflow-wrap: anywhere; } td.text:first-child { white-space: nowrap; } summary { cursor: pointer; }
 """
 ENDINGS: Final = (".html", ".htm")  # of the page's file
 SCENARIO: Final = "scenario.yaml"  # every recording has its scenario in a file of that name
@@ -53,16 +53,19 @@ def report(logs: AnyRun | Sequence[AnyRun], output: Path | str, *, force: bool =
         images = {
             "maps": png_bytes(draw_steps(runs, evenly_spaced(runs, _MAPS))),
             "curves": png_bytes(draw_curves(runs)),
-            "timeline": png_bytes(draw_timeline(runs)),
         }
-    write_file(Path(output), _run_page(runs, images).encode())
+        if any(map(_has_decisions, runs)):
+            images["timeline"] = png_bytes(draw_timeline(runs))
+    write_file(Path(output), _run_page(runs, images))
 
 
 def _run_page(logs: Sequence[StoredRun], images: Mapping[str, bytes]) -> str:
-    """Write the page, with PNG files of the "maps", "curves" and "timeline" of all runs."""
+    """Write the page, with PNG files: "maps" and "curves" of all runs, "timeline" of decisions if there is one."""
     names = _names(logs)
-    headers = [log.header for log in logs]
-    title = " against ".join(f"{one_line(one.scenario)}, {one_line(one.policy)}, seed {one.seed}" for one in headers)
+    title = " against ".join(one_line(log.header.title) for log in logs)
+    rewarded = not all(log.header.lacks("rewards") for log in logs)
+    imported = all(log.header.imported for log in logs)
+    signs = " Rewards are never above zero: less is worse." if rewarded else ""
     body = [
         f"<h1>{escape(title)}</h1>",
         *(f'<p class="caveat">{escape(f"{_name(log)}: {log.damage}; the page ends with the last good step")}</p>'
@@ -72,14 +75,15 @@ def _run_page(logs: Sequence[StoredRun], images: Mapping[str, bytes]) -> str:
         "<h2>Maps</h2>",
         html_figure(images["maps"], _MAPS_CAPTION if len(logs) == 1 else f"{_MAPS_CAPTION} {_ROWS_CAPTION}"),
         "<h2>Curves</h2>",
-        html_figure(images["curves"], "Steps are simulated minutes. Rewards are never above zero: less is worse."),
+        html_figure(images["curves"], f"Steps are simulated minutes.{signs}"),
         "<h2>Decisions</h2>",
-        html_figure(images["timeline"], "White where a brigade made no choice: it refilled, or nothing burned."),
+        *([html_figure(images["timeline"], "White where a brigade made no choice: it refilled, or nothing burned.")]
+          if "timeline" in images else []),
         *(part for log, name in zip(logs, names, strict=True) for part in _decisions(log, name)),
         "<h2>Events</h2>",
         _event_counts(logs, names),
         *(part for log, name in zip(logs, names, strict=True) for part in _events_of_note(log, name)),
-        "<h2>How to get the same again</h2>",
+        f"<h2>{'Where it comes from' if imported else 'How to get the same again'}</h2>",
         *(part for log, name in zip(logs, names, strict=True) for part in _repetition(log, name)),
         *_scenarios(logs, names),
         *html_credit(log.city.attribution for log in logs),
@@ -111,7 +115,7 @@ def _outcome_of(log: StoredRun) -> dict[str, str]:
     return {
         "scenario": one_line(log.header.scenario),
         "policy": one_line(log.header.policy),
-        "seed": str(log.header.seed),
+        "seed": NOT_RECORDED if log.header.lacks("seed") else str(log.header.seed),
         "last step": f"{last.step}: {'nothing burned any more' if last.terminated else ended}",
         **{quantity.label: quantity.text(outcome) for quantity in QUANTITIES},
         "score by today's rule": f"{outcome.score_now:.3f}",
@@ -121,6 +125,9 @@ def _outcome_of(log: StoredRun) -> dict[str, str]:
 
 def _decisions(log: StoredRun, name: str) -> Iterator[str]:
     """Write how often each brigade chose which action, and which targets it named itself."""
+    if not _has_decisions(log):
+        yield f"<p>{escape(name)}: {NOT_RECORDED}.</p>"
+        return
     found = count_choices(log)
     used = [k for k in range(len(ACTION_NAMES)) if any(one.n_by_action[k] for one in found)]
     explored = any(one.n_explored for one in found)
@@ -144,6 +151,10 @@ def _decisions(log: StoredRun, name: str) -> Iterator[str]:
         more = sum(max(0, len(one.own_targets) - _TARGETS_SHOWN) for one in found)
         if more:
             yield f"<p>The {_TARGETS_SHOWN} targets that each brigade pursued longest; {more} more are left out.</p>"
+
+
+def _has_decisions(log: StoredRun) -> bool:
+    return not log.header.lacks("decisions")
 
 
 def _share(one: Counts, n: int) -> str:
@@ -206,8 +217,10 @@ def _repetition(log: StoredRun, name: str) -> Iterator[str]:
     rows = {
         "recording": _name(log),
         "scenario": f"{header.scenario}, {header.scenario_digest}",
-        "policy": f"{header.policy}, {header.policy_digest}",
-        "seed": str(header.seed),
+        "policy": ", ".join(word for word in (header.policy, header.policy_digest) if word),
+        "seed": "" if header.lacks("seed") else str(header.seed),
+        "origin": header.origin,
+        "not recorded": header.not_recorded,
         "forked from": header.forked_from,
         "digest of the run": log.digest,
         "recorded by": f"fireworld {simulator_version(header.fireworld_version, header.simulator_digest)}",
@@ -234,6 +247,8 @@ def _scenarios(logs: Sequence[StoredRun], names: Sequence[str]) -> Iterator[str]
 def _commands(log: StoredRun) -> str:
     """Return the commands that replay a run, and run it anew; a run that branched off has no beginning of its own."""
     header, recording = log.header, shlex.quote(one_line(_name(log)))
+    if header.imported:
+        return f"fireworld info {recording}   # an imported log has no decisions: it cannot be replayed"
     lines = [f"fireworld verify {recording}   # from the recording alone: every step is computed again and compared"]
     if not header.forked_from:
         words = ["fireworld", "run", SCENARIO, "--policy", one_line(header.policy)]

@@ -220,7 +220,7 @@ def replay_every(
     if not place.is_dir():
         raise OutputError(expected(str(place), "", "an existing folder", "none", "make it first"))
     names = [one.name for one in training.scenarios]
-    training.position(scenario if scenario is not None else training.lines[0].scenario if len(training) else 0, -1)
+    training.position(0 if scenario is None else scenario, -1)  # every training begins in the first
     chosen = {
         number: place / episode_file(names[line.scenario], line.episode)
         for number, line in enumerate(training.lines)

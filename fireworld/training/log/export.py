@@ -218,6 +218,7 @@ class _File:
         self._held: list[Rows] = []
         self._n_held = self._n_rows = 0
         self._writer: Any = None
+        self._file: Any = None
 
     def add(self, rows: Rows) -> None:
         self._held.append(rows)
@@ -232,7 +233,8 @@ class _File:
 
     def close(self) -> None:
         if self._writer is not None:
-            self._writer.close()
+            with self._file:
+                self._writer.close()
 
     def _flush(self) -> None:
         import pyarrow as pa
@@ -244,7 +246,8 @@ class _File:
         table = pa.table({key: pa.array(_texts(values)) for key, values in arrays.items()})
         if self._writer is None:
             schema = table.schema.with_metadata(self._facts)
-            self._writer = pq.ParquetWriter(self._path, schema, compression="zstd")
+            self._file = self._path.open("wb")  # arrow itself takes no names of any bytes
+            self._writer = pq.ParquetWriter(self._file, schema, compression="zstd")
         self._writer.write_table(table.replace_schema_metadata(self._facts))
         self._n_rows += self._n_held
         self._held, self._n_held = [], 0

@@ -24,7 +24,7 @@ from fireworld.shown import SHOWN_MAX, Block, Shown
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import Curriculum, CurriculumStage
 from fireworld.training.log.learned import LearnedEpisode, learned
-from fireworld.training.log.records import TRAINING, Episode, PartCommit, Plan, TrainingHeader
+from fireworld.training.log.records import TRAINING, Episode, PartCommit, Plan, TrainingHeader, check_places
 from fireworld.training.log.writer import CITY_FOLDER, CURRICULUM_ATTACHMENT, METHOD_ATTACHMENT
 from fireworld.training.method import Method, Report, Trainer
 from fireworld.training.methods import find_method
@@ -117,12 +117,15 @@ class TrainingLog(Shown):
         """Yield the parts: records by type.
 
         Raises:
-            LogError: the log changed since it was opened, or a part holds nothing of its method.
+            LogError: the log changed since it was opened, or a part holds nothing of its method or does not fit.
         """
         for number, raw in enumerate(self.raw_parts(first), first):
             payloads = dict(raw)
             try:
-                yield {one: decode(one, payloads[one.topic]) for one in self._topics if one.topic in payloads}
+                part = {one: decode(one, payloads[one.topic]) for one in self._topics if one.topic in payloads}
+                for record in part.values():
+                    check_places(record, len(self.scenarios))
+                yield part
             except LogError as error:
                 raise LogError(f"{self.path}: part {number}: {error}") from error
 
@@ -330,7 +333,7 @@ def _setting(header: TrainingHeader) -> tuple[Method, Curriculum, CityCache]:
             for stage in text["stages"]
         )
         curriculum = Curriculum(str(text["name"]), stages)
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise LogError(f"attachments: {CURRICULUM_ATTACHMENT} and {METHOD_ATTACHMENT} make no sense: {error}") from None
     except FireworldError as error:
         raise LogError(f"attachments: {error}") from None

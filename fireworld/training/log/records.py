@@ -25,6 +25,8 @@ from fireworld.simulation.state import fresh_trace
 
 FORMAT: Final = "fireworld-training/1"
 PACKAGE: Final = "fireworld.training.v1"
+SEED_MAX: Final = 2**63 - 1
+"""Of an episode's run: what the kernels count with."""
 TERM_NAMES: Final = tuple(term.name for term in TERMS)
 
 
@@ -222,6 +224,22 @@ class PartCommit:
     step: int = value(1, "sfixed32", "number of the part, from 0")
     done: bool = value(2, "bool", "the training is at its end")
     hash: bytes = value(3, "bytes", "32 bytes, chained to the commit before: the digest of the training up to here")
+
+
+def check_places(record: Any, n_scenarios: int) -> None:
+    """Check that a record is of scenarios that the plan has, and of seeds that a run can have.
+
+    Raises:
+        LogError: it is not.
+    """
+    fires = {Episode: ("scenario", "seed"), Tried: ("fire", "seed")}.get(type(record))
+    if fires is None:
+        return
+    scenario, seed = (np.atleast_1d(getattr(record, name)) for name in fires)
+    if len(scenario) and not 0 <= int(scenario.min()) <= int(scenario.max()) < n_scenarios:
+        raise LogError(f"{record.topic}: {fires[0]}: a scenario that the plan has not")
+    if len(seed) and int(seed.max()) > SEED_MAX:
+        raise LogError(f"{record.topic}: {fires[1]}: {int(seed.max())} is above {SEED_MAX}, the largest of a run")
 
 
 TRAINING: Final = LogKind(

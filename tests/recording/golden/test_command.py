@@ -196,9 +196,9 @@ def test_update_interrupted_while_it_writes_finishes_that(kept, golden, change_p
     change_policy("EASIEST")
     store_recording = store.store_recording
 
-    def interrupted(path, fresh):
+    def interrupted(path, fresh, *, free):
         signal.raise_signal(signal.SIGINT)
-        store_recording(path, fresh)
+        store_recording(path, fresh, free=free)
 
     monkeypatch.setattr(store, "store_recording", interrupted)
     assert golden("update", "--reason", "The easiest fire first.").code == 0
@@ -439,3 +439,12 @@ def test_goldens_are_listed_and_removed(kept, golden):
     assert golden("remove", "bad", "quick-easiest", "--leftovers").code == 0
     assert sorted(contents(kept)) == ["notes.txt", "quick-mine-Policy.mcap", "quick-mine-Policy.txt"]
     assert golden("remove", "--leftovers").out == "nothing is left over\n"
+
+
+def test_a_policy_that_changes_the_folder_changes_no_other_golden(here, golden, write_policy):
+    assert golden(*MINE).code == 0
+    assert golden("add", "quick", "--policy", "easiest", "--steps", 4, "--name", "z").code == 0
+    write_policy(
+        "import os\n\n\nclass Policy:\n    def decide(self, observation):\n        os.chdir('/')\n        return 3\n"
+    )
+    assert golden("check").code == 0

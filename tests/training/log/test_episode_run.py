@@ -123,6 +123,8 @@ def test_what_is_in_the_way_stays(make_log, tmp_path):
         replay_every(make_log(), 2, tmp_path / "none")
     with pytest.raises(LogError, match="scenario: expected one of alone-1"):
         replay_every(make_log(), 2, tmp_path, scenario="x")
+    with pytest.raises(LogError, match="method: expected one that learns in episodes, got 'search'"):
+        replay_every(make_log("search"), 2, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]
 
 

@@ -136,6 +136,34 @@ def test_columns_that_cannot_be_are_refused(log, tmp_path):
                 pass
 
 
+@pytest.mark.parametrize(("name", "value"), [("scenario", 99), ("scenario", -1), ("seed", 2**63)])
+def test_places_and_seeds_that_cannot_be_are_refused_by_every_command(log, tmp_path, fireworld, name, value):
+    from dataclasses import replace
+
+    from fireworld_recorder.codec import decode, encode
+
+    from fireworld.training.log.records import Episode
+
+    def change(number, messages):
+        first = ("/episode", encode(replace(decode(Episode, dict(messages)["/episode"]), **{name: value})))
+        return [first, *messages[1:]] if number == 1 else messages
+
+    path = rewrite(log, tmp_path / "a.mcap", change=change)
+    scenario = log.scenarios[0].name
+    for words in (
+        ("info", path),
+        ("verify", path),
+        ("diff", log.path, path),
+        ("diff", path, log.path),
+        ("export", path, "--parquet", tmp_path / "tables"),
+        ("replay", path, "--scenario", scenario, "--episode", 1, "-o", tmp_path / "b.mcap"),
+        ("report", path, "-o", tmp_path / "a.html"),
+    ):
+        done = fireworld(*words)
+        assert (done.code, done.out) == (2, ""), words
+        assert f"a.mcap: part 1: /episode: {name}: " in done.err, words
+
+
 def test_attachments_that_make_no_sense(log, tmp_path):
     from dataclasses import replace
 

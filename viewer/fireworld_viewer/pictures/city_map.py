@@ -58,6 +58,7 @@ class MapState:
     fieryness: NDArray[Any]  # (n,) official codes 0..8
     civilian_hp: NDArray[Any]  # (n_civilians,) health points
     brigades: BrigadeMarks | None = None  # none are drawn if left out
+    civilian_xy_m: NDArray[Any] | None = None  # (n_civilians, 2) positions; those of the start if left out
 
 
 def state_of(city: CityRecord, record: StepRecord) -> MapState:
@@ -65,16 +66,19 @@ def state_of(city: CityRecord, record: StepRecord) -> MapState:
     brigades, n = record.brigades, len(record.brigades.x_m)
     target = np.full(n, -1, dtype=np.int64)
     target[: len(record.decisions.target)] = existing(record.decisions.target, city)
-    full = np.maximum(np.asarray(city.brigade_tank_litres, dtype=np.float64), 1.0)
+    full = np.asarray(city.brigade_tank_litres, dtype=np.float64)
+    known = len(brigades.activity) == n  # not so in imported logs
+    civilians = record.civilians
     return MapState(
         fieryness=record.buildings.fieryness,
         civilian_hp=record.civilians.hp,
         brigades=BrigadeMarks(
             xy_m=np.column_stack([brigades.x_m, brigades.y_m]).astype(np.float64),
-            activity=brigades.activity,
-            tank_share=np.clip(brigades.tank_litres / full, 0.0, 1.0),
-            target=target,
+            activity=brigades.activity if known else None,
+            tank_share=np.clip(brigades.tank_litres / np.maximum(full, 1.0), 0.0, 1.0) if known or full.all() else None,
+            target=target if known else None,
         ),
+        civilian_xy_m=np.column_stack([civilians.x_m, civilians.y_m]) if len(civilians.x_m) else None,
     )
 
 
@@ -109,8 +113,8 @@ class CityMap:
             axes.annotate("R", tuple(self._centers[index]), va="center", color="white", zorder=5, **bold)
             for index in np.asarray(city.refuge_building)
         ]
-        apart_m = self._m_per_point * np.array([7.0, 7.0])
-        xy = _side_by_side(np.column_stack([city.civilian_x_m, city.civilian_y_m]), apart_m)
+        self._apart_m = self._m_per_point * np.array([7.0, 7.0])
+        xy = _side_by_side(np.column_stack([city.civilian_x_m, city.civilian_y_m]), self._apart_m)
         edge: dict[str, Any] = {"edgecolors": INK, "linewidths": 0.8 * self._scale}
         self._civilians: Any = axes.scatter(xy[:, 0], xy[:, 1], s=34 * self._scale, zorder=6, **edge)
         self._balls = axes.scatter(
@@ -138,6 +142,8 @@ class CityMap:
         faces[np.asarray(self.city.refuge_building, dtype=np.int64)] = np.array(colors.REFUGE_RGB) / 255.0
         self._buildings.set_facecolor(list(map(tuple, faces)))
         hp = np.asarray(state.civilian_hp)
+        if state.civilian_xy_m is not None:
+            self._civilians.set_offsets(_side_by_side(state.civilian_xy_m, self._apart_m))
         self._civilians.set_facecolor(colors.health_rgb(hp, np.asarray(self.city.civilian_hp)) / 255.0)
         self._civilians.set_edgecolor(["white" if points <= 0 else INK for points in hp.tolist()])  # seen on black
         self._civilians.set_paths([_marker("X" if points <= 0 else "o") for points in hp.tolist()])

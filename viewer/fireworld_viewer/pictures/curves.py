@@ -13,7 +13,7 @@ from fireworld.records import ACTIVITIES, Array, Recording
 from fireworld_viewer import colors
 from fireworld_viewer.pictures.city_map import hexadecimal
 from fireworld_viewer.pictures.figure_files import INK, PAIR_COLORS, label_text, new_figure, open_frame
-from fireworld_viewer.story.series import LABELS, action_name, chosen_actions, series
+from fireworld_viewer.story.series import LABELS, action_name, chosen_actions, recorded, series
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,7 +40,11 @@ class Panel:
     def curves(self, recording: Recording) -> list[tuple[Array, str, str, str, float]]:
         """Return the numbers of each curve, its label, color, line and width."""
         if self.styles is not None:
-            return [(series(recording, field), LABELS[field], *look, 1.7) for field, look in self.styles.items()]
+            return [
+                (series(recording, field), LABELS[field], *look, 1.7)
+                for field, look in self.styles.items()
+                if recorded(recording, field)
+            ]
         n, tanks = len(TANKS), series(recording, "brigades.tank_litres").T
         return [  # thinner and thinner: of brigades that refill together, all can be seen
             (litres, f"brigade {k}", TANKS[k % n], "-" if k < n else "--", 2.8 - 0.6 * (k % 4))
@@ -76,7 +80,8 @@ PANELS: Final = (
 def draw_curves(recordings: Sequence[Recording]) -> Figure:
     """Draw all panels: those of two recordings beside each other, on the same scales."""
     pair = len(recordings) > 1
-    n_rows = len(PANELS) if pair else -(-len(PANELS) // 2)
+    panels = [panel for panel in PANELS if panel.styles is None or any(map(panel.curves, recordings))]
+    n_rows = len(panels) if pair else -(-len(panels) // 2)
     high = n_rows * _PANEL_INCHES
     figure = new_figure(_WIDTH_INCHES, high)
     # Room for the legends: right of the second column, of two columns of one run between them too.
@@ -84,7 +89,7 @@ def draw_curves(recordings: Sequence[Recording]) -> Figure:
         left=0.075, right=0.872, bottom=0.55 / high, top=1.0 - 0.3 / high, wspace=0.12 if pair else 0.52, hspace=0.3
     )
     grid = figure.subplots(n_rows, 2, sharex=True, sharey="row" if pair else "none", squeeze=False)
-    for index, panel in enumerate(PANELS):
+    for index, panel in enumerate(panels):
         places = grid[index] if pair else [grid[divmod(index, 2)]]
         shown = [panel.curves(one) for one in recordings]
         alike = len({tuple(label for _, label, *_ in curves) for curves in shown}) == 1
@@ -96,6 +101,8 @@ def draw_curves(recordings: Sequence[Recording]) -> Figure:
         limits = _limits([numbers for curves in shown for numbers, *_ in curves], from_zero=panel.from_zero)
         for axes in places:
             axes.set_ylim(limits)
+    for axes in grid.ravel()[len(panels) if not pair else 2 * len(panels) :]:
+        axes.set_visible(False)
     figure.text(0.475, 0.18 / high, "step (a simulated minute)", fontsize=10, color=INK, ha="center", va="center")
     return figure
 

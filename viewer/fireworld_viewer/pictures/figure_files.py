@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from fireworld.errors import ViewError
+from fireworld.errors import ViewError, described
 from fireworld.files import check_output, written_beside
 
 if TYPE_CHECKING:
@@ -82,6 +82,17 @@ def plain_style() -> Iterator[None]:
         yield
 
 
+@contextmanager
+def drawing() -> Iterator[None]:
+    """Turn what matplotlib raises while it draws, of numbers that no picture can hold, into a line (ViewError)."""
+    try:
+        yield
+    except (ArithmeticError, RuntimeError, ValueError) as error:
+        if isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
+            raise
+        raise ViewError(f"pictures: these values cannot be drawn: {described(error)}") from error
+
+
 def save_figure(figure: Figure, path: Path, *, force: bool = False) -> None:
     """Write a figure as the kind of picture that the file's ending names.
 
@@ -90,12 +101,13 @@ def save_figure(figure: Figure, path: Path, *, force: bool = False) -> None:
     """
     check_output(path, endings=STILLS, force=force)
     ending = path.suffix.lower()
-    with written_beside(path) as partial:
+    with written_beside(path) as partial, drawing():
         figure.savefig(partial, format=ending[1:], metadata=dict(STILLS[ending]))
 
 
 def png_bytes(figure: Figure) -> bytes:
     """Return a figure as a PNG file."""
     data = io.BytesIO()
-    figure.savefig(data, format="png", metadata=dict(STILLS[".png"]))
+    with drawing():
+        figure.savefig(data, format="png", metadata=dict(STILLS[".png"]))
     return data.getvalue()

@@ -14,7 +14,7 @@ from fireworld.files import written_beside
 from fireworld.records import Recording
 from fireworld_viewer import colors
 from fireworld_viewer.pictures.city_map import GROUND, STREET
-from fireworld_viewer.pictures.figure_files import INK, PAPER, import_library
+from fireworld_viewer.pictures.figure_files import INK, PAPER, drawing, import_library
 from fireworld_viewer.pictures.map_grid import MapGrid, labels_on
 from fireworld_viewer.pictures.maps import cells_of
 from fireworld_viewer.story.steps import ShownStep
@@ -79,7 +79,8 @@ class FilmFrames:
             item.set_animated(True)
         for row in self._grid.legend_rows:  # not drawn, but given their places
             row.set_alpha(0.0)
-        self._canvas.draw()
+        with drawing():
+            self._canvas.draw()
         self._ground = self._canvas.copy_from_bbox(self._grid.figure.bbox)
         self._rows: dict[tuple[int, str], Any] = {}
 

@@ -184,6 +184,7 @@ def count_marks(city: CityRecord, state: MapState) -> dict[str, int]:
     brigades = state.brigades
     if brigades is not None and brigades.activity is None:
         counts[_BRIGADE] = len(brigades.xy_m)
+        counts[_TANK] = 0 if brigades.tank_share is None else len(brigades.xy_m)
     elif brigades is not None:
         doing = np.bincount(np.asarray(brigades.activity, dtype=np.int64), minlength=len(_DOING)).tolist()
         counts |= dict(zip(_DOING, doing, strict=True))

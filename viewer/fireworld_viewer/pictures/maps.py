@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -30,15 +31,17 @@ def draw_map(
     fieryness: NDArray[Any] | None = None,
     brigades_xy: NDArray[Any] | None = None,
     civilian_hp: NDArray[Any] | None = None,
+    civilians_xy: NDArray[Any] | None = None,
     title: str = "",
 ) -> Figure:
     """Draw a city from above: buildings, streets, refuges, hydrants, civilians and brigades.
 
     Args:
-        city: what to draw; civilians stand where it has them.
+        city: what to draw.
         fieryness: (n,) official codes 0..8; none burns if left out.
         brigades_xy: (n_brigades, 2) positions in metres; none are drawn if left out.
         civilian_hp: (n_civilians,) health points; those of the start if left out.
+        civilians_xy: (n_civilians, 2) positions in metres; those of the start if left out.
         title: heading; the city's name if left out.
 
     Raises:
@@ -51,6 +54,7 @@ def draw_map(
         fieryness=np.zeros(len(city.building_id), dtype=np.uint8) if fieryness is None else np.asarray(fieryness),
         civilian_hp=np.asarray(city.civilian_hp) if civilian_hp is None else np.asarray(civilian_hp),
         brigades=brigades,
+        civilian_xy_m=civilians_xy,
     )
     return MapGrid([MapCell(city, state, one_line(title or city.name))]).figure
 
@@ -62,6 +66,7 @@ def draw_record(city: CityRecord, record: StepRecord, *, title: str) -> Figure:
         fieryness=record.buildings.fieryness,
         brigades_xy=np.column_stack([record.brigades.x_m, record.brigades.y_m]),
         civilian_hp=record.civilians.hp,
+        civilians_xy=state_of(city, record).civilian_xy_m,
         title=title,
     )
 
@@ -104,10 +109,11 @@ def cells_of(recordings: Sequence[Recording], shown: ShownStep) -> list[MapCell]
 
 def _names(recordings: Sequence[Recording]) -> list[str]:
     """Return scenario, policy and seed of each run."""
-    return [
-        f"{letter}{_shortened(one.header.scenario)}, {_shortened(one.header.policy)}, seed {one.header.seed}"
-        for one, letter in zip(recordings, _letters(recordings), strict=True)
+    short = [
+        replace(one.header, scenario=_shortened(one.header.scenario), policy=_shortened(one.header.policy))
+        for one in recordings
     ]
+    return [f"{letter}{header.title}" for header, letter in zip(short, _letters(recordings), strict=True)]
 
 
 def _when(record: StepRecord, step: int) -> str:

@@ -166,7 +166,8 @@ def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome
         lay_out = blueprint.pair if comparing else blueprint.single
         stream.send_blueprint(lay_out(*recordings, focus=bool(plotted), outcome=outcome))
         stream.send_recording_name(" | ".join(map(blueprint.title, recordings)))
-        log_legend(stream, comparing=comparing, map_by=recordings[0].city.attribution)
+        acting = any(not one.header.lacks("brigades.activity") for one in recordings)
+        log_legend(stream, comparing=comparing, acting=acting, map_by=recordings[0].city.attribution)
         if outcome is not None:
             log_page(stream, OUTCOME_PATH, outcome.markdown)
         if comparing:
@@ -197,10 +198,16 @@ def _identity(recordings: Sequence[Recording]) -> str:
     for one in recordings:
         digest.update(f"{one.header.scenario_digest} {one.header.seed} {one.header.policy_digest}".encode())
         digest.update(one.steps.tobytes())
+        heat = _heat(one)
         for record in one:
-            digest.update(record.buildings.energy.tobytes())
+            digest.update(getattr(record.buildings, heat).tobytes())
             digest.update(record.brigades.x_m.tobytes())
     return digest.hexdigest()[:32]
+
+
+def _heat(recording: Recording) -> str:
+    """Return the field that runs differ in first: all digits of the heat, where they are recorded."""
+    return "temperature" if recording.header.lacks("buildings.energy") else "energy"
 
 
 def _run_viewer(

@@ -19,6 +19,7 @@ from fireworld_viewer.rerun_view.layers import TIMELINE
 from fireworld_viewer.rerun_view.pages import HELP_PATH, LEGEND_PATH, OUTCOME_PATH, OutcomePage, bounds
 from fireworld_viewer.rerun_view.plots import has_choice_values
 from fireworld_viewer.rerun_view.run_layers import MARK_PATH
+from fireworld_viewer.story.series import recorded
 
 STEPS_PER_SECOND: Final = 8.0  # a pace that can be followed
 LAYERS: Final = ("city", "team", "civilians", "fire")
@@ -35,11 +36,9 @@ _SLOPE: Final = math.tan(math.radians(55.0 / 2))
 def single(recording: Recording, *, focus: bool, outcome: OutcomePage | None = None) -> Any:
     """Lay out one recording: map, timelines and log on the left; curves, with `focus` temperatures, on the right."""
     log = rrb.Tabs(text_view("Events and choices", "/log/**"), *pages(outcome), active_tab=0)
-    left = rrb.Vertical(
-        maps("Fire and brigades", "", [recording], aspect=1.8),
-        rrb.Horizontal(rrb.Tabs(*state_views("", ""), active_tab=0), log, column_shares=[1, 1.4]),
-        row_shares=[2.6, 1],
-    )
+    states = state_views("", "", recording)
+    below = rrb.Horizontal(rrb.Tabs(*states, active_tab=0), log, column_shares=[1, 1.4]) if states else log
+    left = rrb.Vertical(maps("Fire and brigades", "", [recording], aspect=1.8), below, row_shares=[2.6, 1])
     rows = [plot_view("Buildings", ["/plots/buildings"]), *plot_tabs("", [""], recording, focus=focus), legend_view()]
     right = rrb.Vertical(*rows, row_shares=[1.0] * (len(rows) - 1) + [1.9])
     return blueprint(rrb.Horizontal(left, right, column_shares=[1.8, 1]))
@@ -64,11 +63,11 @@ def pair(first: Recording, second: Recording, *, focus: bool, outcome: OutcomePa
     details = [
         rrb.Tabs(
             text_view(f"Events and choices: {name}", f"{prefix}/log/**", *logged),
-            *state_views(f": {name}", prefix),
+            *state_views(f": {name}", prefix, recording),
             plot_view(f"Water in tanks (l): {name}", [f"{prefix}/plots/tanks"]),
             active_tab=0,
         )
-        for name, prefix in (("A", "/a"), ("B", "/b"))
+        for name, prefix, recording in (("A", "/a", first), ("B", "/b", second))
     ]
     *outcome_page, help_page = pages(outcome)
     curves += outcome_page
@@ -88,10 +87,11 @@ def maps(name: str, prefix: str, recordings: Sequence[Recording], *, aspect: flo
     every_step = all(record.snapshot for recording in recordings for record in recording)
     n_steps = sum(len(recording.steps) for recording in recordings)
     air = "Air" if every_step and n_steps > 1 else f"Air (every {SNAPSHOT_EVERY_STEPS} steps)"
+    has_air = any(recorded(recording, "snapshot") for recording in recordings)
     return rrb.Tabs(
         map_view(name, prefix, frame_fire(recordings, aspect=aspect)),
         map_view("From above", prefix, above),
-        map_view(air, prefix, above, layers=("city", "air")),
+        *([map_view(air, prefix, above, layers=("city", "air"))] if has_air else []),
         active_tab=0,
     )
 
@@ -103,21 +103,30 @@ def plot_tabs(suffix: str, prefixes: Sequence[str], *recordings: Recording, focu
         return plot_view(f"{name}{suffix}", [f"{prefix}/plots/{plot}" for prefix in prefixes], corner=corner)
 
     heat = [curves("Degrees above ambient", "focus", "RightTop")] if focus else []
-    outcome = [curves("Score", "score", "LeftBottom"), curves("Reward by terms", "reward", "LeftBottom")]
+    outcome = [curves("Score", "score", "LeftBottom")]
+    rewarded = any(recorded(one, "rewards") for one in recordings)
+    outcome += [curves("Reward by terms", "reward", "LeftBottom")] if rewarded else []
     paths = [f"{prefix}/plots/{plot}/**" for prefix in prefixes for plot in ("values", "values_best")]
     values = plot_view(f"Values of choices{suffix}", paths, corner="RightBottom")
     chosen = [values] if any(map(has_choice_values, recordings)) else []
     if len(prefixes) > 1:
         return [rrb.Tabs(*outcome, *heat, *chosen, active_tab=0)]
-    outcome.append(curves("Reward, stacked", "reward_stacked", "LeftBottom"))
+    outcome += [curves("Reward, stacked", "reward_stacked", "LeftBottom")] if rewarded else []
     water = curves("Water in tanks (l)", "tanks", "RightTop")
     return [*heat, rrb.Tabs(*outcome, active_tab=0), rrb.Tabs(water, *chosen, active_tab=0)]
 
 
-def state_views(suffix: str, prefix: str) -> list[Any]:
-    """Lay out what the brigades do and which actions they chose."""
-    titles = {"activity": "What the brigades do", "action": "What they chose"}
-    return [rrb.StateTimelineView(name=f"{name}{suffix}", origin=f"{prefix}/{path}") for path, name in titles.items()]
+def state_views(suffix: str, prefix: str, recording: Recording) -> list[Any]:
+    """Lay out what the brigades do and which actions they chose, as far as that is recorded."""
+    titles = {
+        "activity": ("What the brigades do", "brigades.activity"),
+        "action": ("What they chose", "decisions.action"),
+    }
+    return [
+        rrb.StateTimelineView(name=f"{name}{suffix}", origin=f"{prefix}/{path}")
+        for path, (name, field) in titles.items()
+        if recorded(recording, field)
+    ]
 
 
 def pages(outcome: OutcomePage | None) -> list[Any]:
@@ -131,8 +140,7 @@ def title(recording: Recording) -> str:
 
     Rerun's viewer stops at a character that its font lacks, so that names from files keep Latin letters only.
     """
-    header = recording.header
-    text = f"{header.scenario}, {header.policy}, seed {header.seed}"
+    text = recording.header.title
     return "".join(letter if letter.isprintable() and ord(letter) < 256 else "?" for letter in text)
 
 

@@ -12,7 +12,7 @@ from fireworld.records import ACTION_NAMES, ACTIONS, ACTIVITIES, Recording
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import CityMesh
 from fireworld_viewer.rerun_view.layers import Layers, number_columns
-from fireworld_viewer.story.series import action_name, choices_of, chosen_actions, chosen_targets
+from fireworld_viewer.story.series import action_name, choices_of, chosen_actions, chosen_targets, recorded
 
 _DRIVING: Final = ACTIVITIES.index("driving")
 _BALL_RADIUS_M: Final = 4.0
@@ -35,12 +35,19 @@ def log_brigades(layers: Layers, recording: Recording) -> None:
     width = np.full(k, n)
     choices = choices_of(recording)
     numbers: dict[str, NDArray[Any]] = {
-        **{name: recording.column("/brigades", name) for name in ("tank_litres", "sprayed_litres", "hp", "activity")},
-        **{name: getattr(choices, name) for name in ("action", "target", "value")},
-        **{f"value_{name.replace('-', '_')}": choices.action_values[..., index] for index, name in enumerate(ACTIONS)},
+        name: recording.column("/brigades", name)
+        for name in ("tank_litres", "sprayed_litres", "hp", "activity")
+        if recorded(recording, f"brigades.{name}")
     }
+    if recorded(recording, "decisions"):
+        numbers |= {name: getattr(choices, name) for name in ("action", "target", "value")}
+        values = choices.action_values
+        numbers |= {f"value_{name.replace('-', '_')}": values[..., index] for index, name in enumerate(ACTIONS)}
     tank = numbers["tank_litres"]
-    rgb = colors.packed_table(colors.ACTIVITY_RGB)[numbers["activity"]].reshape(-1)
+    if "activity" in numbers:
+        rgb = colors.packed_table(colors.ACTIVITY_RGB)[numbers["activity"]].reshape(-1)
+    else:
+        rgb = np.repeat(colors.packed_table([colors.BRIGADE_UNKNOWN_RGB]), k * n)
     balls = rerun.Points3D.columns(positions=position.reshape(-1, 3), colors=rgb)
     layers.static("team/brigades", rerun.Points3D.from_fields(radii=[_BALL_RADIUS_M]))
     layers.rows("team/brigades", balls.partition(width), number_columns("Brigade", numbers))
@@ -54,6 +61,8 @@ def log_brigades(layers: Layers, recording: Recording) -> None:
     layers.static("team/names", style)
     layers.rows("team/names", names.partition(width))
 
+    if not recorded(recording, "city.brigade_tank_litres"):
+        return
     full = np.maximum(np.asarray(recording.city.brigade_tank_litres, dtype=np.float32), 1.0)
     half_height = np.clip(tank / full, 0.0, 1.0).astype(np.float32) * (_GAUGE_HEIGHT_M / 2)
     half_width = np.full_like(half_height, _GAUGE_HALF_WIDTH_M)
@@ -68,6 +77,8 @@ def log_brigades(layers: Layers, recording: Recording) -> None:
 
 def log_water(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
     """Draw a jet from each brigade that sprays, and a thin arc from each that drives, to the target."""
+    if not (recorded(recording, "decisions") and recorded(recording, "brigades.activity")):
+        return
     activity, sprayed = (recording.column("/brigades", name) for name in ("activity", "sprayed_litres"))
     target = chosen_targets(recording)
     position = positions_m(recording)
@@ -87,6 +98,7 @@ def log_states(layers: Layers, recording: Recording) -> None:
     actions, rgb = [*map(action_name, codes), "no choice"], [*map(colors.action_rgb, codes), colors.NO_CHOICE_RGB]
     for brigade in range(activity.shape[1]):
         layers.states(f"activity/brigade_{brigade}", activity[:, brigade], ACTIVITIES, colors.ACTIVITY_RGB)
+    for brigade in range(action.shape[1] if recorded(recording, "decisions") else 0):
         layers.states(f"action/brigade_{brigade}", action[:, brigade], actions, rgb)
 
 

@@ -12,6 +12,7 @@ from fireworld.records import AIR, MATERIALS, CityRecord, Recording
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import SHADES_PERCENT, CityMesh, city_box_m
 from fireworld_viewer.rerun_view.layers import Layers, number_columns
+from fireworld_viewer.story.series import recorded
 
 _REFUGE: Final = len(colors.FIERYNESS_RGB)  # row of a refuge in the table of building colors
 _BUILDING_COLORS: Final = colors.shaded_table((*colors.FIERYNESS_RGB, colors.REFUGE_RGB), SHADES_PERCENT)
@@ -49,12 +50,13 @@ def log_city(layers: Layers, city: CityRecord, mesh: CityMesh) -> None:
         layers.static("city/hydrants", hydrants)
     handles = mesh.roof_xyz_m + np.array([0, 0, 0.3], dtype=np.float32)
     points = rerun.Points3D(handles, colors=colors.single(colors.HANDLE_RGB), radii=[0.9])
+    numbers = {name: np.asarray(getattr(city, name)) for name in ("floors", "volume_m3", "initial_fuel")}
     facts = rerun.DynamicArchetype(
         "Facts",
         components={
             "id": np.asarray(city.building_id),
             "material": [MATERIALS[code] for code in city.material],
-            **{name: np.asarray(getattr(city, name)) for name in ("floors", "volume_m3", "initial_fuel")},
+            **{name: column for name, column in numbers.items() if len(column)},
         },
     )
     layers.static("city/handles", points, facts)
@@ -63,7 +65,7 @@ def log_city(layers: Layers, city: CityRecord, mesh: CityMesh) -> None:
 def log_buildings(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
     """Color the city by fieryness, and give the handle on every roof the numbers of its building."""
     names = ("temperature", "fuel_share", "water_litres", "fieryness")
-    columns = {name: recording.column("/buildings", name) for name in names}
+    columns = {name: recording.column("/buildings", name) for name in names if recorded(recording, f"buildings.{name}")}
     shown = columns["fieryness"].copy()
     shown[:, np.asarray(recording.city.refuge_building, dtype=np.intp)] = _REFUGE
     log_mesh(layers, mesh, shown, _BUILDING_COLORS)
@@ -93,14 +95,26 @@ def log_civilians(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
     n = len(city.civilian_x_m)
     if n == 0:
         return
-    inside = np.asarray(city.civilian_building)
-    height = np.where(inside >= 0, mesh.roof_xyz_m[inside, 2] + 3.0, 2.0)
-    position = np.column_stack([city.civilian_x_m, city.civilian_y_m, height])
-    layers.static("civilians", rerun.Points3D(position, radii=[2.6]))
     hp = recording.column("/civilians", "hp")
-    health = colors.packed_array(colors.health_rgb(hp, np.asarray(city.civilian_hp)))
-    dots = rerun.Points3D.columns(colors=health.reshape(-1)).partition(np.full(len(hp), n))
-    layers.rows("civilians", dots, number_columns("Civilian", {"hp": hp}))
+    health = colors.packed_array(colors.health_rgb(hp, np.asarray(city.civilian_hp))).reshape(-1)
+    numbers = {"hp": hp}
+    where = {name: recording.column("/civilians", name) for name in ("x_m", "y_m", "in_building", "buriedness")}
+    if where["x_m"].shape[1]:  # they move
+        position = _above_roofs(mesh, where["in_building"], where["x_m"], where["y_m"]).reshape(-1, 3)
+        layers.static("civilians", rerun.Points3D.from_fields(radii=[2.6]))
+        dots = rerun.Points3D.columns(positions=position, colors=health)
+        numbers["buriedness"] = where["buriedness"]
+    else:
+        position = _above_roofs(mesh, np.asarray(city.civilian_building), city.civilian_x_m, city.civilian_y_m)
+        layers.static("civilians", rerun.Points3D(position, radii=[2.6]))
+        dots = rerun.Points3D.columns(colors=health)
+    layers.rows("civilians", dots.partition(np.full(len(hp), n)), number_columns("Civilian", numbers))
+
+
+def _above_roofs(mesh: CityMesh, inside: NDArray[Any], x_m: NDArray[Any], y_m: NDArray[Any]) -> NDArray[Any]:
+    """Return where civilians are drawn, (..., 3), of the buildings they are in, -1 for none, and their positions."""
+    height = np.where(inside >= 0, mesh.roof_xyz_m[inside, 2] + 3.0, 2.0)
+    return np.stack([x_m, y_m, height], axis=-1)
 
 
 def log_sites(layers: Layers, recording: Recording) -> None:

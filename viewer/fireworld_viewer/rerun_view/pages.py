@@ -45,8 +45,8 @@ class OutcomePage:
         return "\n".join(lines) + "\n"
 
 
-def entries(*, comparing: bool) -> list[list[tuple[str, colors.Rgb]]]:
-    """Return rows of names and colors of everything on the map."""
+def entries(*, comparing: bool, acting: bool = True) -> list[list[tuple[str, colors.Rgb]]]:
+    """Return rows of names and colors of everything on the map; `acting`: it is known what brigades do."""
     buildings = list(zip(FIERYNESS, colors.FIERYNESS_RGB, strict=True))
     names = [f"brigade {activity}".replace("driving-to", "to") for activity in ACTIVITIES]
     brigades = list(zip(names, colors.ACTIVITY_RGB, strict=True))
@@ -58,6 +58,8 @@ def entries(*, comparing: bool) -> list[list[tuple[str, colors.Rgb]]]:
         [*brigades[3:], ("fire can spread", colors.FREE_SIDE_RGB)],
         list(zip([f"civilian, {name}" for name in HEALTH], colors.HEALTH_RGB, strict=True)),
     ]
+    if not acting:  # of imported logs: no activities, no targets, no fire sites, no air
+        rows[2:5] = [rows[2][:3], [("brigade", colors.BRIGADE_UNKNOWN_RGB)], []]
     if comparing:
         rows.append(list(zip(("B is better", "the same", "B is worse"), colors.DIFFERENCE_RGB, strict=True)))
     return rows
@@ -70,11 +72,11 @@ def bounds(*, comparing: bool) -> tuple[tuple[float, float], tuple[float, float]
     return (-_COLUMN_WIDTH / 2, _COLUMN_WIDTH * (n_columns - 0.5)), (-0.4, len(rows) - 0.1)
 
 
-def log_legend(stream: rerun.RecordingStream, *, comparing: bool, map_by: str = "") -> None:
+def log_legend(stream: rerun.RecordingStream, *, comparing: bool, acting: bool = True, map_by: str = "") -> None:
     """Send the legend, as dots in rows with their names below them, and the page of help with whom the map is by."""
     import rerun
 
-    rows = entries(comparing=comparing)
+    rows = entries(comparing=comparing, acting=acting)
     place = [(_COLUMN_WIDTH * x, float(y)) for y, row in enumerate(rows) for x in range(len(row))]
     named = [entry for row in rows for entry in row]
     dots = rerun.Points2D(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fireworld.records import Recording
 from fireworld_viewer import colors
 from fireworld_viewer.rerun_view.layers import Layers
-from fireworld_viewer.story.series import LABELS, REWARD_TERMS, choices_of, series
+from fireworld_viewer.story.series import LABELS, REWARD_TERMS, choices_of, recorded, series
 
 SCORES: Final = ("score.score", "score.score_now")
 COUNTS: Final = ("score.n_burning", "score.n_water_damaged", "score.n_burnt_out")
@@ -38,11 +38,12 @@ def log_plots(layers: Layers, recording: Recording, focus_index: Sequence[int]) 
         ("plots/buildings", COUNTS, _of_run(layers, _COUNT_RGB)),
         ("plots/reward", REWARDS, reward_rgb),
     ):
+        if not all(recorded(recording, field) for field in fields):
+            continue
         numbers = np.column_stack([series(recording, field) for field in fields])
         log_plot(layers, path, numbers, [LABELS[field] for field in fields], rgb)
-    stacked = np.cumsum(np.column_stack([series(recording, term) for term in REWARD_TERMS]), axis=1)
-    first, *others = (LABELS[term] for term in REWARD_TERMS)
-    log_plot(layers, "plots/reward_stacked", stacked, [first, *(f"and {one}" for one in others)], reward_rgb[:-1])
+    if recorded(recording, "rewards"):
+        _log_stacked_rewards(layers, recording, reward_rgb)
     tanks = series(recording, "brigades.tank_litres")
     names = [f"brigade {index}" for index in range(tanks.shape[1])]
     log_plot(layers, "plots/tanks", tanks, names, _of_run(layers, _cycle(len(names))))
@@ -50,6 +51,13 @@ def log_plots(layers: Layers, recording: Recording, focus_index: Sequence[int]) 
     temperature = series(recording, "buildings.temperature")[:, list(focus_index)]
     names = [f"building {recording.city.building_id[index]}" for index in focus_index]
     log_plot(layers, "plots/focus", temperature, names, _of_run(layers, _cycle(len(names))))
+
+
+def _log_stacked_rewards(layers: Layers, recording: Recording, rgb: Sequence[colors.Rgb]) -> None:
+    """Send the terms of the reward one upon the other."""
+    stacked = np.cumsum(np.column_stack([series(recording, term) for term in REWARD_TERMS]), axis=1)
+    first, *others = (LABELS[term] for term in REWARD_TERMS)
+    log_plot(layers, "plots/reward_stacked", stacked, [first, *(f"and {one}" for one in others)], rgb[:-1])
 
 
 def log_choice_values(layers: Layers, recording: Recording) -> None:

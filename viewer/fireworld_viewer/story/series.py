@@ -100,6 +100,11 @@ def per_brigade(recording: Recording, name: str, *, missing: float, topic: str =
     return table
 
 
+def recorded(recording: Recording, field: str) -> bool:
+    """Return whether a recording has a field, as in "brigades.activity", or a topic: an imported log may not."""
+    return not recording.header.lacks(field)
+
+
 def series(recording: Recording, field: str) -> NDArray[np.float64]:
     """Return a field over all steps, as in "score.n_burning": (k,) of a value, (k, width) of an array."""
     topic, _, name = field.partition(".")

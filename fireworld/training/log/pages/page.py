@@ -76,7 +76,7 @@ def report_training(logs: AnyTraining | Sequence[AnyTraining], output: Path | st
     """
     check_output(Path(output), endings=ENDINGS, force=force)
     opened = open_trainings(logs)
-    write_file(Path(output), training_page(opened).encode())
+    write_file(Path(output), training_page(opened))
 
 
 def course_picture(log: TrainingLog) -> Picture:
