@@ -41,6 +41,31 @@ def test_triangles_tile_any_star_shaped_polygon(radii: list[float], clockwise: b
         [(0, 0), (9, 0), (9, 9), (6, 9), (6, 3), (3, 3), (3, 9), (0, 9)],  # U
         [(0, 0), (4, 0), (8, 0), (8, 8), (0, 8)],  # a corner in the middle of a straight wall
         [(0, 0), (5, 4), (10, 0), (6, 5), (10, 10), (5, 6), (0, 10), (4, 5)],  # star
+        # a courtyard, cut in by a slit
+        [(0, 0), (20, 0), (20, 20), (0, 20), (0, 8), (2, 8), (2, 12), (6, 12), (6, 8), (2, 8), (0, 8)],
+        # two of them
+        [
+            (0, 0),
+            (30, 0),
+            (30, 10),
+            (10, 10),
+            (10, 6),
+            (14, 6),
+            (14, 4),
+            (20, 4),
+            (20, 8),
+            (24, 8),
+            (24, 2),
+            (20, 2),
+            (20, 4),
+            (14, 4),
+            (14, 2),
+            (8, 2),
+            (8, 6),
+            (10, 6),
+            (10, 10),
+            (0, 10),
+        ],
     ],
 )
 def test_triangles_tile_angular_outlines(outline: list[tuple[float, float]]):

@@ -95,13 +95,18 @@ def triangulate(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.in
 
 
 def _is_ear(xy: NDArray[np.float64], left: list[int], at: int) -> bool:
-    """Return whether a corner of a counterclockwise polygon can be cut off: it bulges, and the cut is empty."""
+    """Return whether a corner of a counterclockwise polygon can be cut off: it bulges, and the cut is empty.
+
+    Corners at the places of the cut's own are no obstacle: where a courtyard is cut in, its slit has each end twice.
+    """
     corners = left[at - 1], left[at], left[(at + 1) % len(left)]
     a, b, c = xy[list(corners)]
     if _turn(a, b, c) <= 0:
         return False
     others = xy[[corner for corner in left if corner not in corners]]
     inside = (_turn(a, b, others) >= 0) & (_turn(b, c, others) >= 0) & (_turn(c, a, others) >= 0)
+    for corner in (a, b, c):
+        inside &= (others != corner).any(axis=1)
     return not bool(np.any(inside))
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from fireworld.city.formats.osm.projection import UNITS_PER_DEGREE, Place
-from fireworld.errors import CityError, described, expected
+from fireworld.errors import CityError, expected
 
 Window = tuple[int, int, int, int]
 """West, south, east, north in units of 1e-7 degrees."""
@@ -188,7 +188,7 @@ class OsmFile:
             raise self._complaint(error) from None
 
     def _complaint(self, error: Exception) -> CityError:
-        return CityError(expected(self.where, "", "OpenStreetMap data", described(error)))
+        return CityError(expected(self.where, "", "OpenStreetMap data", str(error) or type(error).__name__))
 
     def _take_relation(self, found: Extract, relation: Any) -> None:
         """Keep a relation that is a building or a fire station."""
