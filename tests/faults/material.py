@@ -43,7 +43,7 @@ def warm() -> None:
     from fireworld.cli import COMMANDS
 
     for name in COMMANDS:
-        importlib.import_module(f"fireworld.cli.{name}")
+        importlib.import_module(f"fireworld.cli.{name.replace('-', '_')}")
     for name in (
         "matplotlib.pyplot",
         "pyarrow.parquet",

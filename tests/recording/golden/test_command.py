@@ -401,7 +401,7 @@ def test_an_update_that_was_killed_is_finished_by_another(kept, golden, change_p
     """The reason is there once, whatever of the goldens was written."""
     change_policy("EASIEST")
 
-    def killed(*_):
+    def killed(*_, **__):
         raise SystemExit(9)
 
     for moment in ("store_recording", "store_text"):

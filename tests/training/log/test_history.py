@@ -71,7 +71,7 @@ def test_what_is_shown(log_path, fireworld):
     shown = fireworld("policy", "show", team, state, "--log", log_path)
     assert shown.code == 0
     assert shown.out.startswith(f"state {state}: ")
-    assert "fireworld replay 0.mcap --scenario " in shown.out
+    assert f"fireworld replay {log_path.name} --scenario " in shown.out
     assert "\nbrigade 0 was first in it in alone-" in shown.out
     (found,) = json.loads(fireworld("policy", "show", team, state, "--log", log_path, "--json").out)
     assert (found["state"], len(found["moves"])) == (state, 10)
