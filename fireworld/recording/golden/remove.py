@@ -14,6 +14,7 @@ from fireworld_recorder.writer import PARTIAL_SUFFIX
 from fireworld.errors import FireworldError, OutputError
 from fireworld.files import read_text_file
 from fireworld.recording.golden.check import FOLDER, find_goldens
+from fireworld.recording.golden.spec import hash_line
 from fireworld.recording.golden.store import SUFFIX, TEXT_SUFFIX, text_path
 from fireworld.recording.inputs import is_training
 from fireworld.training.log.reader import open_training
@@ -70,7 +71,7 @@ def leftovers_of(folder: Path = FOLDER) -> list[Path]:
 
 def _is_golden_text(path: Path) -> bool:
     lines = read_text_file(path).splitlines() if path.is_file() else []
-    return bool(lines) and lines[-1].startswith("hash ")
+    return bool(lines) and lines[-1].startswith(hash_line(""))
 
 
 def remove_goldens(folder: Path = FOLDER, names: Collection[str] = (), *, leftovers: bool = False) -> list[Path]:

@@ -172,15 +172,17 @@ class TrainingLog(Shown):
 
     def learn(self, trainer: SarsaTrainer, part: Part, number: int) -> LearnedEpisode:
         """Let a trainer go through a part of this log that is an episode; return what was learned in it."""
-        episode: Episode = part[Episode]
         before = trainer.progress.tables, trainer.progress.visits.copy()
-        try:
-            found = learned(trainer, episode, self.scenarios[episode.scenario])
-        except LogError as error:
-            raise LogError(f"{self.path}: part {number}: {error}") from None
+        found = self._learned(trainer, part[Episode], number)
         trainer.progress.tables, trainer.progress.visits = before
         self.follow(trainer, part, number)
         return found
+
+    def _learned(self, trainer: SarsaTrainer, episode: Episode, number: int) -> LearnedEpisode:
+        try:
+            return learned(trainer, episode, self.scenarios[episode.scenario])
+        except LogError as error:
+            raise LogError(f"{self.path}: part {number}: {error}") from None
 
     def reports(self) -> Iterator[tuple[Trainer[Any, Any], Report]]:
         """Yield the report of every part, with the trainer as it stands after it: the same object each time."""
@@ -299,7 +301,7 @@ class TrainingLog(Shown):
         part = next(self.parts(number), None)
         if part is None or Episode not in part or not isinstance(trainer, SarsaTrainer):
             raise LogError(expected(str(self.path), "part", "an episode", number))
-        return self.learn(trainer, part, number)
+        return self._learned(trainer, part[Episode], number)
 
     def describe(self, *, limit: int = SHOWN_MAX) -> Iterator[Block]:
         """Yield what there is to see of the training: its header, then a table of its scenarios or generations."""
