@@ -21,6 +21,9 @@ KINDS: Final = {
 """What is at a path, where it is no regular file."""
 TEXT_BYTES_MAX: Final = 1 << 24
 PIECE_BYTES: Final = 1 << 20
+SCRATCH: Final = ".fireworld-"
+"""What the names of scratch folders begin with; after a kill they can be removed."""
+PLACE_TRIES: Final = 100
 
 
 def read_input(
@@ -49,7 +52,7 @@ def read_input(
     """
     where, suffix = source or str(path), f": {path}" if key else ""
     try:
-        with open(path, "rb", opener=_without_waiting) as file:
+        with open(path, "rb", opener=without_waiting) as file:
             status = os.fstat(file.fileno())
             size = status.st_size
             kind = KINDS.get(stat.S_IFMT(status.st_mode))
@@ -63,6 +66,11 @@ def read_input(
     if size > n_bytes_max:
         raise error(expected(where, key, f"{what} of at most {n_bytes_max} bytes", f"{size} bytes{suffix}"))
     return content
+
+
+def irregular(path: Path) -> str:
+    """Return what is at a path that is no regular file, "" for one that is; OSError if there is nothing."""
+    return KINDS.get(stat.S_IFMT(path.stat().st_mode), "")
 
 
 def read_text_file(path: Path, *, strict: bool = False) -> str:
@@ -91,14 +99,9 @@ def _read_most(file: IO[bytes], n_bytes_max: int) -> bytes:
     return b"".join(pieces)
 
 
-def _without_waiting(path: str, flags: int) -> int:
+def without_waiting(path: str, flags: int) -> int:
     """Open a file; a pipe that nobody writes to must not hold it up."""
     return os.open(path, flags | os.O_NONBLOCK)
-
-
-SCRATCH: Final = ".fireworld-"
-"""What the names of scratch folders begin with; after a kill they can be removed."""
-PLACE_TRIES: Final = 100
 
 
 def check_output(path: Path, *, force: bool = False, endings: Collection[str] = ()) -> None:

@@ -30,6 +30,7 @@ from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
+from fireworld.files import without_waiting
 from fireworld.interrupt import postponed
 
 OPEN: Final = os.environ.get("FIREWORLD_OPEN_KERNELS") == "1"
@@ -209,16 +210,11 @@ def _seal(purpose: bytes, data: bytes) -> bytes:
 
 def _read(path: Path) -> bytes | None:
     """Return the bytes of a regular file of reasonable size; None for anything else."""
-    with contextlib.suppress(OSError), open(path, "rb", opener=_without_waiting) as file:
+    with contextlib.suppress(OSError), open(path, "rb", opener=without_waiting) as file:
         status = os.fstat(file.fileno())
         if stat.S_ISREG(status.st_mode) and status.st_size <= N_BYTES_MAX:
             return file.read()
     return None
-
-
-def _without_waiting(path: str, flags: int) -> int:
-    """Open a file; a pipe that nobody writes to must not hold it up."""
-    return os.open(path, flags | os.O_NONBLOCK)
 
 
 def _write(path: Path, data: bytes) -> None:

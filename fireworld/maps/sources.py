@@ -10,9 +10,11 @@ from typing import Final
 from fireworld.city.city import Plan
 from fireworld.city.formats import read_plan
 from fireworld.city.formats.official.text import city_file
-from fireworld.errors import CityError, expected
+from fireworld.errors import CityError
+from fireworld.files import read_input
 from fireworld.parameters import OFFICIAL_2013, Parameters
 from fireworld.scenario import Scenario, load_scenario
+from fireworld.scenario.scenario import CITY_BYTES_MAX
 from fireworld.simulation.placement import scenario_plan
 
 MAP_ENDINGS: Final = (".gml", ".gz")
@@ -46,9 +48,6 @@ def city_of(given: str | os.PathLike[str] | Scenario) -> CitySource:
     if path.suffix.lower() in SCENARIO_ENDINGS or not path.suffix:
         scenario = load_scenario(os.fspath(given))
         return CitySource(scenario_plan(scenario), scenario)
-    try:
-        content = path.read_bytes()
-    except (OSError, ValueError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        raise CityError(expected(str(path), "", "a city file, a scenario or a map", reason)) from None
+    what = "a city file, a scenario or a map"
+    content = read_input(path, what=what, n_bytes_max=CITY_BYTES_MAX, error=CityError)
     return CitySource(read_plan(content, file=path, where=str(path)), None)

@@ -253,3 +253,21 @@ def test_empty_messages(here, fireworld):
     done = fireworld("info", "large.mcap")
     assert done.code == 1
     assert "bytes in a log of " in done.out + done.err
+
+
+@pytest.mark.parametrize(
+    ("words", "what"),
+    [
+        (("city", "osm", "pipe.osm", "-o", "town.json"), "a file of OpenStreetMap data"),
+        (("city", "import", "pipe.gml", "-o", "town.json"), "a map"),
+        (("city", "show", "pipe.json", "-o", "town.png"), "a city file, a scenario or a map"),
+        (("city", "export", "pipe.json", "-o", "town"), "a city file, a scenario or a map"),
+        (("info", "pipe.json"), "a city file"),
+    ],
+)
+def test_maps_from_pipes_are_refused_without_waiting(here, fireworld, words, what):
+    os.mkfifo(next(word for word in words if word.startswith("pipe.")))
+    done = fireworld(*words)
+    assert done.code == 2
+    assert f": expected {what}" in done.err
+    assert done.err.endswith("got a pipe\n")

@@ -13,6 +13,7 @@ from fireworld.city.formats.official.reading import build_plan
 from fireworld.city.formats.official.report import Report
 from fireworld.city.formats.official.scenario_xml import ScenarioXml, read_scenario_xml
 from fireworld.errors import CityError, expected
+from fireworld.files import read_input
 
 MAP_NAMES: Final = ("map.gml", "map.gml.gz")
 SCENARIO_NAME: Final = "scenario.xml"
@@ -135,12 +136,4 @@ def _read_configs(folder: Path) -> tuple[tuple[str, bytes], ...]:
 
 def _read(path: Path, what: str, most: int) -> bytes:
     """Read a file; CityError if it cannot be read or is too large."""
-    try:
-        with path.open("rb") as file:
-            content = file.read(most + 1)
-    except (OSError, ValueError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        raise CityError(expected(str(path), "", what, reason)) from None
-    if len(content) > most:
-        raise CityError(expected(str(path), "", f"{what} of at most {most} bytes", "more of them"))
-    return content
+    return read_input(path, what=what, n_bytes_max=most, error=CityError)

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from fireworld.city.formats.osm.projection import UNITS_PER_DEGREE, Place
 from fireworld.errors import CityError, expected
+from fireworld.files import irregular
 
 Window = tuple[int, int, int, int]
 """West, south, east, north in units of 1e-7 degrees."""
@@ -94,6 +95,8 @@ class OsmFile:
             raise CityError(expected(self.where, "", wanted, path.suffix or "no ending"))
         try:
             n_bytes = path.stat().st_size
+            if irregular(path):
+                raise CityError(expected(self.where, "", "a file of OpenStreetMap data", irregular(path)))
             with path.open("rb") as file:
                 file.read(1)
         except OSError as error:
