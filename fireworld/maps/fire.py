@@ -10,21 +10,18 @@ from fireworld.city.formats.official.folder import Imported, MapFiles
 from fireworld.city.formats.official.parameters import overrides, steps, uneven_injuries
 from fireworld.city.formats.official.scenario_xml import ScenarioXml
 from fireworld.errors import ScenarioError, expected
+from fireworld.maps.imported import WHERE, checked_scenario
 from fireworld.parameters import PRESETS
-from fireworld.scenario.scenario import scenario_of
-from fireworld.scenario.yaml_text import write_yaml
-from fireworld.simulation.placement import place
 
 PRESET: Final = "official-2013"
 N_BRIGADES: Final = 4
 """Of a scenario without any."""
-WHERE: Final = "--write-scenario"
 TRY: Final = "try --fires ID,... with ids of buildings"
 LEFT_OUT: Final = {"policeforce": "police forces", "ambulanceteam": "ambulance teams"}
 
 
 def scenario_text(
-    files: MapFiles, imported: Imported, plan: Plan, *, fires: Sequence[int] | None, city: str, city_sha256: str
+    files: MapFiles, imported: Imported, plan: Plan, city_text: str, *, fires: Sequence[int] | None, city: str
 ) -> str:
     """Return the text of a scenario file for a map; what is left out goes into the report.
 
@@ -45,9 +42,7 @@ def scenario_text(
         "steps": steps(imported.config),
     }
     _note_left_out(scenario, imported)
-    checked = {**document, "city": {"file": city, "sha256": city_sha256}}
-    place(scenario_of(checked, source=WHERE, folder=None), plan)
-    return write_yaml(document)
+    return checked_scenario(document, plan, city_text)
 
 
 def _fires(scenario: ScenarioXml, imported: Imported, plan: Plan, fires: Sequence[int] | None) -> list[int]:

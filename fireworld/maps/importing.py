@@ -2,42 +2,29 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from fireworld.arguments import path_of
-from fireworld.city.city import Plan
 from fireworld.city.formats.json_plan import parse_plan
 from fireworld.city.formats.official.folder import Imported, MapFiles, find_files, import_files
-from fireworld.city.formats.official.report import Report
 from fireworld.city.formats.official.text import city_text
-from fireworld.files import check_outputs, write_file
+from fireworld.files import check_outputs
 from fireworld.maps.fire import scenario_text
+from fireworld.maps.imported import ImportedMap, city_name, outputs_of, write_import
 
 
 @dataclass(frozen=True)
-class ImportedCity:
+class ImportedCity(ImportedMap):
     """What an import made of a map."""
-
-    plan: Plan
-    city_text: str
-    """Content of the city file."""
-    scenario_text: str | None
-    """Content of the scenario file; None if none was asked for."""
-    report: Report
-    """What was repaired, inferred or left out."""
-    files: Sequence[Path]
-    """What was written."""
 
     @property
     def summary(self) -> dict[str, Any]:
         """How large the map is, as JSON holds it."""
         plan, roads = self.plan, self.plan.roads
-        low, high = plan.footprints.outline_mm.min(axis=0), plan.footprints.outline_mm.max(axis=0)
         return {
             "name": plan.name,
             "n_buildings": len(plan.footprints.building_id),
@@ -45,7 +32,7 @@ class ImportedCity:
             "n_roads": 0 if roads is None else len(roads.road_id),
             "n_entrances": int((plan.streets.entrance_node >= 0).sum()),
             "n_hydrants": len(plan.streets.hydrant_node),
-            "extent_m": [(int(high[axis]) - int(low[axis])) / 1000.0 for axis in (0, 1)],
+            "extent_m": self.extent_m,
         }
 
     def __repr__(self) -> str:
@@ -86,9 +73,7 @@ def import_city(
     """
     given = {"map": map, "config": config, "scenario": scenario, "links": links}
     paths = {name: path_of(name, value) for name, value in given.items() if value is not None}
-    outputs = [
-        path_of(name, value) for name, value in (("output", output), ("write_scenario", write_scenario)) if value
-    ]
+    outputs = outputs_of(output, write_scenario)
     files = find_files(paths["map"], config=paths.get("config"), scenario=paths.get("scenario"))
     read = [path for path in (files.map_file, files.scenario_file, paths.get("links")) if path is not None]
     check_outputs(outputs, force=force, inputs=read)
@@ -99,11 +84,9 @@ def import_city(
         imported.report.note("outlines", line)
     fire = None
     if write_scenario is not None:
-        city = _relative(Path(output), Path(write_scenario)) if output else f"{files.name}.json"
-        digest = hashlib.sha256(text.encode()).hexdigest()
-        fire = scenario_text(files, imported, plan, fires=fires, city=city, city_sha256=digest)
-    for path, content in zip(outputs, [one for one in (text if output else None, fire) if one], strict=True):
-        write_file(path, content.encode())
+        city = city_name(output, write_scenario, files.name)
+        fire = scenario_text(files, imported, plan, text, fires=fires, city=city)
+    write_import(outputs, text if output else None, fire)
     return ImportedCity(plan=plan, city_text=text, scenario_text=fire, report=imported.report, files=outputs)
 
 
@@ -114,9 +97,4 @@ def _with_links(files: MapFiles, imported: Imported, links: Path | None, attribu
     from fireworld.conformance.links import load_links
 
     given = load_links(links, imported.plan.footprints.building_id)
-    return city_text(files, replace(imported), links=given, attribution=attribution)
-
-
-def _relative(city: Path, scenario: Path) -> str:
-    """Name a city file as a scenario file does: relative to the scenario's folder."""
-    return Path(os.path.relpath(city.absolute(), scenario.absolute().parent)).as_posix()
+    return city_text(files, imported, links=given, attribution=attribution)

@@ -6,11 +6,9 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
-from pathlib import Path
 from typing import Any, Final
 
 from fireworld.arguments import path_of, seed_of
-from fireworld.city.city import Plan
 from fireworld.city.formats.json_plan import parse_plan
 from fireworld.city.formats.json_text import plan_text
 from fireworld.city.formats.official.report import Report
@@ -19,7 +17,8 @@ from fireworld.city.formats.osm.projection import UNITS_PER_DEGREE
 from fireworld.city.formats.osm.reader import OsmFile
 from fireworld.city.formats.osm.reading import read_city
 from fireworld.errors import CityError, expected
-from fireworld.files import check_outputs, write_file
+from fireworld.files import check_outputs
+from fireworld.maps.imported import ImportedMap, city_name, outputs_of, write_import
 from fireworld.maps.osm_fire import fire_text
 
 ATTRIBUTION: Final = "© OpenStreetMap contributors, ODbL 1.0"
@@ -30,24 +29,13 @@ REPORT_LINES_MAX: Final = 60
 
 
 @dataclass(frozen=True)
-class ImportedOsm:
+class ImportedOsm(ImportedMap):
     """What an import made of an extract."""
-
-    plan: Plan
-    city_text: str
-    """Content of the city file."""
-    scenario_text: str | None
-    """Content of the scenario file; None if none was asked for."""
-    report: Report
-    """What was repaired, inferred or left out."""
-    files: Sequence[Path]
-    """What was written."""
 
     @property
     def summary(self) -> dict[str, Any]:
         """How large the city is, as JSON holds it."""
         footprints, streets = self.plan.footprints, self.plan.streets
-        low, high = footprints.outline_mm.min(axis=0), footprints.outline_mm.max(axis=0)
         return {
             "name": self.plan.name,
             "n_buildings": len(footprints.building_id),
@@ -55,7 +43,7 @@ class ImportedOsm:
             "n_nodes": len(streets.node_mm),
             "n_streets": len(streets.street),
             "n_hydrants": len(streets.hydrant_node),
-            "extent_m": [(int(high[axis]) - int(low[axis])) / 1000.0 for axis in (0, 1)],
+            "extent_m": self.extent_m,
         }
 
     def __repr__(self) -> str:
@@ -103,7 +91,7 @@ def import_osm(
         OutputError: files that cannot be written. Nothing is written after an error.
     """
     path, seed = path_of("extract", extract), seed_of(seed)
-    outputs = [path_of(key, to) for key, to in (("output", output), ("write_scenario", write_scenario)) if to]
+    outputs = outputs_of(output, write_scenario)
     check_outputs(outputs, force=force, inputs=[path])
     for key, text in (("--name", name), ("--attribution", attribution)):
         if text is not None and not (0 < len(text) <= (100 if key == "--name" else TEXT_MAX) and text.isprintable()):
@@ -118,9 +106,8 @@ def import_osm(
     plan = parse_plan(text.encode(), where=str(output or path), name=made.plan.name)
     fire = None
     if write_scenario is not None:
-        fire = fire_text(plan, text, fires=fires, city=_city_name(output, write_scenario, plan.name))
-    for to, content in zip(outputs, [one for one in (text if output else None, fire) if one], strict=True):
-        write_file(to, content.encode())
+        fire = fire_text(plan, text, fires=fires, city=city_name(output, write_scenario, plan.name))
+    write_import(outputs, text if output else None, fire)
     return ImportedOsm(plan=plan, city_text=text, scenario_text=fire, report=made.report, files=outputs)
 
 
@@ -145,10 +132,3 @@ def _printable(text: str) -> str:
     """Return a file's name as a name that cities can have."""
     kept = "".join(letter if letter.isprintable() else "?" for letter in text)[: TEXT_MAX // 2]
     return kept or "city"
-
-
-def _city_name(output: str | os.PathLike[str] | None, scenario: str | os.PathLike[str], name: str) -> str:
-    """Name the city file as the scenario file does: relative to the scenario's folder."""
-    if output is None:
-        return f"{name}.json"
-    return Path(os.path.relpath(Path(output).absolute(), Path(scenario).absolute().parent)).as_posix()

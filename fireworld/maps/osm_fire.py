@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -10,9 +9,7 @@ import numpy as np
 
 from fireworld.city.city import Plan
 from fireworld.errors import ScenarioError, expected
-from fireworld.scenario.scenario import scenario_of
-from fireworld.scenario.yaml_text import write_yaml
-from fireworld.simulation.placement import place
+from fireworld.maps.imported import WHERE, checked_scenario
 
 PRESET: Final = "paper"
 N_FIRES: Final = 2
@@ -22,7 +19,6 @@ N_CIVILIANS: Final = 8
 PEOPLE_FROM_TO_M: Final = (60.0, 250.0)
 N_BRIGADES: Final = 4
 STEPS: Final = 300
-WHERE: Final = "--write-scenario"
 
 
 def fire_text(plan: Plan, city_text: str, *, fires: Sequence[int | str] | None, city: str) -> str:
@@ -47,10 +43,7 @@ def fire_text(plan: Plan, city_text: str, *, fires: Sequence[int | str] | None, 
         "brigades": {"n": N_BRIGADES},
         "steps": STEPS,
     }
-    digest = hashlib.sha256(city_text.encode()).hexdigest()
-    checked = {**document, "city": {"file": city, "sha256": digest}}
-    place(scenario_of(checked, source=WHERE, folder=None), plan)
-    return write_yaml(document)
+    return checked_scenario(document, plan, city_text)
 
 
 def _in_the_middle(plan: Plan) -> list[int]:

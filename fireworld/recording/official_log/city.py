@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from fireworld.city.formats.official.keys import PREFIX, SYNONYMS
 from fireworld.errors import LogError, expected
 from fireworld.recording.official_log import names
 from fireworld.recording.official_log.parts import Entity
@@ -18,9 +19,9 @@ FULL_HP: Final = 10_000
 """Health points of an unhurt person in the official program."""
 _BEYOND_MM: Final = 1_000_000_000
 """Nothing of a city is farther from the origin."""
-_TANK: Final = ("fire.tank.maximum", "resq-fire.water_capacity")
-_POWER: Final = ("fire.extinguish.max-sum", "resq-fire.max_extinguish_power_sum")
-_RANGE: Final = ("fire.extinguish.max-distance", "resq-fire.water_distance")
+_TANK, _POWER, _RANGE = (
+    (SYNONYMS[key], PREFIX + key) for key in ("water_capacity", "max_extinguish_power_sum", "water_distance")
+)
 """Keys of the configuration, of which a log has one or both."""
 
 
