@@ -14,7 +14,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
@@ -74,20 +74,23 @@ def forked(
     """
     _COUNTERS[:] = bytes(16)
     texts = tuple(map(str, words))
+    held = _resident_bytes()
     child = _fork(texts, folder, io, at, before, act, cpu_seconds_max)
-    return _wait(child, texts, io, at, wall_seconds_max)
+    done = _wait(child, texts, io, at, wall_seconds_max)
+    return replace(done, peak_bytes=done.peak_bytes - held)
 
 
 def crowd(many: Sequence[Sequence[object]], folder: Path, *, io: Path, cpu_seconds_max: float) -> list[Done]:
     """Call many commands at once, each in a fork of this process; arguments as for `forked`."""
-    began = []
+    began, held = [], _resident_bytes()
     for number, words in enumerate(many):
         texts, own = tuple(map(str, words)), io / str(number)
         own.mkdir(parents=True)
         child = _fork(texts, folder, own, None, None, None, cpu_seconds_max)
         _running.add(child)
         began.append((child, texts, own))
-    return [_wait(child, texts, own, None, WALL_SECONDS_MAX) for child, texts, own in began]
+    done = [_wait(child, texts, own, None, WALL_SECONDS_MAX) for child, texts, own in began]
+    return [replace(one, peak_bytes=one.peak_bytes - held) for one in done]
 
 
 def process(
@@ -112,6 +115,7 @@ def process(
         if before is not None:
             before()
 
+    held = _resident_bytes()
     with (io / "out").open("wb") as out, (io / "err").open("wb") as err:
         child = subprocess.Popen(
             [sys.executable, "-m", "fireworld", *texts],
@@ -125,7 +129,8 @@ def process(
         )
         done = _wait(child.pid, texts, io, at, wall_seconds_max)
         child.returncode = done.code  # it has been waited for
-    return done
+    # Linux counts what a process was before it became another program: no more than that says nothing about the call.
+    return done if done.peak_bytes > held else replace(done, peak_bytes=0)
 
 
 def count_apart() -> None:
@@ -144,11 +149,19 @@ def end_what_runs() -> None:
 def _limit(cpu_seconds_max: float) -> None:
     seconds = int(cpu_seconds_max) + 1
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 2))
-    with Path("/proc/self/statm").open() as file:
-        used = int(file.read().split()[0]) * resource.getpagesize()
+    used = _pages(0) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (used + MORE_MEMORY_BYTES, used + MORE_MEMORY_BYTES))
     resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_BYTES_MAX, FILE_BYTES_MAX))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _resident_bytes() -> int:
+    """Return how much memory a fork of this process has from the start."""
+    return _pages(1) * resource.getpagesize()
+
+
+def _pages(column: int) -> int:
+    return int(Path("/proc/self/statm").read_text().split()[column])
 
 
 def _fork(texts: tuple[str, ...], folder: Path, io: Path, *how: Any) -> int:

@@ -34,7 +34,7 @@ class Done:
         words: of the command line.
         code: the exit code; below zero the signal that ended it.
         out, err: what it wrote.
-        cpu_seconds, peak_bytes: what it took, with the processes it waited for.
+        cpu_seconds, peak_bytes: what it took, with the processes it waited for; not what a fork had from the start.
         asked: the signal that it was sent, 0 for none.
         timed_out: it was killed because it did not end.
         n_orphans: processes it left behind.

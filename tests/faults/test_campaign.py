@@ -15,7 +15,7 @@ import pytest
 from tests.docs.pages import ROOT
 from tests.faults import campaign, material, misbehaving, mounts
 from tests.faults.bench import Bench
-from tests.faults.calls import crowd, forked
+from tests.faults.calls import crowd, forked, process
 from tests.faults.damaged import MAKERS
 from tests.faults.kinds import KINDS
 from tests.faults.ledger import Ledger
@@ -85,6 +85,15 @@ def test_what_a_fork_does_is_seen(tmp_path, act, kinds):
     done = forked(("planted",), tmp_path, io=tmp_path, act=act, cpu_seconds_max=1)
     found = [failure.kind for failure in judge(done, {0}, cpu_seconds_max=1)]
     assert [kind for kind in found if kind != "hang" or kinds == ["hang"]] == kinds  # a busy machine may take long
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("call", [forked, process])
+def test_what_its_parent_holds_is_not_counted(tmp_path, call):
+    held = bytes(b"x" * 1_200_000_000)
+    done = call(("--version",), tmp_path, io=tmp_path)
+    del held
+    assert judge(done, {0}) == []
 
 
 def test_a_half_file_and_a_scratch_file_are_seen(tmp_path):
