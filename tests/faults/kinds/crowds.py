@@ -19,7 +19,7 @@ from tests.faults.material import N_STEPS, TINY_TRAINING
 from tests.faults.outcomes import Outcome
 
 NAME: Final = "crowds"
-SHARE: Final = 0.06
+SHARE: Final = 0.05
 N: Final = 20
 COMPILING_SECONDS_MAX: Final = 150.0
 RUN: Final = ("run", "quick", "--policy", "chief", "--steps", N_STEPS)
