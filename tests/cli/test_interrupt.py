@@ -146,3 +146,8 @@ try:
 except KeyboardInterrupt:
     sys.exit(130)
 """
+
+
+def test_ctrl_c_while_text_is_executed_ends_in_an_exit_code_too(here, fireworld_process):
+    (here / "text.py").write_text("def decide(observation):\n    exec('raise KeyboardInterrupt')\n")
+    assert fireworld_process("run", "quick", "--policy", "text:decide").code == 130
