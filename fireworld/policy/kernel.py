@@ -8,9 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from fireworld.kernels.arrays import Array, CityArrays, PolicyArrays
+from fireworld.kernels.arrays import Array, CityArrays, PolicyArrays, Seen
 from fireworld.kernels.choice import (
     FIXED,
+    GIVEN,
     RANDOM,
     RANK_ALL,
     RANK_NAMED,
@@ -20,8 +21,9 @@ from fireworld.kernels.choice import (
     keeps_choice,
     table_state,
 )
+from fireworld.kernels.learning import EXPLORED, KEPT, NO_CHOICE
 from fireworld.kernels.ranking import N_OF_BUILDING, N_WEIGHTS, rank
-from fireworld.policy.protocol import Decision, Observation, Policy
+from fireworld.policy.protocol import Action, Decision, Observation, Policy
 from fireworld.records import ACTIONS
 
 NO_TABLES: Final = np.zeros((1, 1, 4))
@@ -70,6 +72,12 @@ class KernelPolicy(Policy):
         del city, seed
         self._ready = self.for_brigades(n_brigades)
 
+    def ready(self, n_brigades: int) -> PolicyArrays:
+        """Return the arrays of the run begun, or of one that begins."""
+        if self._ready is None or len(self._ready.kind) != n_brigades:
+            self._ready = self.for_brigades(n_brigades)
+        return self._ready
+
     def decide(self, observation: Observation) -> Decision:
         """Choose as the compiled episode does."""
         ready = self._ready
@@ -80,14 +88,8 @@ class KernelPolicy(Policy):
         action = int(choose(brigade, observation.state_index, ready, seed, step))
         if ready.kind[brigade] != TABLE:
             return Decision(action)
-        row = table_state(observation.state_index, ready.tables.shape[1])
-        values = ready.tables[ready.table_of[brigade], row]
-        return Decision(
-            action,
-            q_values=tuple(values.tolist()),
-            explored=bool(explores(brigade, ready, seed, step)),
-            epsilon=self.epsilon,
-        )
+        explored = bool(explores(brigade, ready, seed, step))
+        return _by_table(ready, brigade, action, observation.state_index, explored=explored)
 
     def keeps(self, brigade: int, last_action: int, step: int) -> bool:
         """Return whether a brigade repeats what it chose before."""
@@ -101,6 +103,44 @@ class KernelPolicy(Policy):
         if {RANK_NAMED, RANK_ALL} & set(self.kinds):
             content.update(np.ascontiguousarray(self.rankings, dtype="<f8").tobytes())
         return content.hexdigest()
+
+
+def noted_decisions(
+    ready: PolicyArrays, seen: Seen, action: Array, target: Array, last_target: Array
+) -> tuple[Decision, ...]:
+    """Return what the brigades decided in a step that a kernel ran, as `decide` would have.
+
+    Args:
+        ready: the policy's arrays.
+        seen: what the kernel noted.
+        action: (b,), what they do.
+        target: (b,), what they go for.
+        last_target: (b,), what they went for in the step before.
+    """
+    decisions = []
+    for brigade, choice in enumerate(seen.choice.tolist()):
+        kind, act = ready.kind[brigade], int(action[brigade])
+        if choice == NO_CHOICE:
+            decisions.append(Decision(-1))
+        elif choice == KEPT:
+            decisions.append(Decision(act, target=int(last_target[brigade])))
+        elif kind in (RANK_NAMED, RANK_ALL):
+            *values, value = seen.values[brigade].tolist()
+            own = int(target[brigade]) if kind == RANK_ALL else None
+            decisions.append(Decision(act, target=own, q_values=tuple(values), value=value))
+        elif kind == TABLE:
+            decisions.append(_by_table(ready, brigade, act, int(seen.state[brigade]), explored=choice == EXPLORED))
+        elif kind == GIVEN and act == Action.OWN_TARGET:
+            decisions.append(Decision(act, target=int(target[brigade])))
+        else:
+            decisions.append(Decision(act))
+    return tuple(decisions)
+
+
+def _by_table(ready: PolicyArrays, brigade: int, action: int, state: int, *, explored: bool) -> Decision:
+    row = table_state(state, ready.tables.shape[1])
+    values = ready.tables[ready.table_of[brigade], row].tolist()
+    return Decision(action, q_values=tuple(values), explored=explored, epsilon=float(ready.epsilon[0]))
 
 
 def _by_rank(observation: Observation, ready: PolicyArrays) -> Decision:
@@ -162,3 +202,8 @@ def from_rankings(rankings: Array, *, own_targets: bool) -> KernelPolicy:
     n = len(rankings)
     kind = RANK_ALL if own_targets else RANK_NAMED
     return KernelPolicy((kind,) * n, (0,) * n, tuple(range(n)), NO_TABLES, rankings=rankings)
+
+
+def given(n_brigades: int) -> PolicyArrays:
+    """Return the arrays of a team that does what is written into them: `action`, and `table_of` for own targets."""
+    return KernelPolicy((GIVEN,), (0,), (0,), NO_TABLES).for_brigades(n_brigades)
