@@ -18,15 +18,20 @@ Float64 = Annotated[Array, np.float64, 1]
 Float64x2 = Annotated[Array, np.float64, 2]
 Float64x3 = Annotated[Array, np.float64, 3]
 Float32 = Annotated[Array, np.float32, 1]
+Float32x2 = Annotated[Array, np.float32, 2]
+Float32x3 = Annotated[Array, np.float32, 3]
+Float32x4 = Annotated[Array, np.float32, 4]
 Int64 = Annotated[Array, np.int64, 1]
 Int64x2 = Annotated[Array, np.int64, 2]
 Int64x3 = Annotated[Array, np.int64, 3]
 Int32 = Annotated[Array, np.int32, 1]
 Int32x2 = Annotated[Array, np.int32, 2]
+Int32x3 = Annotated[Array, np.int32, 3]
 UInt64x2 = Annotated[Array, np.uint64, 2]
 UInt32 = Annotated[Array, np.uint32, 1]
 UInt8 = Annotated[Array, np.uint8, 1]
 UInt8x2 = Annotated[Array, np.uint8, 2]
+UInt8x3 = Annotated[Array, np.uint8, 3]
 """Contiguous arrays by the type of their items and the number of their axes: `addresses` reads it from here."""
 
 
@@ -155,6 +160,7 @@ class HealthConstants(NamedTuple):
     noise_mean: float
     noise_sd: float
     brigade_share: float
+    initial_hp: int
 
 
 class BrigadeConstants(NamedTuple):

@@ -145,6 +145,13 @@ def ask(policy: Policy, observation: Observation) -> Decision:
         raise _failure(policy, _moment(observation), error) from error
 
 
+def plain_actions(answers: Sequence[Any]) -> list[int] | None:
+    """Return the index of the paper's action in each answer; None if one of them is anything else."""
+    found = [None if isinstance(answer, bool | Decision) else _action_index(answer) for answer in answers]
+    named = [index for index in found if index is not None and index < len(ACTIONS)]
+    return named if len(named) == len(found) else None
+
+
 def keeps(policy: Policy, brigade: int, last_action: int, step: int) -> bool:
     """Return whether a policy lets a brigade repeat its last action, False if it has none; PolicyError if it fails."""
     if last_action < 0:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -169,7 +169,7 @@ class World:
         self.memory = memory.copy()
         self.state = self.start.packing.state(self.memory)
         self._bound: Bound | None = None
-        self._seen = fresh_seen(self.n_brigades)
+        self._seen, self._given = fresh_seen(self.n_brigades), given(self.n_brigades)
 
     def observe(self) -> tuple[Observation | None, ...]:
         """Return what each brigade sees before anyone decides in the next step; None of one that will not decide.
@@ -211,6 +211,15 @@ class World:
         brigades, seen = self.state.brigades, Seen(*(array.copy() for array in self._seen))
         made = brigades.action.copy(), brigades.target.copy(), bound.scratch.target_before.copy()
         return Choices(seen.features, seen.state, lambda: noted_decisions(policy, seen, *made))
+
+    def act(self, actions: Sequence[int]) -> None:
+        """Run one step in which the brigades that choose do (b,) `actions`, 0..3: as `step` does, but nothing is noted.
+
+        For loops that others own.
+        """
+        bound = self._bind(self._given, NO_LEARNER, NOTHING_SEEN)
+        self._given.action[:] = actions
+        self.step_number = bound.run(self.seed, self.step_number, self.step_number + 1)
 
     def run(self, policy: PolicyArrays, learner: Learner = NO_LEARNER) -> int:
         """Run the whole episode in compiled code and return the last step; it comes out as step by step."""
