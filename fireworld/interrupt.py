@@ -35,8 +35,11 @@ def once_more() -> None:
 
 
 def no_more() -> None:
-    """Send no Ctrl-C again: the program is at its end."""
+    """Send no Ctrl-C again, and end with an exit code: the program is at its end."""
     _lost.clear()
+    # Python ends by a signal of its own after a Ctrl-C that came while it executed text, as dataclasses do, caught or
+    # not; to execute a text again makes it forget that.
+    exec("")  # noqa: S102
 
 
 def _send() -> None:

@@ -116,7 +116,7 @@ def judge(done: Done, codes: Collection[int], *, cpu_seconds_max: float = CPU_SE
 
 def faults_of_a_refusal(done: Done) -> list[str]:
     """Return what is wrong with what was said with exit code 2: it is one printable line that says something."""
-    lines = [line for line in done.err.splitlines() if _LINE.match(line)]
+    lines = [line for line in done.err.splitlines() if _LINE.match(line) and " cannot be kept in " not in line]
     if done.words[:2] == ("golden", "check") and not lines:
         return [] if done.out.strip() else ["nothing was said"]  # in its table, beside those that are the same
     if len(lines) != 1:

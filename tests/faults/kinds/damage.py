@@ -21,7 +21,7 @@ from tests.faults.material import RUN_LOGS, SHORT_WORDS, TRAINING_LOGS
 from tests.faults.outcomes import Done, Outcome
 
 NAME: Final = "damage"
-SHARE: Final = 0.28
+SHARE: Final = 0.26
 
 READS: Final = frozenset({0, 2})
 JUDGES: Final = frozenset({0, 1, 2})

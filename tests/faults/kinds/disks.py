@@ -15,7 +15,7 @@ from tests.faults.outcomes import Done, Outcome
 from tests.faults.writers import OFTEN, WRITERS, Whole, Writer, call_again, look, whole_call
 
 NAME: Final = "disks"
-SHARE: Final = 0.06
+SHARE: Final = 0.04
 REFUSED: Final = 2
 BLOCK: Final = 4096
 ODD_NAMES: Final = tuple(

@@ -17,7 +17,7 @@ from tests.faults.outcomes import Outcome
 from tests.faults.writers import OFTEN, WRITERS, Whole, call_again, look, missing_files, whole_call
 
 NAME: Final = "kills"
-SHARE: Final = 0.3
+SHARE: Final = 0.27
 """Of the time of a campaign."""
 SIGNALS: Final = (signal.SIGKILL, signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 INTERRUPTED: Final = 130

@@ -20,7 +20,7 @@ from tests.faults.outcomes import Outcome
 from tests.faults.writers import OFTEN, WRITERS, Whole, look, missing_files, whole_call
 
 NAME: Final = "surroundings"
-SHARE: Final = 0.06
+SHARE: Final = 0.04
 REFUSED: Final = 2
 DIES_AFTER: Final = (
     "import os, sys\nn = {n}\nwhile n > 0:\n    n -= len(os.read(0, min(n, 65536))) or n\nsys.exit({code})"
