@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -31,7 +31,7 @@ class Rewards:
 
     def scenario(self, scenario: Scenario) -> Scenario:
         """Return a scenario with this reward, so that a recording has it too."""
-        return with_kind(scenario, self.kind) if self.kind in KINDS else scenario  # type: ignore[arg-type]
+        return with_kind(scenario, self.kind) if self.kind in KINDS else scenario
 
     def of(self, result: Result, before: Array) -> Array:
         """Return the rewards of a step, (n,) float64; `before` (n,): score / maximal score before it.
@@ -58,6 +58,6 @@ def reward_of(value: object) -> Rewards:
     """
     names = (SCORE, *KINDS)
     if callable(value) or value in names:
-        return Rewards(value)  # type: ignore[arg-type]
+        return Rewards(value)
     hint = nearest(value, names) if isinstance(value, str) else ""
     raise ArgumentError(expected("reward", "", f"one of {', '.join(names)}, or a function", value, hint))

@@ -31,7 +31,7 @@ from fireworld.simulation.bound import Bound
 from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.simulation.world import World
 
-SCENARIO: Final = str | Path | Scenario | Mapping[str, Any]
+SCENARIO = str | Path | Scenario | Mapping[str, Any]
 _SNAPSHOT: Final = "fireworld-worlds/1"
 
 
@@ -95,6 +95,7 @@ class Worlds:
         """(n,) number of each world's episode, 0 at first."""
         self._playing = np.full(n, -1, dtype=np.int64)
         self._ended = np.ones(n, dtype=np.bool_)
+        self._share: Array = np.ones(n)
         self._begin()
 
     def _begin(self) -> None:
@@ -141,14 +142,14 @@ class Worlds:
             self.seeds = Seeds(seed_of(seed), test=self.seeds.test)
             self.episode[which] = -1
         self._next_episode(which)
-        return observed(self._batch.view, self.observation)
+        return observed(self._batch.shown, self.observation)
 
     def step(self, actions: Array | Sequence[Sequence[int]]) -> Stepped:
         """Run one step of every world.
 
         Args:
-            actions: (n, n_brigades) whole numbers: 0 to 3 are the paper's actions, 4 + j names the j-th burning building
-                of the brigade's site. Of brigades that choose nothing they are ignored.
+            actions: (n, n_brigades) whole numbers: 0 to 3 are the paper's actions, 4 + j names the j-th burning
+                building of the brigade's site. Of brigades that choose nothing they are ignored.
 
         Raises:
             ArgumentError: another shape, dtype or number; an action that the mask forbids; with Autoreset.DISABLED, a
@@ -171,9 +172,9 @@ class Worlds:
         info = self._info()
         ends = np.flatnonzero(self._ended)
         if len(ends) and self.autoreset is Autoreset.SAME_STEP:
-            info |= {"final": observed(self._batch.view, self.observation), "ended": self._ended.copy()}
+            info |= {"final": observed(self._batch.shown, self.observation), "ended": self._ended.copy()}
             self._next_episode(ends)
-        return Stepped(observed(self._batch.view, self.observation), reward, terminated, truncated, info)
+        return Stepped(observed(self._batch.shown, self.observation), reward, terminated, truncated, info)
 
     def fork(self, source: int, target: int, *, seed: int | None = None) -> None:
         """Bring world `target` into the state of world `source`.
@@ -244,7 +245,7 @@ class Worlds:
             self._worlds[index].memory[:] = wanted[f"world{index}"]
             self._bound[index].clock[:] = wanted["clock"][index]
         self._show(np.arange(self.n), begun=True)
-        return observed(self._batch.view, self.observation)
+        return observed(self._batch.shown, self.observation)
 
     def close(self) -> None:
         """End the threads."""
@@ -306,7 +307,7 @@ class Worlds:
         self._show(which, begun=False)
 
     def _show(self, which: Array, *, begun: bool) -> None:
-        view = self._batch.view
+        view = self._batch.shown
         for index in which.tolist():
             world = self._worlds[index]
             view.frame[index] = world.start.frame
@@ -330,7 +331,7 @@ class Worlds:
             done.result()
 
     def _checked(self, actions: object) -> Array:
-        shape, view = (self.n, self.n_brigades), self._batch.view
+        shape, view = (self.n, self.n_brigades), self._batch.shown
         array = np.asarray(actions)
         if array.shape != shape or array.dtype.kind not in "iu":
             got = f"{array.dtype} {array.shape}"
@@ -372,9 +373,9 @@ class Worlds:
         try:
             held: dict[str, Any] = dict(read_npz(io.BytesIO(snapshot)))
             head = json.loads(str(held["head"]))
-            if not isinstance(head, dict) or head.get("format") != _SNAPSHOT:
-                raise ValueError("another format")
             Seeds(head["base"], test=bool(head["test"]))
+            if head["format"] != _SNAPSHOT:
+                raise ValueError("another format")  # noqa: TRY301 - what the handler is for
         except (ValueError, KeyError, TypeError, RecursionError) as error:
             raise LogError(expected("snapshot", "", "the bytes of a snapshot", str(error) or "others")) from None
         digests = [built.scenario.digest for built in self._built]
@@ -425,8 +426,8 @@ def worlds(
             see what the others did in the last step.
         n: how many, from 1 to 2048.
         observation: "features", "targets" or "graph": `fireworld.envs.view.OBSERVATIONS`.
-        reward: "score", the change of score / maximal score; "stock" or "change", the scenario's terms; or a function of
-            what the step came to, that returns (n,) numbers: see `fireworld.envs.rewards`.
+        reward: "score", the change of score / maximal score; "stock" or "change", the scenario's terms; or a
+            function of what the step came to, that returns (n,) numbers: see `fireworld.envs.rewards`.
         own_targets: how many burning buildings of its site a brigade may name as its own target.
         n_burning_max: of "graph", how many burning buildings there is room for.
         steps: the last step; None: each scenario's.

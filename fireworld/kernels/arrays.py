@@ -295,14 +295,23 @@ class WorldState(NamedTuple):
     ways: WayState
 
 
+class NetworkArrays(NamedTuple):
+    """A network that values targets, layer after layer; without layers there is none."""
+
+    feature: Int64  # (inputs,), the place of each feature that it reads among the 17 of a ranking
+    layer: Int64x2  # (layers, 4): inputs, outputs, activation, where its numbers begin
+    number: Float64  # of each layer the biases (outputs,), then the weights (inputs, outputs)
+
+
 class PolicyArrays(NamedTuple):
     """A policy that the kernels can follow by themselves, per brigade."""
 
-    kind: Int32  # (b,): 0 always one action, 1 random, 2 greedy in a table, 3 and 4 by a ranking of targets, 5 given
+    kind: Int32  # (b,): 0 always one action, 1 random, 2 greedy in a table, 3 and 4 by what targets are worth, 5 given
     action: Int32  # (b,), the action of kinds 0 and 5
     table_of: Int32  # (b,), the table of kind 2, the ranking of kinds 3 and 4, the target of kind 5 and OWN_TARGET
     tables: Float64x3  # (tables, states, 4)
     rankings: Float64x2  # (rankings, 17), weights
+    network: NetworkArrays  # if it has layers, kinds 3 and 4 value targets by it instead of a ranking
     epsilon: Float64  # (1,), probability of a random action instead of the greedy one
     commit: Int64  # (1,), steps that a choice is kept for; 1: a new choice every step
 
@@ -352,6 +361,8 @@ class Scratch(NamedTuple):
     values: Float64  # (5,)
     described: Float64x2  # (n, 7); no rows where nobody ranks
     described_at: Int64  # (n,), -1 at first
+    seen: Float64  # (17,)
+    work: Float64x2  # (2, w), w as `widest` says of the policy's network
 
 
 class Episode(NamedTuple):

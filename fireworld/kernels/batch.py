@@ -75,7 +75,7 @@ class Batch(NamedTuple):
     """What n worlds take and give."""
 
     actions: Int32x2  # (n, b): 0..3 as named; 4 + j: the j-th of `View.own`
-    view: View
+    shown: View
     result: Result
 
 
@@ -135,7 +135,7 @@ def follow(brigade: int, action: int, i: int, episode: Episode, batch: Batch) ->
     if not can_choose(brigade, brigades.hp, brigades.refilling, sites.counts):
         action = -1
     elif action >= N_ACTIONS:
-        target, action = batch.view.own[i, brigade, action - N_ACTIONS], OWN_TARGET
+        target, action = batch.shown.own[i, brigade, action - N_ACTIONS], OWN_TARGET
     else:
         target = find_target(brigade, action, brigades, city.buildings, world.fire, city.geometry, sites)
     brigades.action[brigade], brigades.target[brigade] = action, target
@@ -145,10 +145,13 @@ def follow(brigade: int, action: int, i: int, episode: Episode, batch: Batch) ->
 def show(i: int, episode: Episode, batch: Batch) -> None:
     """Write what is seen of world i, in whose coming step the fire sites are found, and what its last step came to."""
     city, world, clock = episode.city, episode.world, episode.clock
-    outcome, view, result = world.outcome, batch.view, batch.result
-    result.reward[i] = outcome.reward
-    result.score[i] = outcome.score
-    result.counts[i] = outcome.counts
+    outcome, view, result = world.outcome, batch.shown, batch.result
+    for k in range(len(outcome.reward)):
+        result.reward[i, k] = outcome.reward[k]
+    for k in range(len(outcome.score)):
+        result.score[i, k] = outcome.score[k]
+    for k in range(len(outcome.counts)):
+        result.counts[i, k] = outcome.counts[k]
     result.seed[i], result.step[i] = clock[SEED], clock[STEP]
     over = is_over(outcome.counts[BURNING], city.buildings.later_step, clock[STEP])
     result.terminated[i] = over
@@ -170,7 +173,7 @@ def show(i: int, episode: Episode, batch: Batch) -> None:
 @inlined
 def show_brigade(brigade: int, i: int, episode: Episode, batch: Batch) -> None:
     """Write what a brigade of world i sees."""
-    city, world, constants, view = episode.city, episode.world, episode.constants, batch.view
+    world, constants, view = episode.world, episode.constants, batch.shown
     brigades, sites = world.brigades, world.sites
     view.state[i, brigade] = observe(
         brigade, brigades.action, brigades.site, sites, constants.observation, view.features[i, brigade]

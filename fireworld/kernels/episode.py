@@ -88,6 +88,7 @@ def run_steps(episode: Episode) -> None:  # noqa: C901, PLR0912, PLR0915 - to ha
                         step,
                         known,
                         weights,
+                        policy.network,
                         described,
                         described_at,
                         brigades,
@@ -98,6 +99,8 @@ def run_steps(episode: Episode) -> None:  # noqa: C901, PLR0912, PLR0915 - to ha
                         sites,
                         constants.fire,
                         constants.brigades,
+                        scratch.seen,
+                        scratch.work,
                         seen.values[brigade] if noting else values,
                     )
                 else:

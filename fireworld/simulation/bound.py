@@ -10,8 +10,9 @@ import numpy as np
 from fireworld.kernels.addresses import address_row
 from fireworld.kernels.arrays import LAST_STEP, SEED, STEP, Array, Learner, PolicyArrays, Scratch, Seen
 from fireworld.kernels.choice import RANK_ALL, RANK_NAMED
+from fireworld.kernels.network import widest
 from fireworld.kernels.observation import N_ACTIONS, N_FEATURES
-from fireworld.kernels.ranking import N_OF_BUILDING
+from fireworld.kernels.ranking import N_OF_BUILDING, N_WEIGHTS
 from fireworld.simulation.state import NO_LEARNER
 
 
@@ -42,6 +43,8 @@ def bind(
     policy: PolicyArrays,
     learner: Learner = NO_LEARNER,
     seen: Seen | None = None,
+    *,
+    describes: bool = False,
 ) -> Bound:
     """Bind a world to those who act in it.
 
@@ -52,17 +55,19 @@ def bind(
         policy: the team.
         learner: what learns.
         seen: where it is noted what the brigades see and choose; None: nowhere.
+        describes: there is room for the features of buildings, even if the team does not rank them.
     """
-    ranks = bool(np.isin(policy.kind, (RANK_NAMED, RANK_ALL)).any())
-    scratch, clock = fresh_scratch(len(policy.kind), n_buildings if ranks else 0), np.zeros(3, dtype=np.int64)
+    ranks = describes or bool(np.isin(policy.kind, (RANK_NAMED, RANK_ALL)).any())
+    scratch, clock = fresh_scratch(policy, n_buildings if ranks else 0), np.zeros(3, dtype=np.int64)
     noted = NOTHING_SEEN if seen is None else seen
     rows = [address_row(group) for group in (policy, learner, noted, scratch)]
     clock_row = clock.__array_interface__["data"][0], len(clock)
     return Bound(policy, learner, noted, scratch, clock, np.concatenate((city_row, state_row, *rows, clock_row)))
 
 
-def fresh_scratch(n_brigades: int, n_described: int) -> Scratch:
-    """Return what steps write on; `n_described`: buildings of the city if a ranking chooses, else 0."""
+def fresh_scratch(policy: PolicyArrays, n_described: int) -> Scratch:
+    """Return what the steps of a team write on; `n_described`: buildings of the city if it ranks them, else 0."""
+    n_brigades = len(policy.kind)
     return Scratch(
         features=np.zeros(N_FEATURES, dtype=np.int64),
         action_before=np.zeros(n_brigades, dtype=np.int32),
@@ -70,6 +75,8 @@ def fresh_scratch(n_brigades: int, n_described: int) -> Scratch:
         values=np.zeros(N_ACTIONS + 1),
         described=np.zeros((n_described, N_OF_BUILDING)),
         described_at=np.full(n_described, -1),
+        seen=np.zeros(N_WEIGHTS),
+        work=np.zeros((2, widest(policy.network))),
     )
 
 

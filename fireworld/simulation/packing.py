@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from typing import Any, Final
 
 import numpy as np
@@ -22,11 +23,16 @@ class Packing:
         row: list[int] = []
         where: list[bool] = []
         n_bytes = 0
-        for _, array in named_arrays(state):
+        names = []
+        for name, array in named_arrays(state):
+            names.append(name)
             self._places.append((array.dtype, array.shape, n_bytes))
             row += (n_bytes, *array.shape)
             where += (True, *(False for _ in array.shape))
             n_bytes += -(-array.nbytes // ALIGNED_BYTES) * ALIGNED_BYTES
+        layout = repr([(name, *place) for name, place in zip(names, self._places, strict=True)])
+        self.digest = hashlib.sha256(layout.encode()).hexdigest()
+        """Of the names, types, shapes and places of the arrays."""
         self._row, self._where, self._n_bytes = np.array(row, dtype=np.int64), np.array(where), n_bytes
         self._groups = [(name, kind) for name, kind in fields_of(WorldState) if name != WAYS]
         self.memory = self.fresh()

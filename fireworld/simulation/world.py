@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -45,7 +46,7 @@ from fireworld.simulation.city_arrays import (
 )
 from fireworld.simulation.packing import Packing
 from fireworld.simulation.placement import Placement
-from fireworld.simulation.state import NO_LEARNER, fresh_world, rewards_of, score_of
+from fireworld.simulation.state import NO_LEARNER, fresh_world, rewards_of, score_of, take_snapshot
 
 NO_DECISION = Decision(-1)
 NOBODY: Final = given(0)
@@ -70,6 +71,12 @@ class Start:
     def row(self) -> Array:
         """The address row of the city and the constants."""
         return np.concatenate((address_row(self.city_arrays), address_row(self.constants)))
+
+    @cached_property
+    def frame(self) -> Array:
+        """West and south end of the streets, their width and height, (4,) mm."""
+        x, y = self.city_arrays.streets.node_x, self.city_arrays.streets.node_y
+        return np.array([x.min(), y.min(), max(np.ptp(x), 1.0), max(np.ptp(y), 1.0)])
 
 
 def prepare_start(
@@ -227,6 +234,23 @@ class World:
             bound = self._bind(policy, learner, NOTHING_SEEN)
             self.step_number = bound.run(self.seed, self.step_number, self.n_steps_max)
         return self.step_number
+
+    def bound(self, policy: PolicyArrays, *, describes: bool = True) -> Bound:
+        """Return what kernels take of this world and a team, for loops of kernels of their own.
+
+        Args:
+            policy: the team.
+            describes: there is room for the features of buildings, whether the team needs them or not.
+        """
+        row = self.start.packing.row(self.memory, self.state.ways)
+        return bind(self.start.row, row, self.city.n_buildings, policy, describes=describes)
+
+    def digest(self) -> str:
+        """Return a digest of all that the rest of the run follows from: state, seed and step."""
+        found = hashlib.sha256(f"{self.seed} {self.step_number}".encode())
+        for name, array in take_snapshot(self.state).items():
+            found.update(name.encode() + array.tobytes())
+        return found.hexdigest()
 
     def _bind(self, policy: PolicyArrays, learner: Learner, seen: Seen) -> Bound:
         """Return what kernels take of this world and those who act in it, with the clock as it stands."""
