@@ -96,9 +96,10 @@ class _Decided(Policy):
         self._made = made
 
     def decide(self, observation: Observation) -> Decision:
-        """Return what was decided; anything beyond the end, where the outcomes differ anyway."""
+        """Return what was decided; anything where nothing was: there the outcomes differ anyway."""
         step = observation.step - 1
-        return self._made[step][observation.brigade] if step < len(self._made) else Decision(0)
+        made = self._made[step][observation.brigade] if step < len(self._made) else Decision(-1)
+        return made if made.action >= 0 else Decision(0)
 
 
 def _checksum(built: BuiltScenario) -> int:

@@ -46,9 +46,8 @@ def look(row: Array) -> None:
 
 @kernel
 def finish(row: Array) -> None:
-    """Carry out what the brigades decided in the step after the last one done."""
+    """Carry out what the brigades decided in the step of the clock."""
     episode = opened_episode(row)
-    episode.clock[STEP] += 1
     finish_step(episode.city, episode.world, episode.constants, episode.clock[SEED], episode.clock[STEP])
 
 

@@ -184,7 +184,7 @@ class World:
         The world stays as it is; the observations have its state in that moment, in arrays of their own.
         """
         ahead = self.copy()
-        look(ahead._bind(NOBODY, NO_LEARNER, NOTHING_SEEN).row)  # noqa: SLF001 - a world as this one
+        ahead.look()
         ahead.step_number += 1
         brigades, sites, features = ahead.state.brigades, ahead.state.sites, np.zeros(8, dtype=np.int64)
         known, seen = brigades.target.copy(), list[Observation | None]()
@@ -194,13 +194,16 @@ class World:
             seen.append(ahead._observation(brigade, features, state, known) if decides else None)  # noqa: SLF001
         return tuple(seen)
 
+    def look(self) -> None:
+        """Begin the coming step: light what is lit in it, and find the fire sites."""
+        look(self._bind(NOBODY, NO_LEARNER, NOTHING_SEEN).row)
+
     def step(self, policy: Policy) -> Choices:
         """Run one step: the brigades look and decide one after another, then come the phases of `finish_step`."""
         ready = policy.ready(self.n_brigades) if isinstance(policy, KernelPolicy) else None
         if ready is not None:
             return self._step_in_kernel(ready)
-        bound = self._bind(NOBODY, NO_LEARNER, NOTHING_SEEN)
-        look(bound.row)
+        self.look()
         self.step_number += 1
         before, target_before = self.state.brigades.action.copy(), self.state.brigades.target.copy()
         try:
@@ -209,7 +212,7 @@ class World:
             self.step_number -= 1
             self.state.brigades.action[:], self.state.brigades.target[:] = before, target_before
             raise
-        finish(bound.row)
+        finish(self._bind(NOBODY, NO_LEARNER, NOTHING_SEEN).row)
         return choices
 
     def _step_in_kernel(self, policy: PolicyArrays) -> Choices:

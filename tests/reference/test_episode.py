@@ -282,7 +282,7 @@ def test_sites_of_fires_that_jump_about(seed):
             plain.memory.label = found.label.astype(np.int64)
             for who, brigade in enumerate(plain.team):
                 brigade.site = compiled.state.brigades.site[who] = int(random.integers(0, last))
-        compiled._look()
+        compiled.look()
         seen = episode.look(play.tables, plain)
         assert found.label.tolist() == plain.memory.label.tolist()
         assert found.counts[1] == plain.memory.last_number

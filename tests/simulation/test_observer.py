@@ -31,7 +31,7 @@ def told(record):
 def observe_change(world, change):
     """Record a step in which nothing happens but a change."""
     observer = Observer(world)
-    world._look()
+    world.look()
     change(world.state)
     return told(observer.record(NO_CHOICES))
 
@@ -74,7 +74,7 @@ def test_sites_that_merge_do_not_go_out():
     burn(world, 0, 2)
     observer = Observer(world)
     world.state.fire.fieryness[1] = 1
-    world._look()
+    world.look()
     assert [kind for kind, _ in told(observer.record(NO_CHOICES))] == ["ignited"]
 
 
