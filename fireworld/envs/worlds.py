@@ -160,7 +160,7 @@ class Worlds:
             raise ArgumentError(expected("step", f"world {begins[0]}", "one under way", "one that is not", "reset it"))
         self._batch.actions[...] = self._checked(actions)
         runs = np.flatnonzero(~self._ended)
-        self._in_kernel(step_worlds, runs)
+        self._in_kernel(lambda rows, batch, some: step_worlds(rows, batch, some, False), runs)
         if len(begins):
             self._next_episode(begins)
         result = self._batch.result

@@ -102,14 +102,18 @@ def show_worlds(rows: Array, batch_row: Array, indices: Array, begun: bool) -> N
 
 
 @kernel
-def step_worlds(rows: Array, batch_row: Array, indices: Array) -> None:
-    """Run a step of worlds, none of which has ended; arguments as for `show_worlds`."""
+def step_worlds(rows: Array, batch_row: Array, indices: Array, decided: bool) -> None:
+    """Run a step of worlds, none of which has ended; arguments as for `show_worlds`.
+
+    `decided`: their brigades have taken their turns, and `Batch.actions` is nothing more.
+    """
     batch = opened_batch(batch_row)
     for k in range(len(indices)):
         i = indices[k]
         episode = opened_episode(rows[i])
-        for brigade in range(len(episode.world.brigades.action)):
-            follow(brigade, batch.actions[i, brigade], i, episode, batch)
+        if not decided:
+            for brigade in range(len(episode.world.brigades.action)):
+                follow(brigade, batch.actions[i, brigade], i, episode, batch)
         clock = episode.clock
         clock[STEP] += 1
         finish_step(episode.city, episode.world, episode.constants, clock[SEED], clock[STEP])
