@@ -19,8 +19,11 @@ from fireworld.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from fireworld.errors import FireworldError as FireworldError
+    from fireworld.evaluation.check_scenarios import check_scenarios as check_scenarios
     from fireworld.evaluation.compare import compare as compare
     from fireworld.evaluation.comparison import Comparison as Comparison
+    from fireworld.evaluation.scenario_check import ScenarioCheck as ScenarioCheck
+    from fireworld.evaluation.scenario_check import ScenarioChecks as ScenarioChecks
     from fireworld.maps.exporting import export_city as export_city
     from fireworld.maps.importing import ImportedCity as ImportedCity
     from fireworld.maps.importing import import_city as import_city
@@ -75,10 +78,13 @@ _ROOMS = {
     "Reproduction": "reproduction.reproduce",
     "Run": "recording.run",
     "Scenario": "scenario",
+    "ScenarioCheck": "evaluation.scenario_check",
+    "ScenarioChecks": "evaluation.scenario_check",
     "Session": "simulation.session",
     "Team": "policy.teams.team",
     "TrainingLog": "training.log.reader",
     "Verification": "recording.verify",
+    "check_scenarios": "evaluation.check_scenarios",
     "compare": "evaluation.compare",
     "diff": "recording.difference",
     "explain": "recording.explain",
