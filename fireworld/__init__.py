@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from fireworld.evaluation.check_scenarios import check_scenarios as check_scenarios
     from fireworld.evaluation.compare import compare as compare
     from fireworld.evaluation.comparison import Comparison as Comparison
+    from fireworld.evaluation.found_fires import NewScenarios as NewScenarios
+    from fireworld.evaluation.new_scenarios import new_scenarios as new_scenarios
     from fireworld.evaluation.scenario_check import ScenarioCheck as ScenarioCheck
     from fireworld.evaluation.scenario_check import ScenarioChecks as ScenarioChecks
     from fireworld.maps.exporting import export_city as export_city
@@ -72,6 +74,7 @@ _ROOMS = {
     "Imported": "recording.official_log.imported",
     "ImportedCity": "maps.importing",
     "ImportedOsm": "maps.osm",
+    "NewScenarios": "evaluation.found_fires",
     "Observation": "policy.protocol",
     "Outcome": "outcome",
     "Policy": "policy.protocol",
@@ -95,6 +98,7 @@ _ROOMS = {
     "import_log": "recording.official_log.importer",
     "import_osm": "maps.osm",
     "load_team": "policy.teams.team",
+    "new_scenarios": "evaluation.new_scenarios",
     "open_log": "recording.run",
     "open_training": "training.log.reader",
     "policies": "policy.names",
