@@ -175,7 +175,8 @@ def _of_path(path: Path) -> tuple[Scenario, bytes | None]:
     some = plan.footprints.building_id[plan.footprints.inflammable != 0][:1].tolist()
     city = {"official": str(path.absolute()), "sha256": digest}
     document = scenario_document(files, imported, plan, fires=some, city=city)
-    return scenario_of({**document, "name": ""}, source=str(path), folder=None), content
+    scenario = scenario_of({**document, "name": ""}, source=str(path), folder=None)
+    return msgspec.structs.replace(scenario, city=msgspec.structs.replace(scenario.city, sha256=None)), content
 
 
 def _plain(city: Mapping[str, Any], *, source: str = "Scenario") -> Scenario:

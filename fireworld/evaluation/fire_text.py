@@ -32,7 +32,6 @@ def fire_text(scenario: Scenario, *, folder: Path, comment: str) -> str:
     for key in ("file", "official"):
         if key in document["city"]:
             document["city"][key] = name_from(Path(document["city"][key]), folder)
-    document["city"].pop("sha256", None)
     return f"{_as_comment(comment)}\n{write_yaml(document)}"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 import shlex
@@ -154,6 +155,14 @@ def test_a_city_file_is_named_from_the_folder_of_the_scenario(tmp_path, monkeypa
     assert found.options == "--city cities/town.json --seed 1 --seeds 1"
 
 
+def test_a_digest_that_a_city_must_have_stays(tmp_path):
+    (tmp_path / "town.json").write_text(TOWN)
+    digest = hashlib.sha256(TOWN.encode()).hexdigest()
+    pinned = load_scenario("quick").with_values({"city": {"file": str(tmp_path / "town.json"), "sha256": digest}})
+    fw.new_scenarios(pinned, output=tmp_path / "a.yaml", seeds=1)
+    assert f"city: {{file: town.json, sha256: {digest}}}" in (tmp_path / "a.yaml").read_text()
+
+
 def test_places_are_buildings_that_burn(small):
     base = base_of("quick", seed=5, brigades=None, civilians=None, values={})
     places = [*base.places(5, n_places=300, n_fires=2)]
@@ -207,6 +216,7 @@ def test_of_a_map_brigades_people_and_configuration_are_taken(tmp_path):
     found = fw.new_scenarios(tmp_path / "town", seeds=1, lost_below=0.0, held_above=0.001, places=20)
     for check in found.checks:
         assert check.scenario.city.official == str(tmp_path / "town")
+        assert check.scenario.city.sha256 is None
     write_map(tmp_path / "bare", street_of_three().text(), scenario=scenario_text(refuge=[12]))
     bare = base_of(tmp_path / "bare", seed=1, brigades=3, civilians=2, values={})
     assert bare.scenario.brigades.n == 3
