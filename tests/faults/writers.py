@@ -84,7 +84,7 @@ WRITERS: Final[dict[str, Writer]] = {
         (*TINY_TRAINING, "-o", "t.npz", "--log", "t.csv"),
         ("t.npz", "t.csv"),
         TINY,
-        again=("--resume",),
+        again=("--resume", "--force"),  # killed between its two files, it has to be told that it may replace the first
         kept=("t.npz.checkpoint",),
         whole=whole.lines,
     ),

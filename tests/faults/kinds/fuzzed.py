@@ -17,7 +17,7 @@ from tests.fuzz import support, test_files, test_logs, test_tables
 from tests.fuzz.support import TARGETS, _edited
 
 NAME: Final = "fuzzed"
-SHARE: Final = 0.42
+SHARE: Final = 0.38
 TURN_SECONDS_MAX: Final = 60.0
 """CPU of a turn of a fuzz test: some hundred inputs, each of which may take a second."""
 TRAIN: Final = ("train", "in.yaml", *SHORT_WORDS, "--jobs", 1, "-o", "out.npz")
