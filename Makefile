@@ -62,7 +62,7 @@ oldest: .venv-oldest/.installed  ## Run the tests of everything but docs and pac
 
 .venv-oldest/.installed: pyproject.toml constraints-oldest.txt
 	$(PYTHON) -m venv .venv-oldest
-	PIP_CONSTRAINT=constraints-oldest.txt .venv-oldest/bin/python -m pip install --quiet --editable '.[view,film,osm,archive]' \
+	PIP_CONSTRAINT=constraints-oldest.txt .venv-oldest/bin/python -m pip install --quiet --editable '.[view,film,osm,onnx,archive]' \
 		hypothesis import-linter protobuf pytest pytest-xdist scipy
 	touch $@
 

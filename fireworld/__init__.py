@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from fireworld.policy.protocol import Decision as Decision
     from fireworld.policy.protocol import Observation as Observation
     from fireworld.policy.protocol import Policy as Policy
+    from fireworld.policy.teams.network_team import NetworkTeam as NetworkTeam
     from fireworld.policy.teams.team import Team as Team
     from fireworld.policy.teams.team import load_team as load_team
     from fireworld.recording.difference import Difference as Difference
@@ -74,6 +75,7 @@ _ROOMS = {
     "Imported": "recording.official_log.imported",
     "ImportedCity": "maps.importing",
     "ImportedOsm": "maps.osm",
+    "NetworkTeam": "policy.teams.network_team",
     "NewScenarios": "evaluation.found_fires",
     "Observation": "policy.protocol",
     "Outcome": "outcome",

@@ -274,14 +274,23 @@ class WorldState(NamedTuple):
     ways: WayState
 
 
+class NetworkArrays(NamedTuple):
+    """A network that values targets, layer after layer; without layers there is none."""
+
+    feature: Array  # (inputs,) int64, the place of each feature that it reads among the 17 of a ranking
+    layer: Array  # (layers, 4) int64: inputs, outputs, activation, where its numbers begin
+    number: Array  # float64, of each layer the biases (outputs,), then the weights (inputs, outputs)
+
+
 class PolicyArrays(NamedTuple):
     """A policy that the kernels can follow by themselves, per brigade."""
 
-    kind: Array  # (b,) int32: 0 always one action, 1 random, 2 greedy in a table, 3 and 4 by a ranking of targets
+    kind: Array  # (b,) int32: 0 always one action, 1 random, 2 greedy in a table, 3 and 4 by what targets are worth
     action: Array  # (b,) int32, the action of kind 0
     table_of: Array  # (b,) int32, the table of kind 2, the ranking of kinds 3 and 4
     tables: Array  # (tables, states, 4) float64
     rankings: Array  # (rankings, 17) float64, weights
+    network: NetworkArrays  # if it has layers, kinds 3 and 4 value targets by it instead of a ranking
     epsilon: Array  # (1,) float64, probability of a random action instead of the greedy one
     commit: Array  # (1,) int64, steps that a choice is kept for; 1: a new choice every step
 

@@ -32,8 +32,9 @@ from fireworld.kernels.learning import (
     take_reward,
     update,
 )
+from fireworld.kernels.network import widest
 from fireworld.kernels.observation import can_choose, find_target, observe
-from fireworld.kernels.ranking import N_OF_BUILDING, rank
+from fireworld.kernels.ranking import N_OF_BUILDING, N_WEIGHTS, rank
 from fireworld.kernels.sites import find_sites
 from fireworld.kernels.step import finish_step
 
@@ -47,6 +48,8 @@ class EpisodeScratch(NamedTuple):
     values: Array  # (5,) float64
     described: Array  # (n, 7) float64; no rows where nobody ranks
     described_at: Array  # (n,) int64, -1 at first
+    seen: Array  # (17,) float64
+    work: Array  # (2, w) float64, w as `widest` says of the policy's network
 
 
 @inner
@@ -103,6 +106,7 @@ def run_steps(  # noqa: C901, PLR0912, PLR0915 - handing all arrays to functions
                         step,
                         known,
                         weights,
+                        policy.network,
                         described,
                         described_at,
                         brigades,
@@ -113,6 +117,8 @@ def run_steps(  # noqa: C901, PLR0912, PLR0915 - handing all arrays to functions
                         sites,
                         constants.fire,
                         constants.brigades,
+                        scratch.seen,
+                        scratch.work,
                         values,
                     )
                 else:
@@ -167,5 +173,7 @@ def run_episode(
         np.zeros(5),
         np.zeros((n_described, N_OF_BUILDING)),
         np.full(n_described, -1),
+        np.zeros(N_WEIGHTS),
+        np.zeros((2, widest(policy.network))),
     )
     return run_steps(city, world, constants, policy, learner, seed, first_step, last_step, scratch)

@@ -1,4 +1,4 @@
-"""Policies that the compiled episode follows by itself: fixed actions, random, tables, and rankings of targets."""
+"""Policies that the compiled episode follows by itself: fixed actions, random, tables, rankings and networks."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from fireworld.kernels.arrays import Array, CityArrays, PolicyArrays
+from fireworld.kernels.arrays import Array, CityArrays, NetworkArrays, PolicyArrays
 from fireworld.kernels.choice import (
     FIXED,
     RANDOM,
@@ -20,11 +20,13 @@ from fireworld.kernels.choice import (
     keeps_choice,
     table_state,
 )
+from fireworld.kernels.network import widest
 from fireworld.kernels.ranking import N_OF_BUILDING, N_WEIGHTS, rank
 from fireworld.policy.protocol import Decision, Observation, Policy
 from fireworld.records import ACTIONS
 
 NO_TABLES: Final = np.zeros((1, 1, 4))
+NO_NETWORK: Final = NetworkArrays(np.zeros(0, dtype=np.int64), np.zeros((0, 4), dtype=np.int64), np.zeros(0))
 
 
 @dataclass
@@ -44,13 +46,15 @@ class KernelPolicy(Policy):
     """Steps for which a choice is repeated."""
     rankings: Array = field(default_factory=lambda: np.zeros((1, N_WEIGHTS)))
     """(rankings, 17) float64, weights."""
+    network: NetworkArrays = NO_NETWORK
+    """What values targets instead of a ranking, if it has layers."""
     stateless = True
     _ready: PolicyArrays | None = field(default=None, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Raise ValueError for what the compiled episode and single steps would not do alike."""
         if self.commit > 1 and {RANK_NAMED, RANK_ALL} & set(self.kinds):
-            raise ValueError("a ranking chooses in every step: commit must be 1")
+            raise ValueError("what values targets chooses in every step: commit must be 1")
 
     def for_brigades(self, n_brigades: int) -> PolicyArrays:
         """Return the policy's arrays for a team."""
@@ -61,6 +65,7 @@ class KernelPolicy(Policy):
             table_of=np.array(self.table_of, dtype=np.int32)[turn],
             tables=np.ascontiguousarray(self.tables, dtype=np.float64),
             rankings=np.ascontiguousarray(self.rankings, dtype=np.float64),
+            network=self.network,
             epsilon=np.array([self.epsilon]),
             commit=np.array([self.commit], dtype=np.int64),
         )
@@ -100,11 +105,14 @@ class KernelPolicy(Policy):
         content.update(repr(self.tables.shape).encode() + np.ascontiguousarray(self.tables, dtype="<f8").tobytes())
         if {RANK_NAMED, RANK_ALL} & set(self.kinds):
             content.update(np.ascontiguousarray(self.rankings, dtype="<f8").tobytes())
+        if len(self.network.layer):
+            for array, dtype in zip(self.network, ("<i8", "<i8", "<f8"), strict=True):
+                content.update(np.ascontiguousarray(array, dtype=dtype).tobytes())
         return content.hexdigest()
 
 
 def _by_rank(observation: Observation, ready: PolicyArrays) -> Decision:
-    """Choose the target that a brigade's ranking puts first."""
+    """Choose the target that a brigade values most, by its ranking or network."""
     brigade, city, world, constants = observation.brigade, observation.city, observation.world, observation.constants
     n = len(world.fire.energy)
     values = np.zeros(len(ACTIONS) + 1)
@@ -115,6 +123,7 @@ def _by_rank(observation: Observation, ready: PolicyArrays) -> Decision:
         observation.step,
         observation.known_targets,
         ready.rankings[ready.table_of[brigade]],
+        ready.network,
         np.zeros((n, N_OF_BUILDING)),
         np.full(n, -1),
         world.brigades,
@@ -125,6 +134,8 @@ def _by_rank(observation: Observation, ready: PolicyArrays) -> Decision:
         world.sites,
         constants.fire,
         constants.brigades,
+        np.zeros(N_WEIGHTS),
+        np.zeros((2, widest(ready.network))),
         values,
     )
     return Decision(
@@ -162,3 +173,8 @@ def from_rankings(rankings: Array, *, own_targets: bool) -> KernelPolicy:
     n = len(rankings)
     kind = RANK_ALL if own_targets else RANK_NAMED
     return KernelPolicy((kind,) * n, (0,) * n, tuple(range(n)), NO_TABLES, rankings=rankings)
+
+
+def from_network(network: NetworkArrays, *, own_targets: bool) -> KernelPolicy:
+    """Return the policy of brigades that all value targets by one network."""
+    return KernelPolicy((RANK_ALL if own_targets else RANK_NAMED,), (0,), (0,), NO_TABLES, network=network)

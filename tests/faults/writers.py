@@ -121,6 +121,12 @@ WRITERS: Final[dict[str, Writer]] = {
         again=("--resume",),
         partials=("t.mcap.partial",),
     ),
+    "policy import": Writer(
+        ("policy", "import", "net.onnx", "-o", "t.npz", "--features", "mine,volume"),
+        ("t.npz",),
+        {"net.onnx": "net.onnx"},
+        ("--force",),
+    ),
     "compare, results": Writer((*COMPARE, "--results", "r.parquet"), ("r.parquet",), whole=whole.results),
     "compare, more results": Writer(
         (*COMPARE, "--results", "r.parquet"), ("r.parquet",), {"r.parquet": "known.parquet"}, whole=whole.results

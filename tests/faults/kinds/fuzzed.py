@@ -13,7 +13,7 @@ from hypothesis import seed as seeded
 from tests.faults.bench import VERDICT_OR_REFUSED, Bench, as_process
 from tests.faults.material import SHORT_WORDS
 from tests.faults.outcomes import Outcome
-from tests.fuzz import support, test_files, test_logs, test_tables
+from tests.fuzz import support, test_files, test_logs, test_networks, test_tables
 from tests.fuzz.support import TARGETS, _edited
 
 NAME: Final = "fuzzed"
@@ -44,6 +44,12 @@ READERS: Final[dict[str, tuple[tuple[object, ...], ...]]] = {
         ("compare", "in.npz", "chief", "--scenarios", "quick", "--seeds", 1, "--jobs", 1, "--gate", *SHORT),
     ),
     "ranking.npz": (("policy", "show", "in.npz"), ("run", "quick", "--policy", "in.npz", "--steps", 2)),
+    "network.npz": (
+        ("policy", "show", "in.npz"),
+        ("policy", "diff", "in.npz", "team.npz"),
+        ("run", "quick", "--policy", "in.npz", "--steps", 2),
+    ),
+    "net.onnx": (("policy", "import", "in.onnx", "-o", "out.npz", "--features", "mine,volume"),),
     "known.parquet": (
         (
             "compare",
@@ -131,6 +137,8 @@ def _good(bench: Bench, name: str) -> bytes:
         return (bench.material / "traces" / "mini.json").read_bytes()
     if name == "trace.npz":
         return test_files.npz(test_tables.ARRAYS)
+    if name == "network.npz":
+        return test_networks.TEAM.to_bytes()
     return (bench.material / name).read_bytes()
 
 
