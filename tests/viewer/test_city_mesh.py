@@ -83,6 +83,10 @@ def test_mesh_of_a_city(small):
     assert np.array_equal(np.bincount(mesh.vertex_building), 5 * n_corners)
     assert mesh.triangle.max() < len(mesh.vertex_xyz_m)
     assert mesh.vertex_shade.max() < len(SHADES_PERCENT)
+    width, height = mesh.picture_size
+    assert width * (height - 1) < len(n_corners) <= width * height
+    column, row = np.floor(mesh.vertex_uv * (width, height)).astype(int).T
+    assert np.array_equal(row * width + column, mesh.vertex_building)
     owners = mesh.vertex_building[mesh.triangle]
     assert np.all(owners == owners[:, :1])  # no triangle joins two buildings
 

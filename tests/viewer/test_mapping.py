@@ -27,22 +27,28 @@ def saved(small: MemoryRecording, tmp_path_factory: pytest.TempPathFactory) -> d
     return rrd.read(path)
 
 
-def packed(rgb: colors.Rgb, percent: int) -> int:
-    red, green, blue = (part * percent // 100 for part in rgb)
-    return red << 24 | green << 16 | blue << 8 | 255
-
-
 def test_every_building_has_its_color_at_every_step(small, saved):
-    mesh = build_mesh(small.city)
-    shown = rrd.at_every_step(saved["/city/buildings"]["Mesh3D:vertex_colors"], small.steps.tolist())
+    shown = rrd.building_colors(saved, "/city/buildings", small.steps.tolist(), len(small.city.building_id))
     refuges = set(small.city.refuge_building.tolist())
     assert len(shown) == len(list(small))
-    for record, vertex_colors in zip(small, shown, strict=True):
+    for record, rgb in zip(small, shown, strict=True):
         for building, code in enumerate(record.buildings.fieryness.tolist()):
-            rgb = colors.REFUGE_RGB if building in refuges else colors.FIERYNESS_RGB[code]
-            own = mesh.vertex_building == building
-            wanted = [packed(rgb, SHADES_PERCENT[shade]) for shade in mesh.vertex_shade[own].tolist()]
-            assert vertex_colors[own].tolist() == wanted
+            wanted = colors.REFUGE_RGB if building in refuges else colors.FIERYNESS_RGB[code]
+            assert tuple(rgb[building].tolist()) == wanted
+
+
+def test_every_vertex_has_the_pixel_of_its_building_and_the_shade_of_its_face(small, saved):
+    mesh, sent = build_mesh(small.city), saved["/city/buildings"]
+    ((_, picture),), ((_, uv),), ((_, shade),) = (
+        sent[f"Mesh3D:{name}"] for name in ("albedo_texture_format", "vertex_texcoords", "vertex_colors")
+    )
+    (size,) = picture.as_py()
+    (_, first), *_ = sent["Mesh3D:albedo_texture_buffer"]
+    assert len(first.as_py()[0]) == 3 * size["width"] * size["height"]
+    column, row = np.floor(np.array(uv.as_py()) * (size["width"], size["height"])).astype(int).T
+    assert np.array_equal(row * size["width"] + column, mesh.vertex_building)
+    grey = np.array([255 * percent // 100 for percent in SHADES_PERCENT])[mesh.vertex_shade]
+    assert np.array_equal(shade.as_py(), grey << 24 | grey << 16 | grey << 8 | 255)
 
 
 def test_geometry_is_sent_once_and_colors_only_when_they_change(small, saved):
@@ -50,7 +56,7 @@ def test_geometry_is_sent_once_and_colors_only_when_they_change(small, saved):
     assert [step for step, _ in mesh["Mesh3D:vertex_positions"]] == [None]
     codes = small.column("/buildings", "fieryness")
     changes = [0, *(np.flatnonzero(np.any(codes[1:] != codes[:-1], axis=1)) + 1).tolist()]
-    assert [step for step, _ in mesh["Mesh3D:vertex_colors"]] == changes
+    assert [step for step, _ in mesh["Mesh3D:albedo_texture_buffer"]] == changes
     assert len(changes) < len(codes)
 
 

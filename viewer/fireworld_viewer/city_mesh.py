@@ -1,8 +1,13 @@
-"""One mesh of the whole city: extruded buildings that share one set of vertices, so that a step only recolors them."""
+"""One mesh of the whole city: extruded buildings that share one set of vertices, so that a step only recolors them.
+
+Its colors are a picture with a pixel for each building: a step takes three bytes a building, where colors of vertices
+would take eighty.
+"""
 
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -26,6 +31,8 @@ class CityMesh:
     triangle: NDArray[np.uint32]  # (t, 3) indices of vertices
     vertex_building: NDArray[np.int32]  # (v,) building of each vertex, rising
     vertex_shade: NDArray[np.uint8]  # (v,) index into SHADES_PERCENT
+    vertex_uv: NDArray[np.float32]  # (v, 2) the middle of its building's pixel in the picture, of which 1 by 1 is all
+    picture_size: tuple[int, int]  # width and height of the picture, in pixels: the buildings row by row
     roof_xyz_m: NDArray[np.float32]  # (n, 3) middle of each roof
 
 
@@ -65,13 +72,24 @@ def build_mesh(city: CityRecord) -> CityMesh:
     walls = np.concatenate([np.column_stack([wall, wall + 1, wall + 2]), np.column_stack([wall, wall + 2, wall + 3])])
     roofs = [roof[a + triangulate(x[a:b], y[a:b])] for a, b in itertools.pairwise(ptr.tolist())]
     middles = np.column_stack([city.center_x_m, city.center_y_m, np.asarray(city.floors) * STOREY_M])
+    vertex_building = np.repeat(np.arange(len(n_corners), dtype=np.int32), 5 * n_corners)
+    width, length = _picture_size(len(n_corners))
+    row, column = np.divmod(vertex_building, width)
     return CityMesh(
         vertex_xyz_m=xyz,
         triangle=np.concatenate([*roofs, walls]).astype(np.uint32),
-        vertex_building=np.repeat(np.arange(len(n_corners), dtype=np.int32), 5 * n_corners),
+        vertex_building=vertex_building,
         vertex_shade=shade,
+        vertex_uv=np.column_stack([(column + 0.5) / width, (row + 0.5) / length]).astype(np.float32),
+        picture_size=(width, length),
         roof_xyz_m=middles.astype(np.float32),
     )
+
+
+def _picture_size(n_buildings: int) -> tuple[int, int]:
+    """Return width and height of the squarest picture with a pixel for each building: no side may be long."""
+    width = math.isqrt(max(0, n_buildings - 1)) + 1
+    return width, max(1, -(-n_buildings // width))
 
 
 def triangulate(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:

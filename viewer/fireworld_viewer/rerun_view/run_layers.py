@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fireworld.errors import ViewError, expected
 from fireworld.records import CityRecord, MemoryRecording, Recording
 from fireworld_viewer import colors
-from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh
+from fireworld_viewer.city_mesh import build_mesh
 from fireworld_viewer.rerun_view import brigades, city_layers
 from fireworld_viewer.rerun_view.layers import Layers
 from fireworld_viewer.rerun_view.pages import OutcomePage
@@ -30,7 +30,6 @@ PART_BYTES: Final = 64 << 20
 _BYTES_OF_BUILDING: Final = 21  # numbers and colors of a building in a step
 
 _AGREEMENT_RGB: Final = (colors.HEALTHY_RGB, colors.MARK_RGB, colors.WORSE_RGB)
-_DIFFERENCE_COLORS: Final = colors.shaded_table(colors.DIFFERENCE_RGB, SHADES_PERCENT)
 
 
 class RunLayers:
@@ -135,7 +134,7 @@ def log_comparison(
     fieryness_a = first.column("/buildings", "fieryness")[rows_a]
     fieryness_b = second.column("/buildings", "fieryness")[rows_b]
     change = compare_damage(fieryness_a, fieryness_b)
-    city_layers.log_mesh(layers, mesh, (change + 1).astype(np.uint8), _DIFFERENCE_COLORS)
+    city_layers.log_mesh(layers, mesh, (change + 1).astype(np.uint8), colors.DIFFERENCE_RGB)
     codes = {"difference": change, "fieryness_a": fieryness_a, "fieryness_b": fieryness_b}
     layers.numbers("city/handles", "Difference", codes)
 
