@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
+from pathlib import Path
 
 from fireworld.errors import LogError, expected
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
@@ -14,7 +15,6 @@ from fireworld.records import (
     Array,
     CityRecord,
     Decisions,
-    MemoryRecording,
     Recording,
     RunHeader,
     Snapshot,
@@ -163,17 +163,25 @@ def check_replay(recorded: Recording, replayed: Steps, *, source: str, hint: str
         raise LogError(f"{source}: does not replay to what is recorded: {first.sentence}; {hint}")
 
 
-def replay_with_air(recording: Recording, *, source: str) -> MemoryRecording:
+def replay_with_air(recording: Recording, path: Path, *, source: str) -> Recording:
     """Return a run with the air of every step, which is recorded with snapshots only.
 
     Args:
         recording: the run.
-        source: its file.
+        path: a log to make: all that air would fill the memory.
+        source: the run's file.
 
     Raises:
         LogError: this fireworld computes something else than what is recorded.
+        OutputError: the log cannot be written.
     """
+    from fireworld_recorder.reader import open_log
+    from fireworld_recorder.writer import LogWriter
+
     replay = Replay(recording, with_air=True)
-    replayed = MemoryRecording(recording.header, replay.city, list(replay))
+    with LogWriter(path, recording.header, replay.city) as log:
+        for record in replay:
+            log.write(record)
+    replayed = open_log(path)
     check_replay(recording, replayed, source=source, hint="try without --air")
     return replayed

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +13,10 @@ from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh
 from fireworld_viewer.rerun_view import app, brigades, layers, run_layers
 from fireworld_viewer.rerun_view.plots import COUNTS, REWARDS, SCORES, first_burning
+from fireworld_viewer.story import steps
 
 from fireworld.errors import ViewError
-from fireworld.records import ACTION_NAMES, ACTIVITIES, MemoryRecording
+from fireworld.records import ACTION_NAMES, ACTIVITIES, STEP_TOPICS, MemoryRecording
 from tests.viewer import rrd
 from tests.viewer.conftest import make_recording
 
@@ -351,3 +352,30 @@ def test_the_page_of_help_says_whom_the_map_is_by(small, saved, tmp_path: Path):
     (text,) = [rows[0][1].as_py()[0] for name, rows in rrd.read(tmp_path / "a.rrd")["/help"].items() if "text" in name]
     (before,) = [rows[0][1].as_py()[0] for name, rows in saved["/help"].items() if "text" in name]
     assert text == f"{before}\nMap: © mappers\n"
+
+
+def test_steps_that_would_fill_the_memory_are_read_again(small, tmp_path: Path, monkeypatch):
+    """Of a large city the numbers of buildings and snapshots are not held; what is shown is the same."""
+    held = steps.select_steps(small, first=3, every=4)
+    monkeypatch.setattr(steps, "HELD_MAX", 0)
+    read = steps.select_steps(small, first=3, every=4)
+    assert isinstance(held, MemoryRecording)
+    assert isinstance(read, steps.SelectedSteps)
+    assert read.steps.tolist() == held.steps.tolist() == list(range(3, 41, 4))
+    for topic in STEP_TOPICS:
+        for item in fields(topic):
+            for one, other in zip(
+                read.ragged(topic.topic, item.name), held.ragged(topic.topic, item.name), strict=True
+            ):
+                assert np.array_equal(one, other), (topic, item.name)
+    app.save([held], tmp_path / "held.rrd")
+    app.save([read], tmp_path / "read.rrd")
+    assert rrd.read(tmp_path / "read.rrd") == rrd.read(tmp_path / "held.rrd")
+
+
+def test_pictures_hold_no_numbers_of_buildings(small):
+    for shown in steps.read_steps_between([small, small]):
+        for record in shown.records:
+            assert record.snapshot is None
+            assert not len(record.buildings.energy)
+            assert len(record.buildings.fieryness) == len(small.city.building_id)

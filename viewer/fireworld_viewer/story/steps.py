@@ -26,7 +26,11 @@ _DAMAGE: Final = np.argsort(np.array(DAMAGE_ORDER)).astype(np.int8)  # (9,) plac
 
 @dataclass(frozen=True)
 class ShownStep:
-    """A step of every recording that is shown; of a run that ended earlier, its last step."""
+    """A step of every recording that is shown; of a run that ended earlier, its last step.
+
+    Its records are without snapshots and the numbers of buildings, which no picture shows: of many steps of a large city
+    they would fill the memory.
+    """
 
     step: int
     records: tuple[StepRecord, ...]
@@ -41,7 +45,7 @@ class SelectedSteps(RecordingBase):
     def __init__(self, recording: Recording, steps: Collection[int]) -> None:
         self.header, self.city = recording.header, recording.city
         self._recording, self._chosen = recording, frozenset(steps)
-        self._light = [_without_numbers(record) for record in self]
+        self._light = [without_numbers(record) for record in self]
 
     @property
     def steps(self) -> Array:
@@ -58,7 +62,7 @@ class SelectedSteps(RecordingBase):
         return (getattr(getattr(record, record_type.topic[1:]), item.name) for record in records)
 
 
-def _without_numbers(record: StepRecord) -> StepRecord:
+def without_numbers(record: StepRecord) -> StepRecord:
     """Return a step without its snapshot and the numbers of its buildings."""
     return replace(record, snapshot=None, buildings=replace(record.buildings, **dict.fromkeys(_NUMBERS, _NONE)))
 
@@ -139,7 +143,8 @@ def _read(recordings: Sequence[Recording], steps: Sequence[int]) -> list[ShownSt
     for recording in recordings:
         own = recording.steps
         wanted = own[np.searchsorted(own, steps, side="right") - 1].tolist()  # the step, or the last one before it
-        found = {record.step: record for record in recording if record.step in set(wanted)}
+        chosen = set(wanted)
+        found = {record.step: without_numbers(record) for record in recording if record.step in chosen}
         columns.append([found[step] for step in wanted])
     return [ShownStep(step, tuple(records)) for step, *records in zip(steps, *columns, strict=True)]
 
