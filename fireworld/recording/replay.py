@@ -143,7 +143,9 @@ class Replay:
             yield finished(with_errors(record, policy.made(record.step)))
 
 
-def check_replay(recorded: Recording, replayed: Steps, *, source: str, hint: str = "") -> None:
+def check_replay(
+    recorded: Steps, replayed: Steps, *, source: str, hint: str = "", first_step: int | None = None
+) -> None:
     """Compare recorded steps with the same steps computed again.
 
     Args:
@@ -151,13 +153,14 @@ def check_replay(recorded: Recording, replayed: Steps, *, source: str, hint: str
         replayed: the same steps, computed again; iterated over once.
         source: the file.
         hint: what to do if they differ; by default, how to see the whole difference.
+        first_step: the first step to compare; None: all are compared.
 
     Raises:
         LogError: they differ; names the first step.
     """
-    from fireworld_recorder.diff import compare
+    from fireworld_recorder.diff import StepRange, compare
 
-    first = compare(recorded, replayed).first
+    first = compare(recorded, replayed, steps=StepRange(first=first_step)).first
     if first is not None:
         hint = hint or f"see `fireworld verify {source}`"
         raise LogError(f"{source}: does not replay to what is recorded: {first.sentence}; {hint}")

@@ -28,8 +28,8 @@ _DAMAGE: Final = np.argsort(np.array(DAMAGE_ORDER)).astype(np.int8)  # (9,) plac
 class ShownStep:
     """A step of every recording that is shown; of a run that ended earlier, its last step.
 
-    Its records are without snapshots and the numbers of buildings, which no picture shows: of many steps of a large city
-    they would fill the memory.
+    Its records are without snapshots and the numbers of buildings: no picture shows them, and of many steps of a large
+    city they would fill the memory.
     """
 
     step: int
