@@ -35,8 +35,8 @@ FLOOR_HEIGHT_M: Final = 3
 def build_city(plan: Plan, fire: FireParameters, *, seed: int) -> City:
     """Build a city from its plan; all its arrays are read-only. `seed`: of the rays that measure radiation.
 
-    Raises CityError if the plan is too large for the air grid, a building covers no air cell, or the walls are so long
-    that they send too many rays.
+    Raises CityError if the plan is too large for the air grid, a building covers no air cell, the walls are so long
+    that they send too many rays, or so many lie on or around one another that looking at them would take minutes.
     """
     footprints = plan.footprints
     air = cover_cells(footprints, fire.air_cell_mm, where=plan.name)
@@ -52,7 +52,7 @@ def build_city(plan: Plan, fire: FireParameters, *, seed: int) -> City:
         order=order,
         air=air,
         links=links,
-        near=near_relation(footprints, links),
+        near=near_relation(footprints, links, where=plan.name),
         streets=at_entrances(streets_of(plan.streets, footprints.centroid_mm), plan.streets.entrance_node),
         attribution=plan.attribution,
     )

@@ -16,8 +16,14 @@ from fireworld.parameters import FireParameters
 MARGIN_MM: Final = 1
 """A wall is registered in every cell that it comes this close to."""
 CELL_SIDE_MIN_MM: Final = 1000
+RAYS_FREE: Final = 10_000_000
+RAYS_PER_BUILDING: Final = 1000
 N_RAYS_MAX: Final = 200_000_000
-"""Half a million houses send 65 million."""
+"""Buildings send at most as many rays as the first two make together, and no more than the last: a house sends 130."""
+COMPARED_FREE: Final = 500_000_000
+COMPARED_PER_RAY: Final = 50
+"""All rays are compared with at most as many walls as these make together; in cities a ray with 7 to 10, where parts of
+them lie far apart with some hundreds."""
 
 
 def radiation_links(
@@ -26,19 +32,27 @@ def radiation_links(
     """Send every building's rays; a link's share is its hits over all rays, self-hits and misses included.
 
     `order` (n,): in which the official program visits the buildings. `fire` has the number and the length of the rays.
-    Raises CityError, which begins with `where`, for walls so long that they send too many rays.
+    Raises CityError, which begins with `where`, for walls so long that they send too many rays, or so close together
+    that each is compared with too many.
     """
     walls = wall_table(footprints, order, fire)
-    total = int(walls.n_rays.sum())
-    if total > N_RAYS_MAX:
-        sent = np.bincount(walls.building, weights=walls.n_rays)
-        most = int(np.argmax(sent))
-        key = f"building {int(footprints.building_id[most])}: apexes"
-        wanted = f"at most {N_RAYS_MAX} rays from all walls, at {fire.ray_rate_per_mm:g} a mm"
-        got = f"{total}, {int(sent[most])} of them from this one"
-        raise CityError(expected(where, key, wanted, got, "try a smaller parameters.fire.ray_rate_per_mm"))
-    ptr, building, n_hits = count_hits(walls, wall_grid(walls), footprints.building_id, seed, fire.ray_range_mm)
     n_rays = np.bincount(walls.building, weights=walls.n_rays)
+    total, n = int(walls.n_rays.sum()), len(footprints.building_id)
+    rays_max = min(RAYS_FREE + RAYS_PER_BUILDING * n, N_RAYS_MAX)
+    if total > rays_max:
+        most = int(np.argmax(n_rays))
+        key = f"building {int(footprints.building_id[most])}: apexes"
+        wanted = f"at most {rays_max} rays from all walls, at {fire.ray_rate_per_mm:g} a mm"
+        got = f"{total}, {int(n_rays[most])} of them from this one"
+        raise CityError(expected(where, key, wanted, got, "try a smaller parameters.fire.ray_rate_per_mm"))
+    compared_max = COMPARED_FREE + COMPARED_PER_RAY * total
+    ptr, building, n_hits, end = count_hits(
+        walls, wall_grid(walls), footprints.building_id, seed, fire.ray_range_mm, compared_max
+    )
+    if end < n:
+        key = f"building {int(footprints.building_id[end])}: apexes"
+        wanted = f"at most {compared_max} comparisons of {total} rays with walls"
+        raise CityError(expected(where, key, wanted, "more: too many walls lie on one another"))
     emitter = np.repeat(np.arange(len(n_rays)), np.diff(ptr))
     rising = np.lexsort((building, emitter))
     return Links(

@@ -9,18 +9,23 @@ import numpy as np
 
 from fireworld.city.city import Footprints, Int32Array, Int64Array, Links
 from fireworld.city.outlines import bounding_boxes, numbered
+from fireworld.errors import CityError, expected
 from fireworld.kernels.near import BoxGrid, fill_rows, find_upper
 
 SITE_GAP_MM: Final = 30_000
 """Outlines closer than this, strictly, make one fire site."""
+COMPARED_FREE: Final = 300_000_000
+COMPARED_PER_BUILDING: Final = 20_000
+"""Outlines are compared at as many pairs of walls as these make together, at most: houses at some hundreds each."""
 
 
-def near_relation(footprints: Footprints, links: Links) -> Links:
+def near_relation(footprints: Footprints, links: Links, *, where: str = "city") -> Links:
     """Relate the buildings that are linked in either direction, or whose outlines are closer than 30 m.
 
-    The relation is symmetric, as CSR, neighbours rising, all shares 1; no building is near itself.
+    The relation is symmetric, as CSR, neighbours rising, all shares 1; no building is near itself. CityError, which
+    begins with `where`, if outlines of many corners lie around one another, so that too many walls are compared.
     """
-    upper_ptr, upper = _upper_neighbours(footprints, links)
+    upper_ptr, upper = _upper_neighbours(footprints, links, where)
     n = len(footprints.building_id)
     n_related = np.diff(upper_ptr) + np.bincount(upper, minlength=n)
     ptr = np.concatenate([[0], np.cumsum(n_related)]).astype(np.int32)
@@ -29,17 +34,22 @@ def near_relation(footprints: Footprints, links: Links) -> Links:
     return Links(ptr=ptr, building=building, share=np.ones(len(building), dtype=np.float32))
 
 
-def _upper_neighbours(footprints: Footprints, links: Links) -> tuple[Int64Array, Int32Array]:
+def _upper_neighbours(footprints: Footprints, links: Links, where: str) -> tuple[Int64Array, Int32Array]:
     """Return the near buildings with higher numbers of every building, as CSR, in any order."""
     low, high = bounding_boxes(footprints)
     n = len(low)
     city = footprints.outline_ptr, footprints.outline_mm, low, high, _box_grid(low, high), *_either_way(links)
     met, ptr = np.full(n, -1, dtype=np.int32), np.zeros(n + 1, dtype=np.int64)
     upper, done = np.empty(8 * n, dtype=np.int32), 0
+    compared_max, n_compared = COMPARED_FREE + COMPARED_PER_BUILDING * n, np.zeros(1, dtype=np.int64)
     while True:
-        done = find_upper(done, *city, SITE_GAP_MM, met, ptr, upper)
+        done = find_upper(done, *city, SITE_GAP_MM, met, ptr, upper, compared_max, n_compared)
         if done == n:
             return ptr, upper[: ptr[-1]]
+        if n_compared[0] > compared_max:
+            key = f"building {int(footprints.building_id[done])}: apexes"
+            wanted = f"outlines that are compared at no more than {compared_max} pairs of walls"
+            raise CityError(expected(where, key, wanted, "more: too many of many corners lie around one another"))
         upper = np.concatenate([upper, np.empty(len(upper), dtype=np.int32)])
 
 

@@ -69,13 +69,17 @@ def boxes_closer(low_x: int, low_y: int, high_x: int, high_y: int, low: Array, h
 
 
 @inner
-def outlines_closer(one: Array, other: Array, low: Array, high: Array, gap_mm: int) -> bool:
-    """Return whether two outlines, corners (c, 2), are closer than a gap; `low` and `high` (2,) bound the other one."""
+def outlines_closer(one: Array, other: Array, low: Array, high: Array, gap_mm: int, n_compared: Array) -> bool:
+    """Return whether two outlines, corners (c, 2), are closer than a gap; `low` and `high` (2,) bound the other one.
+
+    Counts the walls that it compares, in `n_compared` (1,).
+    """
     for i in range(len(one)):
         before = i - 1 if i > 0 else len(one) - 1
         ax, ay, bx, by = np.int64(one[before, 0]), np.int64(one[before, 1]), np.int64(one[i, 0]), np.int64(one[i, 1])
         if not boxes_closer(min(ax, bx), min(ay, by), max(ax, bx), max(ay, by), low, high, gap_mm):
             continue
+        n_compared[0] += len(other)
         cx, cy = np.int64(other[-1, 0]), np.int64(other[-1, 1])
         for j in range(len(other)):
             dx, dy = np.int64(other[j, 0]), np.int64(other[j, 1])
@@ -88,11 +92,12 @@ def outlines_closer(one: Array, other: Array, low: Array, high: Array, gap_mm: i
 @inner
 def append_closer(
     a: int, outline_ptr: Array, outline_mm: Array, low: Array, high: Array, grid: BoxGrid, gap_mm: int, met: Array,
-    upper: Array, end: int,
+    upper: Array, end: int, n_compared: Array,
 ) -> int:  # fmt: skip
     """Append the buildings with higher numbers whose outlines are closer to building a than a gap; return the new end.
 
-    Those that it has met are left out, and met[b] = a for all that it was compared with.
+    Those that it has met are left out, and met[b] = a for all that it was compared with. `n_compared` (1,) counts
+    walls.
     """
     x0, x1 = (low[a, 0] - gap_mm - grid.x_mm) // grid.side_mm, (high[a, 0] + gap_mm - grid.x_mm) // grid.side_mm
     y0, y1 = (low[a, 1] - gap_mm - grid.y_mm) // grid.side_mm, (high[a, 1] + gap_mm - grid.y_mm) // grid.side_mm
@@ -106,7 +111,7 @@ def append_closer(
                 met[b] = a
                 if boxes_closer(low[a, 0], low[a, 1], high[a, 0], high[a, 1], low[b], high[b], gap_mm):
                     others = outline_mm[outline_ptr[b] : outline_ptr[b + 1]]
-                    if outlines_closer(corners, others, low[b], high[b], gap_mm):
+                    if outlines_closer(corners, others, low[b], high[b], gap_mm, n_compared):
                         upper[end] = b
                         end += 1
     return end
@@ -126,6 +131,8 @@ def find_upper(
     met: Array,
     upper_ptr: Array,
     upper: Array,
+    compared_max: int,
+    n_compared: Array,
 ) -> int:
     """List, building by building, those with higher numbers that it is linked with or closer to than a gap.
 
@@ -142,14 +149,17 @@ def find_upper(
         met: (n,) int32, scratch: the last building that each one was compared with, -1 at first.
         upper_ptr: (n+1,) int64, out: start of each list.
         upper: (any,) int32, out: the lists, each in any order.
+        compared_max: walls that may be compared.
+        n_compared: (1,) int64, in and out: those that were compared, pair by pair.
 
     Returns:
-        The building before which there was too little room in `upper`; n where all is done.
+        The building before which there was too little room in `upper`, or more had been compared than may be; n where
+        all is done.
     """
     n = len(low)
     for a in range(begin, n):
         end = upper_ptr[a]
-        if end + (n - a) > len(upper):
+        if end + (n - a) > len(upper) or n_compared[0] > compared_max:
             return a
         for k in range(linked_ptr[a], linked_ptr[a + 1]):
             b = linked[k]
@@ -157,7 +167,9 @@ def find_upper(
                 met[b] = a
                 upper[end] = b
                 end += 1
-        upper_ptr[a + 1] = append_closer(a, outline_ptr, outline_mm, low, high, grid, gap_mm, met, upper, end)
+        upper_ptr[a + 1] = append_closer(
+            a, outline_ptr, outline_mm, low, high, grid, gap_mm, met, upper, end, n_compared
+        )
     return n
 
 

@@ -66,10 +66,11 @@ def meet(walls: WallTable, w: int, px: int, py: int, rx: int, ry: int) -> float:
 
 
 @inner
-def first_hit(walls: WallTable, grid: WallGrid, source: int, px: int, py: int, rx: int, ry: int) -> int:
+def first_hit(walls: WallTable, grid: WallGrid, source: int, px: int, py: int, rx: int, ry: int) -> tuple[int, int]:
     """Return the first wall other than `source` on the way from (px, py) to (px + rx, py + ry), MISS if there is none.
 
-    Walks from cell to cell of the grid until a wall is met no farther than the edge of the cell.
+    Walks from cell to cell of the grid until a wall is met no farther than the edge of the cell. Returned is also how
+    many walls the ray was compared with.
     """
     cell_x, cell_y = (px - grid.x_mm) // grid.side_mm, (py - grid.y_mm) // grid.side_mm
     step_x, step_y = (1 if rx > 0 else -1), (1 if ry > 0 else -1)
@@ -81,9 +82,10 @@ def first_hit(walls: WallTable, grid: WallGrid, source: int, px: int, py: int, r
     if ry != 0:
         leave_y = (grid.y_mm + (cell_y + (step_y + 1) // 2) * grid.side_mm - py) / ry
         across_y = grid.side_mm / abs(ry)
-    best, best_at = MISS, math.inf
+    best, best_at, n_compared = MISS, math.inf, 0
     while 0 <= cell_x < grid.nx and 0 <= cell_y < grid.ny:
         cell = cell_x * grid.ny + cell_y
+        n_compared += grid.ptr[cell + 1] - grid.ptr[cell]
         for k in range(grid.ptr[cell], grid.ptr[cell + 1]):
             w = grid.wall[k]
             at = meet(walls, w, px, py, rx, ry)
@@ -98,7 +100,7 @@ def first_hit(walls: WallTable, grid: WallGrid, source: int, px: int, py: int, r
         else:
             cell_y += step_y
             leave_y += across_y
-    return best
+    return best, n_compared
 
 
 @inner
@@ -123,14 +125,15 @@ def random_ray(walls: WallTable, w: int, key: np.uint64, range_mm: int) -> tuple
 
 @making_arrays
 def count_hits(
-    walls: WallTable, grid: WallGrid, building_id: Array, seed: int, range_mm: int
-) -> tuple[Array, Array, Array]:
+    walls: WallTable, grid: WallGrid, building_id: Array, seed: int, range_mm: int, compared_max: int
+) -> tuple[Array, Array, Array, int]:
     """Send the rays of all walls and count, for every building, which others they hit.
 
     A building's rays are numbered across its walls and keyed by its identifier, (n,) int64, so they are the same
     whatever else the city holds. Returns ptr (n+1,), building (links,) and hits (links,), all int64: as CSR, the
     buildings that each building's rays hit, in the order of the first hit, and how often. Rays that hit nothing or
-    their own building are left out.
+    their own building are left out. Last comes the building at which rays had been compared with `compared_max` walls:
+    there it ends; n if it ends with the last one.
     """
     n = len(building_id)
     n_rays = 0
@@ -142,6 +145,7 @@ def count_hits(
     slot = np.full(n, -1, dtype=np.int64)  # where the current building's hits on another one are counted
     end = np.int64(0)
     ray = np.int64(0)
+    n_compared = np.int64(0)
     for w in range(len(walls.x)):
         b = walls.building[w]
         if w > 0 and walls.building[w - 1] != b:
@@ -149,7 +153,10 @@ def count_hits(
         for _ in range(walls.n_rays[w]):
             px, py, rx, ry = random_ray(walls, w, hash_key(seed, RAY, ray, building_id[b]), range_mm)
             ray += 1
-            hit = first_hit(walls, grid, w, px, py, rx, ry)
+            hit, n_here = first_hit(walls, grid, w, px, py, rx, ry)
+            n_compared += n_here
+            if n_compared > compared_max:
+                return ptr, neighbour[:end], n_hits[:end], b
             if hit == MISS or walls.building[hit] == b:
                 continue
             other = walls.building[hit]
@@ -160,4 +167,4 @@ def count_hits(
                 end += 1
             n_hits[slot[other]] += 1
         ptr[b + 1] = end
-    return ptr, neighbour[:end], n_hits[:end]
+    return ptr, neighbour[:end], n_hits[:end], n

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from difflib import get_close_matches
 from typing import Final
 
@@ -135,10 +136,14 @@ def read_decision(where: str, given: DecisionGiven, run: StoredRun) -> Decision:
 
     Raises:
         PolicyError: there is no such action or building, or a building where none belongs.
-        ArgumentError: it is no action at all.
+        ArgumentError: it is no action at all, or a building that there is not by its index.
     """
     if isinstance(given, Decision):
-        return given
+        action = Action(whole_number(where, given.action, least=0, most=len(Action) - 1))
+        if action != Action.OWN_TARGET:
+            return replace(given, action=action, target=None)
+        target = whole_number(f"{where}: target", given.target, least=0, most=len(run.city.building_id) - 1)
+        return replace(given, action=action, target=target)
     if not isinstance(given, str):
         return Decision(Action(whole_number(where, given, least=0, most=len(Action) - 2)))
     name, colon, building = given.partition(":")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from itertools import takewhile
 from typing import Any, Final
 
 from fireworld.arguments import ArgumentError, path_of, whole_number
@@ -27,10 +26,10 @@ from fireworld.recording.decisions import (
 )
 from fireworld.recording.inputs import AnyRun, check_replayable, open_run, run_name
 from fireworld.recording.record import run_prepared
-from fireworld.recording.replay import build_recorded, check_replay
-from fireworld.recording.resume import Resumed, recorded_policy, resume
+from fireworld.recording.replay import build_recorded
+from fireworld.recording.resume import Beginning, recorded_policy, resume
 from fireworld.recording.run import Run
-from fireworld.records import CityRecord, MemoryRecording, RunHeader, StepRecord, StoredRun
+from fireworld.records import CityRecord, RunHeader, StepRecord, StoredRun
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.prepared_run import PreparedRun
 from fireworld.simulation.world import World
@@ -73,7 +72,7 @@ class PreparedFork(PreparedRun):
         note: how a team is used in another way than it was trained, if it is.
     """
 
-    recorded: Sequence[StepRecord]
+    recorded: Beginning
     score_of_original: float
     note: str
 
@@ -140,34 +139,32 @@ def prepare_fork(
     built = build_recorded(run.header)
     change = _read_change(run, built.n_brigades, policy, decide or {}, swap or {})
     with_memory = change.named if policy is None and not change.named.policy.stateless else None
-    resumed = resume(built, beginning, source=run_name(run), with_memory=with_memory)
-    check_replay(resumed.recorded, resumed.replayed, source=run_name(run))
-    _check_change(change, resumed, run)
+    world = resume(built, beginning, source=run_name(run), with_memory=with_memory)
+    _check_change(change, world, run)
     if with_memory is None:
-        begin(change.named.policy, resumed.world.city_arrays, n_brigades=built.n_brigades, seed=run.header.seed)
+        begin(change.named.policy, world.city_arrays, n_brigades=built.n_brigades, seed=run.header.seed)
     return PreparedFork(
         header=_header(run, change, at),
         city=run.city,
-        start=resumed.world,
+        start=world,
         policy=_forced_policy(change, first_step=at + 1),
-        recorded=list(beginning),
+        recorded=beginning,
         score_of_original=run.step(int(run.steps[-1])).score.score,
         note=note_on_team(change.named, built.n_brigades, choices=built.scenario.choices),
     )
 
 
-def _recorded_up_to(run: StoredRun, step: int) -> MemoryRecording:
-    """Read the steps of a run up to one of them."""
+def _recorded_up_to(run: StoredRun, step: int) -> Beginning:
+    """Return the steps of a run up to one of them, after which it must continue."""
     if step not in run.steps:
         steps = run.steps
         held = f"a step of {run_name(run)}, {steps[0]} to {steps[-1]}" if len(run) else f"steps in {run_name(run)}"
         raise LogError(expected("at", "", held, step if len(run) else "none"))
-    recording = MemoryRecording(run.header, run.city, [*takewhile(lambda record: record.step <= step, run)])
-    *_, last = recording
+    last = run.step(step)
     if last.terminated or last.truncated:
         got = f"{step}, {'nothing burns any more' if last.terminated else 'it is the last of the run'}"
         raise LogError(expected("at", "", f"a step of {run_name(run)} after which the run continues", got))
-    return recording
+    return Beginning(run, step)
 
 
 def _read_change(
@@ -199,15 +196,15 @@ def _read_change(
     return ForkChange(named, decided, swaps)
 
 
-def _check_change(change: ForkChange, resumed: Resumed, run: StoredRun) -> None:
+def _check_change(change: ForkChange, world: World, run: StoredRun) -> None:
     """Check that every brigade can do what it is to do."""
     observing = _Observing()
     if change.decided:
-        resumed.world.copy().step(observing)  # what the brigades that are asked in the next step see then
+        world.copy().step(observing)  # what the brigades that are asked in the next step see then
     for brigade, decision in change.decided.items():
-        _check_decides(resumed.world, brigade, run, observing.seen)
-        _check_possible(resumed.world, brigade, decision, run.city, observing.seen[brigade])
-    step = resumed.world.step_number
+        _check_decides(world, brigade, run, observing.seen)
+        _check_possible(world, brigade, decision, run.city, observing.seen[brigade])
+    step = world.step_number
     for other, decisions in change.swaps.values():
         check_same_draws(run.header, other.header, names=(run_name(run), run_name(other)))
         if decisions.last_step <= step:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
+from pathlib import Path
 
 from fireworld.errors import LogError, expected
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
@@ -14,7 +15,6 @@ from fireworld.records import (
     Array,
     CityRecord,
     Decisions,
-    MemoryRecording,
     Recording,
     RunHeader,
     Snapshot,
@@ -143,7 +143,9 @@ class Replay:
             yield finished(with_errors(record, policy.made(record.step)))
 
 
-def check_replay(recorded: Recording, replayed: Steps, *, source: str, hint: str = "") -> None:
+def check_replay(
+    recorded: Steps, replayed: Steps, *, source: str, hint: str = "", first_step: int | None = None
+) -> None:
     """Compare recorded steps with the same steps computed again.
 
     Args:
@@ -151,29 +153,38 @@ def check_replay(recorded: Recording, replayed: Steps, *, source: str, hint: str
         replayed: the same steps, computed again; iterated over once.
         source: the file.
         hint: what to do if they differ; by default, how to see the whole difference.
+        first_step: the first step to compare; None: all are compared.
 
     Raises:
         LogError: they differ; names the first step.
     """
-    from fireworld_recorder.diff import compare
+    from fireworld_recorder.diff import StepRange, compare
 
-    first = compare(recorded, replayed).first
+    first = compare(recorded, replayed, steps=StepRange(first=first_step)).first
     if first is not None:
         hint = hint or f"see `fireworld verify {source}`"
         raise LogError(f"{source}: does not replay to what is recorded: {first.sentence}; {hint}")
 
 
-def replay_with_air(recording: Recording, *, source: str) -> MemoryRecording:
+def replay_with_air(recording: Recording, path: Path, *, source: str) -> Recording:
     """Return a run with the air of every step, which is recorded with snapshots only.
 
     Args:
         recording: the run.
-        source: its file.
+        path: a log to make: all that air would fill the memory.
+        source: the run's file.
 
     Raises:
         LogError: this fireworld computes something else than what is recorded.
+        OutputError: the log cannot be written.
     """
+    from fireworld_recorder.reader import open_log
+    from fireworld_recorder.writer import LogWriter
+
     replay = Replay(recording, with_air=True)
-    replayed = MemoryRecording(recording.header, replay.city, list(replay))
+    with LogWriter(path, recording.header, replay.city) as log:
+        for record in replay:
+            log.write(record)
+    replayed = open_log(path)
     check_replay(recording, replayed, source=source, hint="try without --air")
     return replayed

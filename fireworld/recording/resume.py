@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import takewhile
+
+import numpy as np
 
 from fireworld.errors import FireworldError, LogError, PolicyError, expected
 from fireworld.policy.asking import begin
@@ -11,8 +14,8 @@ from fireworld.policy.names import TEAM_ATTACHMENT, NamedPolicy, find_policy
 from fireworld.policy.protocol import Policy
 from fireworld.policy.teams.team import parse_team
 from fireworld.recording.decisions import RecordedDecisions, ShadowPolicy
-from fireworld.recording.replay import with_errors
-from fireworld.records import ACTION_NAMES, MemoryRecording, RunHeader, StepRecord
+from fireworld.recording.replay import check_replay, with_errors
+from fireworld.records import ACTION_NAMES, CityRecord, RunHeader, StepRecord, StoredRun
 from fireworld.simulation.built import BuiltScenario
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.state import copy_into, copy_world, restore_snapshot
@@ -21,18 +24,24 @@ from fireworld.training.log.episode_run import LEARNING_ATTACHMENT
 
 
 @dataclass(frozen=True)
-class Resumed:
-    """A world after some step of a recorded run.
+class Beginning:
+    """The steps of a recorded run up to one of them, read again at each iteration: a `fireworld.records.Steps`."""
 
-    Attributes:
-        world: in the state it was in then.
-        recorded: the recorded steps that were computed again, in the recorded city.
-        replayed: the same as computed now; to be compared with what is recorded.
-    """
+    run: StoredRun
+    last: int
 
-    world: World
-    recorded: MemoryRecording
-    replayed: MemoryRecording
+    @property
+    def header(self) -> RunHeader:
+        """The header of the run."""
+        return self.run.header
+
+    @property
+    def city(self) -> CityRecord:
+        """The city it took place in."""
+        return self.run.city
+
+    def __iter__(self) -> Iterator[StepRecord]:
+        return takewhile(lambda record: record.step <= self.last, self.run)
 
 
 def refind_policy(header: RunHeader) -> NamedPolicy:
@@ -76,33 +85,33 @@ def recorded_policy(header: RunHeader, *, source: str) -> NamedPolicy:
     return named
 
 
-def resume(
-    built: BuiltScenario, recording: MemoryRecording, *, source: str, with_memory: NamedPolicy | None = None
-) -> Resumed:
-    """Bring a world into the state after the last step of a recording.
+def resume(built: BuiltScenario, beginning: Beginning, *, source: str, with_memory: NamedPolicy | None = None) -> World:
+    """Return the world of a recorded run after a step.
 
-    It starts from the nearest snapshot before that step and takes the recorded decisions from there.
+    It starts from the nearest snapshot before that step and takes the recorded decisions from there; what it computes
+    on the way is compared with what is recorded.
 
     Args:
         built: the scenario of the recording, built.
-        recording: the steps 0 to the one to resume after.
+        beginning: the steps 0 to the one to resume after.
         source: the file it comes from, for errors.
         with_memory: the recorded policy, if it has a memory: it then sees every step from the first.
 
     Raises:
-        LogError: the recording does not begin with step 0, or lacks a step.
+        LogError: the recording does not begin with step 0, lacks a step, or does not replay to what is recorded.
         PolicyError: `with_memory` would not have decided as is recorded.
     """
-    header, records = recording.header, list(recording)
-    if [record.step for record in records] != list(range(len(records))):
-        raise LogError(expected(source, "steps", f"every step from 0 to {records[-1].step}", "some are missing"))
+    header, steps = beginning.header, beginning.run.steps
+    if not np.array_equal(steps[: beginning.last + 1], np.arange(beginning.last + 1)):
+        raise LogError(expected(source, "steps", f"every step from 0 to {beginning.last}", "some are missing"))
     world = built.world(seed=header.seed, n_steps_max=header.n_steps_max)
-    start = _restore(world, records) if with_memory is None else 0
-    decider: Policy = RecordedDecisions(recording)
+    start = _restore(world, beginning) if with_memory is None else 0
+    decider: Policy = RecordedDecisions(beginning)
     if with_memory is not None:
         begin(with_memory.policy, world.city_arrays, n_brigades=world.n_brigades, seed=world.seed)
         decider = ShadowPolicy(decider, with_memory.policy)
-    again = _steps_again(world, decider, records[start:])
+    again = _Again(header, built.city_record(), world, decider, beginning)
+    check_replay(beginning, again, source=source, first_step=start)
     if isinstance(decider, ShadowPolicy) and decider.disagreements:
         (step, brigade), (made, own) = next(iter(decider.disagreements.items()))
         name, found = header.policy, f"{ACTION_NAMES[made.action]} is recorded"
@@ -110,19 +119,16 @@ def resume(
             f"{source}: step {step}, brigade {brigade}: {found}, but {name} now decides {ACTION_NAMES[own.action]},"
             f" so it cannot continue the run; --policy {name} starts it afresh"
         )
-    return Resumed(
-        world=world,
-        recorded=MemoryRecording(header, recording.city, records[start:]),
-        replayed=MemoryRecording(header, built.city_record(), again),
-    )
+    return world
 
 
-def _restore(world: World, records: Sequence[StepRecord]) -> int:
+def _restore(world: World, beginning: Beginning) -> int:
     """Put the world into the nearest snapshot before the last step and return its step.
 
     Before, so that at least one step is always computed again; a snapshot that does not fit is skipped.
     """
-    for record in reversed(records[1:-1]):
+    for number in range(beginning.last - 1, 0, -1):
+        record = beginning.run.step(number)
         if record.snapshot is not None:
             restored = copy_world(world.state)
             try:
@@ -135,16 +141,24 @@ def _restore(world: World, records: Sequence[StepRecord]) -> int:
     return 0
 
 
-def _steps_again(world: World, decider: Policy, records: Sequence[StepRecord]) -> list[StepRecord]:
-    """Compute recorded steps again, from the world that the first of them left."""
-    observer = Observer(world)
-    start = observer.record()
-    if world.step_number > 0:  # observations, decisions and events of that step are not part of the state
-        first = records[0]
-        start = replace(start, observations=first.observations, decisions=first.decisions, events=first.events)
-    again = [start]
-    recorded = {record.step: record.decisions for record in records}
-    while world.step_number < records[-1].step and not (world.terminated or world.truncated):
-        record = observer.record(world.step(decider))
-        again.append(with_errors(record, recorded[record.step]))
-    return again
+@dataclass(frozen=True)
+class _Again:
+    """Recorded steps that are computed again, from where a world stands; it moves on, so iterate once."""
+
+    header: RunHeader
+    city: CityRecord
+    world: World
+    decider: Policy
+    beginning: Beginning
+
+    def __iter__(self) -> Iterator[StepRecord]:
+        world, observer = self.world, Observer(self.world)
+        start = observer.record()
+        recorded = (record for record in self.beginning if record.step >= world.step_number)
+        first = next(recorded)
+        if world.step_number > 0:  # observations, decisions and events of that step are not part of the state
+            start = replace(start, observations=first.observations, decisions=first.decisions, events=first.events)
+        yield start
+        while world.step_number < self.beginning.last and not (world.terminated or world.truncated):
+            record = observer.record(world.step(self.decider))
+            yield with_errors(record, next(recorded).decisions)

@@ -139,12 +139,14 @@ class Training:
 
         from fireworld.training.log.reader import open_training
         from fireworld.training.log.records import TRAINING
+        from fireworld.training.log.verify import check_last_part
 
         self._resumes = True
         if path == self.checkpoint and holds_nothing(path, TRAINING):
             return True
         before = open_training(path, partial=True)
         check_same(before.identity, self.trainer.identity, path)
+        check_last_part(before)
         for number, part in enumerate(before.parts()):
             self._report(before.follow(self.trainer, part, number))
         self.has_checkpoint = True

@@ -77,4 +77,4 @@ def walls_hit(
     grid = wall_grid(walls)
     starts, ways = start_mm.astype(np.int64), (end_mm - start_mm).astype(np.int64)
     rays = zip(source.tolist(), starts.tolist(), ways.tolist(), strict=True)
-    return np.array([first_hit(walls, grid, wall, *start, *way) for wall, start, way in rays], dtype=np.int64)
+    return np.array([first_hit(walls, grid, wall, *start, *way)[0] for wall, start, way in rays], dtype=np.int64)

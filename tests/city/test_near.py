@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fireworld.city import near as module
 from fireworld.city.city import Links
 from fireworld.city.near import near_relation
+from fireworld.errors import CityError
 from tests.city.plans import footprints, rectangle
 
 
@@ -106,3 +108,22 @@ def test_agrees_with_shapely(seed):
     np.fill_diagonal(closer, val=False)
     assert near(footprints(*outlines)) == [np.flatnonzero(row).tolist() for row in closer]
     assert closer.any(axis=1).sum() > 40
+
+
+def test_outlines_of_many_corners_around_one_another_are_refused(monkeypatch):
+    """Rings, each within the box of the next, but 31 m away from it: every wall of both would be compared."""
+    rings = []
+    for half in range(40_000, 400_000, 31_500):
+        side = range(-half, half, half // 20)
+        rings.append([
+            *((x, -half) for x in side), *((half, y) for y in side), *((-x, half) for x in side),
+            *((-half, -y) for y in side),
+        ])  # fmt: skip
+    plan = footprints(*rings, ids=range(7, 7 + len(rings)))
+    monkeypatch.setattr(module, "COMPARED_FREE", 0)
+    monkeypatch.setattr(module, "COMPARED_PER_BUILDING", 200_000)
+    assert near(plan) == [[]] * len(rings)
+    monkeypatch.setattr(module, "COMPARED_PER_BUILDING", 5000)
+    wanted = "city: building [0-9]+: apexes: expected outlines that are compared at no more than 60000 pairs of walls"
+    with pytest.raises(CityError, match=wanted):
+        near(plan)

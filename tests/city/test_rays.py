@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
+import time
 from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
+from fireworld.city import links
 from fireworld.city.build import visiting_order
 from fireworld.city.links import radiation_links
 from fireworld.city.outlines import walls_of
@@ -111,9 +114,40 @@ def test_too_many_rays_are_refused_by_the_name_of_the_building_that_sends_most()
     with pytest.raises(CityError) as caught:
         radiation_links(plan, order, replace(FIRE, ray_rate_per_mm=10.0), seed=1, where="here")
     assert str(caught.value) == (
-        "here: building 7: apexes: expected at most 200000000 rays from all walls, at 10 a mm, got 400400000, "
+        "here: building 7: apexes: expected at most 10002000 rays from all walls, at 10 a mm, got 400400000, "
         "400000000 of them from this one; try a smaller parameters.fire.ray_rate_per_mm"
     )
+
+
+def test_walls_that_lie_on_one_another_are_refused(monkeypatch):
+    plan = footprints(*[rectangle(100 * k, 100 * k, 10_000, 10_000) for k in range(50)], ids=range(7, 57))
+    monkeypatch.setattr(links, "COMPARED_FREE", 0)
+    monkeypatch.setattr(links, "COMPARED_PER_RAY", 200)
+    links_of(plan)
+    monkeypatch.setattr(links, "COMPARED_PER_RAY", 1)
+    with pytest.raises(CityError) as caught:
+        links_of(plan)
+    assert re.fullmatch(
+        r"city: building \d+: apexes: expected at most (\d+) comparisons of \1 rays with walls, got more: "
+        "too many walls lie on one another",
+        str(caught.value),
+    )
+
+
+def comb(x_mm: int, *, teeth: int) -> list[tuple[int, int]]:
+    """An outline of two corners for each tooth, which are 20 m long and 20 cm apart."""
+    zigzag = [(100 * k, x_mm + 20_000 * (k % 2)) for k in range(2 * teeth)]
+    return [*zigzag, (200 * teeth, -9000 - x_mm), (0, -9000 - x_mm)]
+
+
+@pytest.mark.slow
+def test_stacked_combs_are_refused_in_seconds():
+    """In one cell of the grid, because another building is far away, lie all their walls."""
+    plan = footprints(*[comb(k, teeth=1990) for k in range(20)], rectangle(10**6, 10**6, 10_000, 10_000))
+    began = time.process_time()
+    with pytest.raises(CityError, match="too many walls lie on one another"):
+        links_of(plan)
+    assert time.process_time() - began < 10
 
 
 def test_a_lonely_building_has_no_links():

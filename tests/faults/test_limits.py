@@ -148,6 +148,27 @@ def test_a_large_file_is_not_read(here, fireworld):
     assert wanted in fireworld("run", "a.yaml").err
 
 
+def squares_on_a_spot(n: int) -> str:
+    """An extract whose buildings all lie on one another."""
+    nodes, ways = [], []
+    for k in range(n):
+        for corner, (x, y) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1))):
+            lat, lon = 60 + 1e-6 * k + 2e-4 * y, 24 + 2e-6 * k + 4e-4 * x
+            nodes.append(f'<node id="{4 * k + corner + 1}" version="1" lat="{lat:.7f}" lon="{lon:.7f}"/>')
+        refs = "".join(f'<nd ref="{4 * k + corner % 4 + 1}"/>' for corner in range(5))
+        ways.append(f'<way id="{k + 1}" version="1">{refs}<tag k="building" v="yes"/></way>')
+    return f'<osm version="0.6">{"".join(nodes + ways)}</osm>'
+
+
+@pytest.mark.slow
+def test_buildings_on_one_spot(here, refused):
+    pytest.importorskip("osmium")
+    (here / "spot.osm").write_text(squares_on_a_spot(2000))
+    assert (here / "spot.osm").stat().st_size < 1_000_000
+    line = "spot.osm: buildings: expected at most 1600000 corners in pairs that overlap, got more: w1 alone lies on "
+    assert line in refused("city", "osm", "spot.osm", "-o", "town.json")
+
+
 # Files of arrays
 
 

@@ -98,6 +98,19 @@ class TestStore:
         assert capsys.readouterr().err == "", "and says nothing"
         shutil.rmtree(spare)
 
+    def test_a_folder_that_may_not_be_read_holds_nothing(self, folder, monkeypatch):
+        """Root may read any folder, so the system is made to say no."""
+        Store().write(NAME, PURPOSE, DATA)
+
+        def refuse(path: object, *_: object, **__: object) -> object:
+            raise PermissionError(13, "Permission denied", str(path))
+
+        monkeypatch.setattr(cache.os, "scandir", refuse)
+        monkeypatch.setattr("builtins.open", refuse)
+        store = Store()
+        assert store.is_empty()
+        assert store.read(NAME, PURPOSE) is None
+
     def test_without_any_place_it_is_in_memory_alone(self, caches, monkeypatch):
         caches.write_text("a file\n")
         monkeypatch.setattr(cache.tempfile, "mkdtemp", lambda **_: (_ for _ in ()).throw(OSError(28, "no space")))

@@ -15,6 +15,7 @@ from fireworld_recorder.reader import open_log
 from fireworld.policy.names import find_policy
 from fireworld.policy.teams.ranking_team import RankingTeam
 from fireworld.recording.decisions import RecordedDecisions
+from fireworld.recording.explanation import counterfactual
 from fireworld.recording.explanation.counterfactual import CounterfactualRun, prepare_counterfactuals
 from fireworld.recording.explanation.search import search_effects
 from fireworld.recording.explanation.spans import DecisionSpan, find_spans
@@ -305,3 +306,16 @@ def test_ctrl_c_shows_what_is_known(here, fireworld, interruptible, monkeypatch)
     assert known["interrupted"]
     assert known["n_replays"] < known["n_stretches"]
     assert f"interrupted after {known['n_replays']} replays" in done.err
+
+
+def test_states_that_would_fill_the_memory_are_not_saved(recordings, monkeypatch):
+    log, other = open_log(recordings / "easiest.mcap"), open_log(recordings / "chief.mcap")
+    better = RecordedDecisions(other)
+    built, make = build_recorded(log.header), lambda: find_policy("easiest").policy
+    whole = prepare_counterfactuals(built, log, better, make)
+    monkeypatch.setattr(counterfactual, "STATE_BYTES_MAX", 1)
+    bare = prepare_counterfactuals(built, log, better, make)
+    assert [*whole.states] == [*range(10, 61, 10)]
+    assert not bare.states
+    spans = find_spans(whole.recorded, better, n_brigades=built.n_brigades)
+    assert bare.score(spans[-1:]) == whole.score(spans[-1:])

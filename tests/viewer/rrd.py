@@ -62,6 +62,12 @@ def at_every_step(rows: list[tuple[int | None, Any]], steps: list[int]) -> list[
     return shown
 
 
+def building_colors(found: dict[str, Rows], path: str, steps: list[int], n_buildings: int) -> np.ndarray:
+    """Return the colors of buildings that a mesh's picture has at each step, (k, n_buildings, 3)."""
+    pictures = at_every_step(found[path]["Mesh3D:albedo_texture_buffer"], steps)
+    return np.array([np.asarray(one, dtype=np.uint8).reshape(-1, 3)[:n_buildings] for one in pictures])
+
+
 def rerun_program(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [str(app.viewer_executable()), *arguments],

@@ -88,10 +88,12 @@ except OutputError as error:
 def test_a_file_that_is_not_whole_is_noticed(small, tmp_path: Path):
     """Rerun writes in a thread of its own, and says nothing of bytes that found no room."""
     app.save([small], tmp_path / "run.rrd")
-    content = (tmp_path / "run.rrd").read_bytes()
-    assert app.is_whole(content)
+    path = tmp_path / "run.rrd"
+    content = path.read_bytes()
+    assert app.is_whole(path)
     for damaged in (b"", content[:10], content[:-1], content[:-5000], content[:1000] + content[2000:], content + b"0"):
-        assert not app.is_whole(damaged)
+        path.write_bytes(damaged)
+        assert not app.is_whole(path)
 
 
 def test_logging_switched_off_by_the_environment_is_not_mistaken_for_success(tmp_path: Path):

@@ -15,6 +15,15 @@ def area(x: np.ndarray, y: np.ndarray) -> float:
     return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)) / 2
 
 
+def triangles_of(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Cut one polygon, between two others that are cut too."""
+    square, n = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]), len(x)
+    triangles = triangulate(np.array([0, 4, 4 + n, 8 + n]), np.concatenate([square, np.column_stack([x, y]), square]))
+    assert triangles[:2].tolist() == [[0, 1, 2], [0, 2, 3]]
+    assert (triangles[-2:] - 4 - n).tolist() == [[0, 1, 2], [0, 2, 3]]
+    return triangles[2:-2] - 4
+
+
 def triangle_areas(x: np.ndarray, y: np.ndarray, triangles: np.ndarray) -> list[float]:
     return [area(x[corners], y[corners]) for corners in triangles]
 
@@ -25,7 +34,7 @@ def test_triangles_tile_any_star_shaped_polygon(radii: list[float], clockwise: b
     x, y = np.array(radii) * np.cos(angles), np.array(radii) * np.sin(angles)
     if clockwise:
         x, y = x[::-1].copy(), y[::-1].copy()
-    triangles = triangulate(x, y)
+    triangles = triangles_of(x, y)
     assert triangles.shape == (len(radii) - 2, 3)
     areas = np.array(triangle_areas(x, y, triangles))
     assert math.isclose(areas.sum(), area(x, y), rel_tol=1e-9, abs_tol=1e-9) or math.isclose(
@@ -70,7 +79,7 @@ def test_triangles_tile_any_star_shaped_polygon(radii: list[float], clockwise: b
 )
 def test_triangles_tile_angular_outlines(outline: list[tuple[float, float]]):
     x, y = np.array(outline, dtype=float).T
-    areas = triangle_areas(x, y, triangulate(x, y))
+    areas = triangle_areas(x, y, triangles_of(x, y))
     assert sum(areas) == pytest.approx(area(x, y))
     assert min(areas) >= 0
 
@@ -83,6 +92,10 @@ def test_mesh_of_a_city(small):
     assert np.array_equal(np.bincount(mesh.vertex_building), 5 * n_corners)
     assert mesh.triangle.max() < len(mesh.vertex_xyz_m)
     assert mesh.vertex_shade.max() < len(SHADES_PERCENT)
+    width, height = mesh.picture_size
+    assert width * (height - 1) < len(n_corners) <= width * height
+    column, row = np.floor(mesh.vertex_uv * (width, height)).astype(int).T
+    assert np.array_equal(row * width + column, mesh.vertex_building)
     owners = mesh.vertex_building[mesh.triangle]
     assert np.all(owners == owners[:, :1])  # no triangle joins two buildings
 

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fireworld_viewer import colors
-from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh
 from fireworld_viewer.rerun_view import app
 from fireworld_viewer.rerun_view.pages import OutcomePage
 from fireworld_viewer.rerun_view.run_layers import AGREEMENT
@@ -55,10 +54,8 @@ def test_the_difference_is_colored_at_every_step(small, slower, tmp_path: Path):
 
     numbers = rrd.at_every_step(found["/diff/city/handles"]["Difference:difference"], steps)
     assert np.array_equal(np.array(numbers), change)
-    mesh = build_mesh(small.city)
-    table = colors.shaded_table(colors.DIFFERENCE_RGB, SHADES_PERCENT)
-    shown = rrd.at_every_step(found["/diff/city/buildings"]["Mesh3D:vertex_colors"], steps)
-    assert np.array_equal(np.array(shown), table[change[:, mesh.vertex_building] + 1, mesh.vertex_shade])
+    shown = rrd.building_colors(found, "/diff/city/buildings", steps, change.shape[1])
+    assert np.array_equal(shown, np.array(colors.DIFFERENCE_RGB)[change + 1])
 
     counts = np.array(rrd.at_every_step(found["/diff/plots/buildings"]["Scalars:scalars"], steps))
     assert counts[-1].tolist() == [(change[-1] > 0).sum(), (change[-1] < 0).sum()]

@@ -142,7 +142,7 @@ def test_step_by_step_shows_what_a_recording_shows(small, tmp_path: Path):
     whole, seen = rrd.read(tmp_path / "whole.rrd"), rrd.read(tmp_path / "live.rrd")
     steps = small.steps.tolist()
     for path, component in (
-        ("/city/buildings", "Mesh3D:vertex_colors"),
+        ("/city/buildings", "Mesh3D:albedo_texture_buffer"),
         ("/city/handles", "Building:temperature"),
         ("/team/brigades", "Points3D:positions"),
         ("/civilians", "Points3D:colors"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +13,10 @@ from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh
 from fireworld_viewer.rerun_view import app, brigades, layers, run_layers
 from fireworld_viewer.rerun_view.plots import COUNTS, REWARDS, SCORES, first_burning
+from fireworld_viewer.story import steps
 
 from fireworld.errors import ViewError
-from fireworld.records import ACTION_NAMES, ACTIVITIES, MemoryRecording
+from fireworld.records import ACTION_NAMES, ACTIVITIES, STEP_TOPICS, MemoryRecording
 from tests.viewer import rrd
 from tests.viewer.conftest import make_recording
 
@@ -27,22 +28,28 @@ def saved(small: MemoryRecording, tmp_path_factory: pytest.TempPathFactory) -> d
     return rrd.read(path)
 
 
-def packed(rgb: colors.Rgb, percent: int) -> int:
-    red, green, blue = (part * percent // 100 for part in rgb)
-    return red << 24 | green << 16 | blue << 8 | 255
-
-
 def test_every_building_has_its_color_at_every_step(small, saved):
-    mesh = build_mesh(small.city)
-    shown = rrd.at_every_step(saved["/city/buildings"]["Mesh3D:vertex_colors"], small.steps.tolist())
+    shown = rrd.building_colors(saved, "/city/buildings", small.steps.tolist(), len(small.city.building_id))
     refuges = set(small.city.refuge_building.tolist())
     assert len(shown) == len(list(small))
-    for record, vertex_colors in zip(small, shown, strict=True):
+    for record, rgb in zip(small, shown, strict=True):
         for building, code in enumerate(record.buildings.fieryness.tolist()):
-            rgb = colors.REFUGE_RGB if building in refuges else colors.FIERYNESS_RGB[code]
-            own = mesh.vertex_building == building
-            wanted = [packed(rgb, SHADES_PERCENT[shade]) for shade in mesh.vertex_shade[own].tolist()]
-            assert vertex_colors[own].tolist() == wanted
+            wanted = colors.REFUGE_RGB if building in refuges else colors.FIERYNESS_RGB[code]
+            assert tuple(rgb[building].tolist()) == wanted
+
+
+def test_every_vertex_has_the_pixel_of_its_building_and_the_shade_of_its_face(small, saved):
+    mesh, sent = build_mesh(small.city), saved["/city/buildings"]
+    ((_, picture),), ((_, uv),), ((_, shade),) = (
+        sent[f"Mesh3D:{name}"] for name in ("albedo_texture_format", "vertex_texcoords", "vertex_colors")
+    )
+    (size,) = picture.as_py()
+    (_, first), *_ = sent["Mesh3D:albedo_texture_buffer"]
+    assert len(first.as_py()[0]) == 3 * size["width"] * size["height"]
+    column, row = np.floor(np.array(uv.as_py()) * (size["width"], size["height"])).astype(int).T
+    assert np.array_equal(row * size["width"] + column, mesh.vertex_building)
+    grey = np.array([255 * percent // 100 for percent in SHADES_PERCENT])[mesh.vertex_shade]
+    assert np.array_equal(shade.as_py(), grey << 24 | grey << 16 | grey << 8 | 255)
 
 
 def test_geometry_is_sent_once_and_colors_only_when_they_change(small, saved):
@@ -50,7 +57,7 @@ def test_geometry_is_sent_once_and_colors_only_when_they_change(small, saved):
     assert [step for step, _ in mesh["Mesh3D:vertex_positions"]] == [None]
     codes = small.column("/buildings", "fieryness")
     changes = [0, *(np.flatnonzero(np.any(codes[1:] != codes[:-1], axis=1)) + 1).tolist()]
-    assert [step for step, _ in mesh["Mesh3D:vertex_colors"]] == changes
+    assert [step for step, _ in mesh["Mesh3D:albedo_texture_buffer"]] == changes
     assert len(changes) < len(codes)
 
 
@@ -345,3 +352,30 @@ def test_the_page_of_help_says_whom_the_map_is_by(small, saved, tmp_path: Path):
     (text,) = [rows[0][1].as_py()[0] for name, rows in rrd.read(tmp_path / "a.rrd")["/help"].items() if "text" in name]
     (before,) = [rows[0][1].as_py()[0] for name, rows in saved["/help"].items() if "text" in name]
     assert text == f"{before}\nMap: © mappers\n"
+
+
+def test_steps_that_would_fill_the_memory_are_read_again(small, tmp_path: Path, monkeypatch):
+    """Of a large city the numbers of buildings and snapshots are not held; what is shown is the same."""
+    held = steps.select_steps(small, first=3, every=4)
+    monkeypatch.setattr(steps, "HELD_MAX", 0)
+    read = steps.select_steps(small, first=3, every=4)
+    assert isinstance(held, MemoryRecording)
+    assert isinstance(read, steps.SelectedSteps)
+    assert read.steps.tolist() == held.steps.tolist() == list(range(3, 41, 4))
+    for topic in STEP_TOPICS:
+        for item in fields(topic):
+            for one, other in zip(
+                read.ragged(topic.topic, item.name), held.ragged(topic.topic, item.name), strict=True
+            ):
+                assert np.array_equal(one, other), (topic, item.name)
+    app.save([held], tmp_path / "held.rrd")
+    app.save([read], tmp_path / "read.rrd")
+    assert rrd.read(tmp_path / "read.rrd") == rrd.read(tmp_path / "held.rrd")
+
+
+def test_pictures_hold_no_numbers_of_buildings(small):
+    for shown in steps.read_steps_between([small, small]):
+        for record in shown.records:
+            assert record.snapshot is None
+            assert not len(record.buildings.energy)
+            assert len(record.buildings.fieryness) == len(small.city.building_id)

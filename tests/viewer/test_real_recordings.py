@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from fireworld_recorder.reader import Log, open_log
 from fireworld_viewer import colors
-from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh
 from fireworld_viewer.rerun_view.city_layers import air_cells, air_pixels
 from fireworld_viewer.rerun_view.plots import COUNTS, REWARDS, SCORES
 
@@ -31,12 +30,10 @@ def saved(monkeypatch: pytest.MonkeyPatch, folder: Path, *names: str) -> tuple[l
 def assert_shown(log: Log, found: dict[str, rrd.Rows], prefix: str = "") -> None:
     """Colors of all buildings, their numbers and all curves are the log's."""
     steps = log.steps.tolist()
-    mesh, fieryness = build_mesh(log.city), log.column("/buildings", "fieryness")
-    table = colors.shaded_table((*colors.FIERYNESS_RGB, colors.REFUGE_RGB), SHADES_PERCENT)
-    wanted = fieryness.copy()
+    wanted = log.column("/buildings", "fieryness").copy()
     wanted[:, log.city.refuge_building] = 9
-    shown = rrd.at_every_step(found[f"{prefix}/city/buildings"]["Mesh3D:vertex_colors"], steps)
-    assert np.array_equal(np.array(shown), table[wanted[:, mesh.vertex_building], mesh.vertex_shade])
+    shown = rrd.building_colors(found, f"{prefix}/city/buildings", steps, wanted.shape[1])
+    assert np.array_equal(shown, np.array((*colors.FIERYNESS_RGB, colors.REFUGE_RGB))[wanted])
     for name in ("temperature", "fuel_share", "water_litres", "fieryness"):
         shown = rrd.at_every_step(found[f"{prefix}/city/handles"][f"Building:{name}"], steps)
         assert np.array_equal(np.array(shown), log.column("/buildings", name))

@@ -1,8 +1,12 @@
-"""One mesh of the whole city: extruded buildings that share one set of vertices, so that a step only recolors them."""
+"""One mesh of the whole city: extruded buildings that share one set of vertices, so that a step only recolors them.
+
+Its colors are a picture with a pixel for each building: a step takes three bytes a building, where colors of vertices
+would take eighty.
+"""
 
 from __future__ import annotations
 
-import itertools
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -26,6 +30,8 @@ class CityMesh:
     triangle: NDArray[np.uint32]  # (t, 3) indices of vertices
     vertex_building: NDArray[np.int32]  # (v,) building of each vertex, rising
     vertex_shade: NDArray[np.uint8]  # (v,) index into SHADES_PERCENT
+    vertex_uv: NDArray[np.float32]  # (v, 2) the middle of its building's pixel in the picture, of which 1 by 1 is all
+    picture_size: tuple[int, int]  # width and height of the picture, in pixels: the buildings row by row
     roof_xyz_m: NDArray[np.float32]  # (n, 3) middle of each roof
 
 
@@ -63,26 +69,55 @@ def build_mesh(city: CityRecord) -> CityMesh:
         xyz[wall + corner] = np.column_stack(columns)
         shade[wall + corner] = facing
     walls = np.concatenate([np.column_stack([wall, wall + 1, wall + 2]), np.column_stack([wall, wall + 2, wall + 3])])
-    roofs = [roof[a + triangulate(x[a:b], y[a:b])] for a, b in itertools.pairwise(ptr.tolist())]
     middles = np.column_stack([city.center_x_m, city.center_y_m, np.asarray(city.floors) * STOREY_M])
+    vertex_building = np.repeat(np.arange(len(n_corners), dtype=np.int32), 5 * n_corners)
+    width, length = _picture_size(len(n_corners))
+    row, column = np.divmod(vertex_building, width)
     return CityMesh(
         vertex_xyz_m=xyz,
-        triangle=np.concatenate([*roofs, walls]).astype(np.uint32),
-        vertex_building=np.repeat(np.arange(len(n_corners), dtype=np.int32), 5 * n_corners),
+        triangle=np.concatenate([roof[triangulate(ptr, np.column_stack([x, y]))], walls]).astype(np.uint32),
+        vertex_building=vertex_building,
         vertex_shade=shade,
+        vertex_uv=np.column_stack([(column + 0.5) / width, (row + 0.5) / length]).astype(np.float32),
+        picture_size=(width, length),
         roof_xyz_m=middles.astype(np.float32),
     )
 
 
-def triangulate(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Cut a simple polygon into triangles, (c - 2, 3) indices of corners: a fan if it is convex, ears if it is not.
+def _picture_size(n_buildings: int) -> tuple[int, int]:
+    """Return width and height of the squarest picture with a pixel for each building: no side may be long."""
+    width = math.isqrt(max(0, n_buildings - 1)) + 1
+    return width, max(1, -(-n_buildings // width))
 
-    x and y, (c,): corners in either sense of rotation; the closing corner is not repeated.
+
+def triangulate(ptr: NDArray[np.int64], xy: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Cut simple polygons into triangles, (t, 3) indices of corners: a fan of a convex one, ears of others.
+
+    Args:
+        ptr: (n + 1,) start of each polygon's corners.
+        xy: (c, 2) corners in either sense of rotation; the closing corner is not repeated. Polygons of c corners have
+            c - 2 triangles, in their order.
     """
-    n, xy = len(x), np.column_stack([x, y])
-    turns = _turn(np.roll(xy, 1, axis=0), xy, np.roll(xy, -1, axis=0))
-    if np.all(turns >= 0) or np.all(turns <= 0):
-        return np.column_stack([np.zeros(n - 2, dtype=np.int64), np.arange(1, n - 1), np.arange(2, n)])
+    n_corners = np.diff(ptr)
+    n_triangles = np.maximum(n_corners - 2, 0)
+    polygon = np.repeat(np.arange(len(n_corners)), n_triangles)
+    start = np.cumsum(n_triangles) - n_triangles
+    second = ptr[polygon] + 1 + np.arange(len(polygon)) - start[polygon]
+    triangles = np.column_stack([ptr[polygon], second, second + 1])
+    before, after = np.arange(len(xy)) - 1, np.arange(len(xy)) + 1
+    whole = n_corners > 0
+    before[ptr[:-1][whole]], after[ptr[1:][whole] - 1] = ptr[1:][whole] - 1, ptr[:-1][whole]
+    turns = _turn(xy[before], xy, xy[after])
+    owner = np.repeat(np.arange(len(n_corners)), n_corners)
+    left, right = (np.bincount(owner[turning], minlength=len(n_corners)) > 0 for turning in (turns > 0, turns < 0))
+    for k in np.flatnonzero(left & right).tolist():
+        triangles[start[k] : start[k] + n_triangles[k]] = ptr[k] + _ears(xy[ptr[k] : ptr[k + 1]])
+    return triangles
+
+
+def _ears(xy: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Cut a simple polygon, (c, 2), into triangles, (c - 2, 3), by cutting off one ear after another."""
+    (x, y), n = xy.T, len(xy)
     doubled_area = float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
     left = list(range(n)) if doubled_area > 0 else list(range(n - 1, -1, -1))
     triangles = []

@@ -14,11 +14,13 @@ from fireworld.recording.decisions import ForcedPolicy, RecordedDecisions, Shado
 from fireworld.recording.explanation.spans import DecisionSpan, span_at
 from fireworld.records import Steps
 from fireworld.simulation.built import BuiltScenario
-from fireworld.simulation.state import copy_into, copy_world
+from fireworld.simulation.state import copy_into, copy_world, named_arrays
 from fireworld.simulation.world import World
 
 STATE_EVERY_STEPS: Final = 10
-"""Steps from one saved state of the worse run to the next; a replay begins at one of them."""
+"""Steps from one saved state of the worse run to the next; a replay begins at one of them. More in a large city."""
+STATE_BYTES_MAX: Final = 512 << 20
+"""What all saved states take."""
 
 MakePolicy = Callable[[], Policy]
 
@@ -116,9 +118,11 @@ def prepare_counterfactuals(
         begin(policy, world.city_arrays, n_brigades=world.n_brigades, seed=world.seed)
         decider = ShadowPolicy(recorded, policy)
     states = {}
+    n_bytes = sum(array.nbytes for _, array in named_arrays(world.state))
+    every = max(STATE_EVERY_STEPS, -(-n_bytes * world.n_steps_max // STATE_BYTES_MAX))
     while not (world.terminated or world.truncated):
         world.step(decider)
-        if world.step_number % STATE_EVERY_STEPS == 0:
+        if world.step_number % every == 0:
             states[world.step_number] = copy_world(world.state)
     others = decider.disagreements if isinstance(decider, ShadowPolicy) else {}
     return CounterfactualRun(

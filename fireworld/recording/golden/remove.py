@@ -15,7 +15,7 @@ from fireworld.errors import FireworldError, OutputError
 from fireworld.files import read_text_file
 from fireworld.recording.golden.check import FOLDER, find_goldens
 from fireworld.recording.golden.spec import hash_line
-from fireworld.recording.golden.store import SUFFIX, TEXT_SUFFIX, text_path
+from fireworld.recording.golden.store import STORING, SUFFIX, TEXT_SUFFIX, text_path
 from fireworld.recording.inputs import is_training
 from fireworld.training.log.reader import open_training
 
@@ -60,7 +60,8 @@ def _entry(path: Path) -> GoldenEntry:
 
 def leftovers_of(folder: Path = FOLDER) -> list[Path]:
     """Return what is no golden but was made for one: partial recordings, scratch folders, texts of none."""
-    partial = [*folder.glob(f"*{SUFFIX}{PARTIAL_SUFFIX}"), *folder.glob(".fireworld-*/")]
+    partial = [path for ending in (PARTIAL_SUFFIX, STORING) for path in folder.glob(f"*{SUFFIX}{ending}")]
+    partial += folder.glob(".fireworld-*/")
     texts = [
         path
         for path in folder.glob(f"*{TEXT_SUFFIX}")

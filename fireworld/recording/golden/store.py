@@ -25,6 +25,8 @@ from fireworld.training.log.verify import TrainedAgain
 
 SUFFIX: Final = ".mcap"
 TEXT_SUFFIX: Final = ".txt"
+STORING: Final = ".storing"
+"""What the name of a golden ends in until it is whole."""
 LETTERS: Final = {"E": "easiest", "V": "nearest-to-civilian", "C": "nearest-to-center", "M": "nearest-to-me"}
 """Of the actions, in their order."""
 OWN: Final = "T"
@@ -56,9 +58,9 @@ def store_golden(path: Path, fresh: Steps | TrainedAgain, *, free: bool = False)
 def store_recording(path: Path, fresh: Steps | TrainedAgain, *, free: bool = False) -> None:
     """Write a recording, `free` as for `store_golden`; a training is trained for it (OutputError)."""
     if isinstance(fresh, TrainedAgain):
-        store_training(path, fresh)
+        store_training(path, fresh, free=free, scratch_suffix=STORING)
         return
-    with LogWriter(path, fresh.header, fresh.city, force=not free, scratch_suffix=".storing") as writer:
+    with LogWriter(path, fresh.header, fresh.city, force=not free, scratch_suffix=STORING) as writer:
         for record in fresh:
             writer.write(record)
 

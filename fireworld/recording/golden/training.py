@@ -122,19 +122,22 @@ def prepare_training(
     return TrainedAgain(make, replace(header, attachments=attachments), workers)
 
 
-def store_training(path: Path, fresh: TrainedAgain) -> None:
-    """Train, and write the training log, replacing what is there; an error or Ctrl-C leaves nothing (OutputError)."""
+def store_training(path: Path, fresh: TrainedAgain, *, free: bool, scratch_suffix: str) -> None:
+    """Train, and write the training log; an error or Ctrl-C leaves nothing (OutputError).
+
+    Args:
+        path: of the log.
+        fresh: what is trained.
+        free: there must be no log of that name; else one is replaced.
+        scratch_suffix: what its name ends in until it is complete.
+    """
     trainer = fresh.trainer()
     trainer.detailed = True
-    writer = TrainingWriter(path, trainer, header=fresh.header, force=True)
-    try:
-        with writer:
-            for _ in fresh.run(trainer):
-                writer.write()
-            writer.close()
-    except BaseException:
-        writer.partial.unlink(missing_ok=True)
-        raise
+    writer = TrainingWriter(path, trainer, header=fresh.header, force=not free, scratch_suffix=scratch_suffix)
+    with writer:
+        for _ in fresh.run(trainer):
+            writer.write()
+        writer.close()
 
 
 def training_text(log: TrainingLog) -> str:

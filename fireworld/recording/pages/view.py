@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from fireworld_recorder.diff import compare
 from fireworld_recorder.totals import totals_of
@@ -41,19 +43,26 @@ def view(
     """
     held = open_to_show(logs)
     names = [run_name(recording) for recording in held]
-    if air:
-        from fireworld.recording.replay import replay_with_air
+    with ExitStack() as stack:
+        if air:
+            folder = Path(stack.enter_context(TemporaryDirectory(prefix="fireworld-")))
+            held = [_with_air(one, folder / f"{k}.mcap", source=names[k]) for k, one in enumerate(held)]
+        shown = [select_steps(one, first=first_step, last=last_step, every=every) for one in held]
+        outcome = _outcome([Path(name).name for name in names], shown)
+        write = functools.partial(app.save, shown, focus=focus, outcome=outcome)
+        if save is not None:
+            write(Path(save), force=force)
+        elif web:
+            app.serve(write, port=port or app.WEB_PORT, announce=announce)
+        else:
+            app.show(write)
 
-        held = [replay_with_air(recording, source=name) for recording, name in zip(held, names, strict=True)]
-    shown = [select_steps(one, first=first_step, last=last_step, every=every) for one in held]
-    outcome = _outcome([Path(name).name for name in names], shown)
-    write = functools.partial(app.save, shown, focus=focus, outcome=outcome)
-    if save is not None:
-        write(Path(save), force=force)
-    elif web:
-        app.serve(write, port=port or app.WEB_PORT, announce=announce)
-    else:
-        app.show(write)
+
+def _with_air(recording: Recording, path: Path, *, source: str) -> Recording:
+    """Replay a run for the air of every step; only this needs a simulator."""
+    from fireworld.recording.replay import replay_with_air
+
+    return replay_with_air(recording, path, source=source)
 
 
 def _outcome(heads: Sequence[str], recordings: Sequence[Recording]) -> OutcomePage:

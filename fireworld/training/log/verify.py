@@ -8,6 +8,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from fireworld_recorder.codec import encode
+
 from fireworld.errors import LogError, TrainingError, expected
 from fireworld.executors import Workers, threads
 from fireworld.policy.teams.team import Team, read_team
@@ -17,7 +19,7 @@ from fireworld.training.log.reader import AnyTraining, Part, TrainingLog, opened
 from fireworld.training.log.records import TrainingHeader
 from fireworld.training.method import Method, Report, Trainer
 from fireworld.verified import Verified, trust_of
-from fireworld.version import simulator_version
+from fireworld.version import simulator_digest, simulator_version
 
 
 class TrainedAgain:
@@ -105,6 +107,28 @@ def check_team(log: TrainingLog, team: Team, *, source: str) -> str:
     if team.digest != digest:
         raise TrainingError(expected(source, "", f"the team of {log.path}, digest {digest}", team.digest))
     return digest
+
+
+def check_last_part(log: TrainingLog) -> None:
+    """Check that a training of another simulator can be continued by this one: it learns the last part again.
+
+    As of a verification, what counts is what comes out, not whose sources are the same; nothing is checked if they are.
+
+    Raises:
+        TrainingError: it learns something else than is recorded.
+    """
+    header, last = log.header, len(log) - 1
+    if last < 0 or header.simulator_digest in {"", simulator_digest()}:
+        return
+    trainer = log.trainer_before(last)
+    trainer.recording = True
+    next(iter(trainer.run(threads(None))))
+    again = {record.topic: encode(record) for record in trainer.records()}
+    *recorded, _ = next(log.raw_parts(last))
+    if again != {topic: bytes(payload) for topic, payload in recorded}:
+        by = simulator_version(header.fireworld_version, header.simulator_digest)
+        got = f"{simulator_version()}, with which {header.unit} {last} comes out otherwise"
+        raise TrainingError(expected(str(log.path), "simulator", by, got, "begin again with --force"))
 
 
 def verify_training(

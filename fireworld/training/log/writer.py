@@ -115,6 +115,7 @@ class TrainingWriter:
         force: replace an existing log.
         before: the parts of the interrupted training that is continued; they are copied first, and then the new file
             takes the place of the partial one.
+        scratch_suffix: as for `StepFile`, for a log that is made anew where its making is cut short.
 
     Raises:
         OutputError: the log exists, its folder does not, or it cannot be written.
@@ -128,6 +129,7 @@ class TrainingWriter:
         header: TrainingHeader | None = None,
         force: bool = False,
         before: Iterable[RawStep] | None = None,
+        scratch_suffix: str = "",
     ) -> None:
         header = header or header_of(trainer)
         self._trainer = trainer
@@ -140,7 +142,7 @@ class TrainingWriter:
             city=self._chain.plan,
             force=force,
             kind=TRAINING,
-            scratch_suffix="" if before is None else ".resuming",
+            scratch_suffix=scratch_suffix if before is None else ".resuming",
         )
         trainer.recording = True
         if before is not None:

@@ -308,6 +308,6 @@ def test_of_many_courtyards_the_largest_stay():
 
 
 def test_overlaps_are_found_across_blocks(monkeypatch):
-    monkeypatch.setattr(overlaps, "ROWS_AT_ONCE", 2)
+    monkeypatch.setattr(overlaps, "PAIRS_AT_ONCE", 20)
     shapes = [shape(k, 15 * k, 0, 15 * k + 20, 20) for k in range(7)]
     assert weed(shapes).overlapping == ["w1", "w2", "w3", "w4", "w5", "w6"]

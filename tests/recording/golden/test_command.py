@@ -420,6 +420,7 @@ def test_goldens_are_listed_and_removed(kept, golden):
     (kept / "gone.txt").write_bytes((kept / "quick-easiest.txt").read_bytes())
     (kept / "notes.txt").write_text("not of a golden\n")
     (kept / "new.mcap.partial").write_bytes(b"")
+    (kept / "newer.mcap.storing").write_bytes(b"")
     (kept / "bad.mcap").write_bytes(b"no log")
     done = golden("list")
     assert done.code == 0
@@ -429,9 +430,9 @@ def test_goldens_are_listed_and_removed(kept, golden):
         ["quick-mine-Policy", "quick", "mine:Policy", "1"],
     ]
     assert "bad.mcap" in done.out
-    assert done.out.count(": left over; fireworld golden remove --leftovers") == 2
+    assert done.out.count(": left over; fireworld golden remove --leftovers") == 3
     found = json.loads(golden("list", "--json").out)
-    assert [Path(path).name for path in found["leftovers"]] == ["gone.txt", "new.mcap.partial"]
+    assert [Path(path).name for path in found["leftovers"]] == ["gone.txt", "new.mcap.partial", "newer.mcap.storing"]
     assert [len(one["digest"]) for one in found["goldens"]] == [0, 64, 64]
     done = golden("remove", "bad", "quick-easy")
     assert (done.code, "try quick-easiest" in done.err) == (2, True)

@@ -321,3 +321,19 @@ def test_stored_only_if_changed(kept):
     assert (kept / "tiny.txt").is_file()
     assert store_if_changed(path, prepare_training(TrainingSpec(curriculum="quick", settings=spec.settings), kept))
     assert [scenario.name for scenario in open_training(path).scenarios] == ["quick"]
+
+
+def test_of_two_that_add_one_golden_one_does(here, golden, monkeypatch):
+    """As for runs: what another has added meanwhile is not replaced."""
+    folder = here / "recordings" / "golden"
+    close = TrainingWriter.close
+
+    def late(self):
+        (folder / "tiny.mcap").write_bytes(b"of another")
+        close(self)
+
+    monkeypatch.setattr(TrainingWriter, "close", late)
+    done = golden(*ADD)
+    assert done.code == 2
+    assert "tiny.mcap: expected a name that is free, got an existing file" in done.err
+    assert contents(folder) == {"tiny.mcap": b"of another"}

@@ -12,7 +12,8 @@ import pytest
 from fireworld_recorder.writer import PARTIAL_SUFFIX
 
 from fireworld.errors import LogError, OutputError, TrainingError
-from fireworld.training.log.reader import open_training
+from fireworld.training.log import verify
+from fireworld.training.log.reader import TrainingLog, open_training
 from fireworld.training.train import train
 from fireworld.training.training import StopTraining
 from tests.training.log.conftest import SHORT, SHORT_SEARCH
@@ -146,3 +147,29 @@ def test_a_training_that_is_killed_continues(curriculum_file, make_log, tmp_path
             subprocess.run([*command, *(["--resume"] if partial.exists() else [])], check=True, capture_output=True)
     assert (tmp_path / "t.mcap").read_bytes() == make_log().read_bytes()
     assert n_kills > 0
+
+
+@pytest.mark.parametrize(("method", "short"), [("paper", SHORT), ("search", SHORT_SEARCH)])
+def test_another_simulator_continues_what_it_learns_alike(curriculum, make_log, tmp_path, monkeypatch, method, short):
+    """As verification does, it is judged by what comes out of the last part, not by its sources."""
+    whole = make_log(method).read_bytes()
+    path = cut(whole, tmp_path, 9 * len(whole) // 10)
+    monkeypatch.setattr(verify, "simulator_digest", lambda: "ab" * 32)
+    train(curriculum, method=method, set=short, record=path, resume=True)
+    assert path.read_bytes() == whole
+
+
+@pytest.mark.parametrize(("method", "short"), [("paper", SHORT), ("search", SHORT_SEARCH)])
+def test_another_simulator_that_learns_otherwise_is_noticed(curriculum, make_log, tmp_path, monkeypatch, method, short):
+    whole = make_log(method).read_bytes()
+    path = cut(whole, tmp_path, 9 * len(whole) // 10)
+    partial = path.with_name(path.name + PARTIAL_SUFFIX)
+    before = TrainingLog.trainer_before
+    monkeypatch.setattr(TrainingLog, "trainer_before", lambda log, number: before(log, number - 1))
+    monkeypatch.setattr(verify, "simulator_digest", lambda: "ab" * 32)
+    last = len(open_training(partial, partial=True)) - 1
+    unit = "episode" if method == "paper" else "generation"
+    wanted = rf"t\.mcap\.partial: simulator: expected .*\+[0-9a-f]{{12}}, got .* with which {unit} {last} comes out"
+    with pytest.raises(TrainingError, match=f"{wanted} otherwise; begin again with --force"):
+        train(curriculum, method=method, set=short, record=path, resume=True)
+    assert partial.read_bytes() == whole[: 9 * len(whole) // 10]

@@ -107,7 +107,7 @@ class CityMap:
         self._ways = LineCollection([], colors=INK, linewidths=1.1 * self._scale, linestyles=(0, (3, 2)), zorder=5)
         self._jet_casing = LineCollection([], colors=JET_EDGE, linewidths=4.2 * self._scale, **line)
         self._jets = LineCollection([], colors=hexadecimal(colors.WATER_RGB), linewidths=2.6 * self._scale, **line)
-        self._buildings = PolyCollection(outlines_m(city), edgecolors=INK, linewidths=0.35 * self._scale, zorder=2)
+        self._buildings: Any = PolyCollection(outlines_m(city), edgecolors=INK, linewidths=0.35 * self._scale, zorder=2)
         bold: dict[str, Any] = {"ha": "center", "weight": "bold", "fontsize": 8 * self._scale}
         self._centers = np.column_stack([city.center_x_m, city.center_y_m])
         self._refuges = [
@@ -142,7 +142,7 @@ class CityMap:
         """Set the map to a step."""
         faces = _unit_rgb(colors.FIERYNESS_RGB)[np.asarray(state.fieryness, dtype=np.int64)]
         faces[np.asarray(self.city.refuge_building, dtype=np.int64)] = np.array(colors.REFUGE_RGB) / 255.0
-        self._buildings.set_facecolor(list(map(tuple, faces)))
+        self._buildings.set_facecolor(faces)
         hp = np.asarray(state.civilian_hp)
         if state.civilian_xy_m is not None:
             self._civilians.set_offsets(_side_by_side(state.civilian_xy_m, self._apart_m, self._east_m))

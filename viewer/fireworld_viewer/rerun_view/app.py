@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -16,7 +17,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Final
 
 from fireworld.errors import OutputError, ViewError, expected
-from fireworld.files import check_output, write_file
+from fireworld.files import check_output, write_file, written_beside
 from fireworld.records import Recording
 from fireworld_viewer.rerun_view.pages import OutcomePage
 
@@ -28,6 +29,7 @@ INSTALL_HINT: Final = "try pip install 'fireworld[view]'"
 LOCALHOST: Final = "127.0.0.1"
 WEB_PORT: Final = 9090
 APPLICATION_ID: Final = "fireworld"
+_END_BYTES: Final = 32  # of a Rerun file, after its table of contents
 
 
 def save(
@@ -45,7 +47,8 @@ def save(
     if Rerun is missing, the cities differ or a building of the focus is unknown.
     """
     check_output(path, force=force)
-    write_file(path, _rrd(recordings, focus, outcome))
+    with written_beside(path) as partial:
+        _write_rrd(recordings, focus, outcome, partial)
 
 
 def save_training(
@@ -133,11 +136,14 @@ def new_stream(application_id: str = APPLICATION_ID, *, recording_id: str | None
     return stream
 
 
-def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: OutcomePage | None) -> bytes:
-    """Make the Rerun file of one recording, or of two of the same city.
+def _write_rrd(
+    recordings: Sequence[Recording], focus: Sequence[int], outcome: OutcomePage | None, output: Path
+) -> None:
+    """Write the Rerun file of one recording, or of two of the same city.
 
-    Rerun writes it to a temporary file as it is sent, block by block: a large city's colors would fill gigabytes of
-    memory before they are compressed. It does so in a thread of its own that reports no error, so the end is checked.
+    Rerun writes it to a temporary file, which has a name that it takes, as it is sent, block by block: a large city
+    would fill gigabytes of memory before it is compressed. It does so in a thread of its own that reports no error, so
+    the end is checked.
     """
     rerun = _import_rerun()
     from fireworld_viewer.rerun_view import blueprint
@@ -175,10 +181,9 @@ def _rrd(recordings: Sequence[Recording], focus: Sequence[int], outcome: Outcome
         else:
             RunLayers(stream, recordings[0].city, focus=plotted, after_block=write_out).add(recordings[0])
         stream.disconnect()
-        content = path.read_bytes()
-        if not is_whole(content):
+        if not is_whole(path):
             raise _no_room(path)
-    return content
+        shutil.copyfile(path, output)
 
 
 def _no_room(path: Path) -> OutputError:
@@ -186,10 +191,14 @@ def _no_room(path: Path) -> OutputError:
     return OutputError(expected(where, "", "room for a Rerun file", found, "try TMPDIR=another folder"))
 
 
-def is_whole(rrd: bytes) -> bool:
+def is_whole(path: Path) -> bool:
     """Return whether a Rerun file is as long as its end says, by the place and the length of its table of contents."""
-    begins, length = int.from_bytes(rrd[-32:-24], "little"), int.from_bytes(rrd[-24:-16], "little")
-    return rrd[-12:-4] == b"RRF2FOOT" and begins + length + 32 == len(rrd)
+    n_bytes = path.stat().st_size
+    with path.open("rb") as file:
+        file.seek(max(0, n_bytes - _END_BYTES))
+        end = file.read()
+    begins, length = int.from_bytes(end[:8], "little"), int.from_bytes(end[8:16], "little")
+    return end[-12:-4] == b"RRF2FOOT" and begins + length + _END_BYTES == n_bytes
 
 
 def _identity(recordings: Sequence[Recording]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -15,7 +16,8 @@ from fireworld_viewer.rerun_view.layers import Layers, number_columns
 from fireworld_viewer.story.series import recorded
 
 _REFUGE: Final = len(colors.FIERYNESS_RGB)  # row of a refuge in the table of building colors
-_BUILDING_COLORS: Final = colors.shaded_table((*colors.FIERYNESS_RGB, colors.REFUGE_RGB), SHADES_PERCENT)
+_BUILDING_RGB: Final = (*colors.FIERYNESS_RGB, colors.REFUGE_RGB)
+_SHADE_RGB: Final = colors.shaded_table([(255, 255, 255)], SHADES_PERCENT)[0]
 _GROUND_M: Final = -0.4
 _GROUND_MARGIN_M: Final = 15.0
 _ABOVE_ROOFS_M: Final = 4.0
@@ -68,25 +70,33 @@ def log_buildings(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
     columns = {name: recording.column("/buildings", name) for name in names if recorded(recording, f"buildings.{name}")}
     shown = columns["fieryness"].copy()
     shown[:, np.asarray(recording.city.refuge_building, dtype=np.intp)] = _REFUGE
-    log_mesh(layers, mesh, shown, _BUILDING_COLORS)
+    log_mesh(layers, mesh, shown, _BUILDING_RGB)
     layers.numbers("city/handles", "Building", columns)
 
 
-def log_mesh(layers: Layers, mesh: CityMesh, codes: NDArray[np.uint8], table: NDArray[np.uint32]) -> None:
-    """Send the city's mesh once and its colors for every step in which a code changes.
+def log_mesh(layers: Layers, mesh: CityMesh, codes: NDArray[np.uint8], rgb: Sequence[colors.Rgb]) -> None:
+    """Send the city's mesh once, and the picture with its colors for every step in which a code changes.
 
-    codes: (k, n) row of the table for each building; table: (codes, len(SHADES_PERCENT)) packed colors.
+    codes: (k, n) index into the colors for each building. Shades are colors of the vertices, which Rerun multiplies.
     """
     path = "city/buildings"
-    layers.static(path, rerun.Mesh3D(vertex_positions=mesh.vertex_xyz_m, triangle_indices=mesh.triangle))
-    changed = layers.changed(path, codes)
-    flat = table.reshape(-1)
-    n_vertices = len(mesh.vertex_building)
-    for block in layers.blocks(4 * n_vertices, changed):
-        entry = codes[block].astype(np.intp) * table.shape[1]
-        vertex_colors = flat[entry[:, mesh.vertex_building] + mesh.vertex_shade]
-        columns = rerun.Mesh3D.columns(vertex_colors=vertex_colors.reshape(-1))
-        layers.rows(path, columns.partition(np.full(len(block), n_vertices)), steps=layers.steps[block])
+    width, height = mesh.picture_size
+    static = rerun.Mesh3D.from_fields(
+        vertex_positions=mesh.vertex_xyz_m,
+        triangle_indices=mesh.triangle,
+        vertex_colors=_SHADE_RGB[mesh.vertex_shade],
+        vertex_texcoords=mesh.vertex_uv,
+        albedo_texture_format=rerun.components.ImageFormat(
+            width=width, height=height, color_model="RGB", channel_datatype="U8"
+        ),
+    )
+    layers.static(path, static)
+    table = np.array(rgb, dtype=np.uint8)
+    for block in layers.blocks(3 * width * height, layers.changed(path, codes)):
+        pixels = np.zeros((len(block), width * height, 3), dtype=np.uint8)
+        pixels[:, : codes.shape[1]] = table[codes[block]]
+        columns = rerun.Mesh3D.columns(albedo_texture_buffer=[one.tobytes() for one in pixels])
+        layers.rows(path, columns, steps=layers.steps[block])
 
 
 def log_civilians(layers: Layers, recording: Recording, mesh: CityMesh) -> None:

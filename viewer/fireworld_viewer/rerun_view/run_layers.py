@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -10,9 +10,9 @@ import rerun
 from numpy.typing import NDArray
 
 from fireworld.errors import ViewError, expected
-from fireworld.records import CityRecord, MemoryRecording, Recording
+from fireworld.records import CityRecord, MemoryRecording, Recording, StepRecord
 from fireworld_viewer import colors
-from fireworld_viewer.city_mesh import SHADES_PERCENT, build_mesh
+from fireworld_viewer.city_mesh import CityMesh, build_mesh
 from fireworld_viewer.rerun_view import brigades, city_layers
 from fireworld_viewer.rerun_view.layers import Layers
 from fireworld_viewer.rerun_view.pages import OutcomePage
@@ -27,10 +27,9 @@ AGREEMENT: Final = ("the same", "buildings the same, something else not", "build
 
 PART_BYTES: Final = 64 << 20
 """Size of the parts in which a long run of a large city is sent: their numbers are put together in memory."""
-_BYTES_OF_BUILDING: Final = 21  # numbers and colors of a building in a step
+_BYTES_OF_BUILDING: Final = 21  # what is recorded of a building in a step
 
 _AGREEMENT_RGB: Final = (colors.HEALTHY_RGB, colors.MARK_RGB, colors.WORSE_RGB)
-_DIFFERENCE_COLORS: Final = colors.shaded_table(colors.DIFFERENCE_RGB, SHADES_PERCENT)
 
 
 class RunLayers:
@@ -42,6 +41,7 @@ class RunLayers:
         prefix: entity path to put it below, "" or like "/a".
         name: of the run beside another, "" where it is alone.
         focus: ids of buildings whose temperatures are plotted.
+        mesh: of the city, if it was made before.
         after_block: called when a block of wide data has been sent.
 
     Raises:
@@ -56,23 +56,19 @@ class RunLayers:
         prefix: str = "",
         name: str = "",
         focus: Sequence[int] = (),
+        mesh: CityMesh | None = None,
         after_block: Callable[[], object] | None = None,
     ) -> None:
         self._focus_index = _building_indices(city, focus)
         self._layers = Layers(stream, prefix, np.zeros(0, dtype=np.int64), name=name, after_block=after_block)
-        self._mesh = build_mesh(city)
+        self._mesh = build_mesh(city) if mesh is None else mesh
         self._layers.static("", rerun.ViewCoordinates.RIGHT_HAND_Z_UP)
         city_layers.log_city(self._layers, city, self._mesh)
 
     def add(self, recording: Recording) -> None:
         """Send the next steps of the run, which are in a recording of this city: one, all, or any number of them."""
-        n_steps = max(1, PART_BYTES // (_BYTES_OF_BUILDING * max(1, len(recording.city.building_id))))
-        if len(recording.steps) <= n_steps:
-            self._add(recording)
-            return
-        records = list(recording)
-        for begin in range(0, len(records), n_steps):
-            self._add(MemoryRecording(recording.header, recording.city, records[begin : begin + n_steps]))
+        for part in _parts(recording):
+            self._add(part)
 
     def _add(self, recording: Recording) -> None:
         layers, mesh = self._layers, self._mesh
@@ -86,6 +82,21 @@ class RunLayers:
         log_plots(layers, recording, self._focus_index)
         brigades.log_states(layers, recording)
         _log_text(layers, recording)
+
+
+def _parts(recording: Recording) -> Iterator[MemoryRecording]:
+    """Yield a recording in parts of at most PART_BYTES, or a step; one part of a recording without steps."""
+    held: list[StepRecord] = []
+    n_bytes = 0
+    for record in recording:
+        arrays = record.snapshot.arrays.values() if record.snapshot is not None else ()
+        more = _BYTES_OF_BUILDING * len(record.buildings.fieryness) + sum(array.nbytes for array in arrays)
+        if held and n_bytes + more > PART_BYTES:
+            yield MemoryRecording(recording.header, recording.city, held)
+            held, n_bytes = [], 0
+        held.append(record)
+        n_bytes += more
+    yield MemoryRecording(recording.header, recording.city, held)
 
 
 def _log_text(layers: Layers, recording: Recording) -> None:
@@ -126,16 +137,19 @@ def log_comparison(
     """
     check_same_city(first.city, second.city)
     steps, rows_a, rows_b = common_steps(first.steps, second.steps)
-    RunLayers(stream, first.city, prefix="/a", name="A", focus=focus, after_block=after_block).add(first)
-    RunLayers(stream, second.city, prefix="/b", name="B", focus=focus, after_block=after_block).add(second)
+    mesh = build_mesh(first.city)
+    for recording, name in ((first, "A"), (second, "B")):
+        RunLayers(
+            stream, recording.city, prefix=f"/{name.lower()}", name=name, focus=focus, mesh=mesh,
+            after_block=after_block,
+        ).add(recording)  # fmt: skip
 
     layers = Layers(stream, "/diff", steps, after_block=after_block)
-    mesh = build_mesh(first.city)
     city_layers.log_city(layers, first.city, mesh)
     fieryness_a = first.column("/buildings", "fieryness")[rows_a]
     fieryness_b = second.column("/buildings", "fieryness")[rows_b]
     change = compare_damage(fieryness_a, fieryness_b)
-    city_layers.log_mesh(layers, mesh, (change + 1).astype(np.uint8), _DIFFERENCE_COLORS)
+    city_layers.log_mesh(layers, mesh, (change + 1).astype(np.uint8), colors.DIFFERENCE_RGB)
     codes = {"difference": change, "fieryness_a": fieryness_a, "fieryness_b": fieryness_b}
     layers.numbers("city/handles", "Difference", codes)
 

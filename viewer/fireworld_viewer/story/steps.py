@@ -2,39 +2,82 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import Field, dataclass, replace
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fireworld.errors import ViewError, expected
-from fireworld.records import CityRecord, MemoryRecording, Recording, StepRecord
+from fireworld.records import Array, Buildings, CityRecord, MemoryRecording, Recording, RecordingBase, StepRecord
 
 LAST: Final = -1  # in place of a step: the last one
 DAMAGE_ORDER: Final = (0, 4, 5, 1, 6, 2, 7, 3, 8)
 """Fieryness codes from the least damage to the most: by the official score's factors; 8 comes after 3, both count 0."""
+
+HELD_MAX: Final = 6_000_000
+"""Buildings times steps that are held in memory whole, at 21 bytes each."""
+_NUMBERS: Final = ("temperature", "energy", "fuel_share", "water_litres")
+_NONE: Final[Array] = np.zeros(0)
 
 _DAMAGE: Final = np.argsort(np.array(DAMAGE_ORDER)).astype(np.int8)  # (9,) place of each code in that order
 
 
 @dataclass(frozen=True)
 class ShownStep:
-    """A step of every recording that is shown; of a run that ended earlier, its last step."""
+    """A step of every recording that is shown; of a run that ended earlier, its last step.
+
+    Its records are without snapshots and the numbers of buildings: no picture shows them, and of many steps of a large
+    city they would fill the memory.
+    """
 
     step: int
     records: tuple[StepRecord, ...]
 
 
+class SelectedSteps(RecordingBase):
+    """Some steps of a recording, in memory but for what fills it: that is read again whenever it is asked for.
+
+    What fills it are the numbers of buildings, all but their codes, and snapshots.
+    """
+
+    def __init__(self, recording: Recording, steps: Collection[int]) -> None:
+        self.header, self.city = recording.header, recording.city
+        self._recording, self._chosen = recording, frozenset(steps)
+        self._light = [without_numbers(record) for record in self]
+
+    @property
+    def steps(self) -> Array:
+        """(k,) int64: the chosen steps, rising."""
+        return np.array([record.step for record in self._light], dtype=np.int64)
+
+    def __iter__(self) -> Iterator[StepRecord]:
+        """Read the chosen steps, whole."""
+        return (record for record in self._recording if record.step in self._chosen)
+
+    def values(self, record_type: type[Any], item: Field[Any]) -> Iterator[Any]:
+        """Yield a field of every step."""
+        records = self if record_type is Buildings and item.name in _NUMBERS else self._light
+        return (getattr(getattr(record, record_type.topic[1:]), item.name) for record in records)
+
+
+def without_numbers(record: StepRecord) -> StepRecord:
+    """Return a step without its snapshot and the numbers of its buildings."""
+    return replace(record, snapshot=None, buildings=replace(record.buildings, **dict.fromkeys(_NUMBERS, _NONE)))
+
+
 def select_steps(
     recording: Recording, *, first: int | None = None, last: int | None = None, every: int = 1
-) -> MemoryRecording:
-    """Read the steps from `first` to `last`, both included, and of these every `every`-th, into memory.
+) -> MemoryRecording | SelectedSteps:
+    """Read the steps from `first` to `last`, both included, and of these every `every`-th.
 
-    Events and choices of steps that are left out are left out, too. ViewError if no step is left.
+    They are in memory then; of many steps of a large city only what does not fill it. Events and choices of steps that
+    are left out are left out, too. ViewError if no step is left.
     """
     chosen = set(_between("view", recording.steps, first, last)[::every].tolist())
+    if len(chosen) * len(recording.city.building_id) > HELD_MAX:
+        return SelectedSteps(recording, chosen)
     return MemoryRecording(recording.header, recording.city, [one for one in recording if one.step in chosen])
 
 
@@ -100,7 +143,8 @@ def _read(recordings: Sequence[Recording], steps: Sequence[int]) -> list[ShownSt
     for recording in recordings:
         own = recording.steps
         wanted = own[np.searchsorted(own, steps, side="right") - 1].tolist()  # the step, or the last one before it
-        found = {record.step: record for record in recording if record.step in set(wanted)}
+        chosen = set(wanted)
+        found = {record.step: without_numbers(record) for record in recording if record.step in chosen}
         columns.append([found[step] for step in wanted])
     return [ShownStep(step, tuple(records)) for step, *records in zip(steps, *columns, strict=True)]
 

@@ -63,7 +63,7 @@ def read_city(
     on_progress("reading")
     extract = file.read(area.window)
     on_progress("buildings")
-    shapes = _shapes(extract, area, report)
+    shapes = _shapes(extract, area, report, where=file.where)
     if not shapes:
         hint = "try a larger --radius, or another place"
         raise CityError(expected(file.where, "", "a building in the area", "none", hint))
@@ -81,7 +81,7 @@ def read_city(
     return OsmCity(freeze(plan), report, area)
 
 
-def _shapes(extract: Extract, area: Area, report: Report) -> list[Shape]:
+def _shapes(extract: Extract, area: Area, report: Report, *, where: str) -> list[Shape]:
     """Return the buildings whose middle is in the area, in their order, without those that cannot stand."""
     losses = Losses()
     shapes: list[Shape] = []
@@ -98,7 +98,7 @@ def _shapes(extract: Extract, area: Area, report: Report) -> list[Shape]:
         (shape for shape, within in zip(above, inside.tolist(), strict=True) if within), key=lambda s: s.order
     )
     below = len(shapes) - len(above)
-    weeded = weed(here)
+    weeded = weed(here, where=where)
     report.note_areas(
         "incomplete", "buildings lose nodes or ways at the edge of the extract: left out", losses.incomplete
     )
