@@ -163,10 +163,13 @@ def check_folder(folder: Path, *, own: Collection[str], force: bool = False) -> 
     """
     with _output_errors(folder):
         _check_parent(folder)
-        if not folder.exists() and not folder.is_symlink():
+        is_folder = not folder.is_symlink()
+        try:
+            found = sorted(path.name for path in folder.iterdir()) if is_folder else [folder.name]
+        except FileNotFoundError:  # there is none; or in this moment another takes its place
             return
-        is_folder = folder.is_dir() and not folder.is_symlink()
-        found = sorted(path.name for path in folder.iterdir()) if is_folder else [folder.name]
+        except NotADirectoryError:
+            is_folder, found = False, [folder.name]
     foreign = [name for name in found if name not in own or not is_folder]
     if foreign:
         got = f"{foreign[0]} in it" if is_folder else "a file or a link"
