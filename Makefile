@@ -62,7 +62,7 @@ oldest: .venv-oldest/.installed  ## Run the tests of everything but docs and pac
 
 .venv-oldest/.installed: pyproject.toml constraints-oldest.txt
 	$(PYTHON) -m venv .venv-oldest
-	PIP_CONSTRAINT=constraints-oldest.txt .venv-oldest/bin/python -m pip install --quiet --editable '.[view,film,osm,archive]' \
+	PIP_CONSTRAINT=constraints-oldest.txt .venv-oldest/bin/python -m pip install --quiet --editable '.[view,film,osm,onnx,archive]' \
 		hypothesis import-linter protobuf pytest pytest-xdist scipy
 	touch $@
 
@@ -74,6 +74,7 @@ docs: install  ## Renew what is made from the code in docs/, and the transcripts
 	$(BIN)/python -m tests.docs.log_format
 	$(BIN)/python -m tests.docs.foxglove_schema
 	$(BIN)/python -m tests.docs.scenario_reference
+	$(BIN)/python -m tests.docs.contested_table
 	$(BIN)/python -m tests.docs.cli_reference
 	$(BIN)/python -m tests.docs.transcripts
 

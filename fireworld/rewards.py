@@ -55,7 +55,7 @@ class Reward(NamedTuple):
 
     kind: int
     """Position in KINDS."""
-    weights: tuple[float, ...]
+    weights: tuple[float, float, float, float]
     """One of each term."""
 
 
@@ -88,7 +88,8 @@ def reward_of(kind: Kind, weights: Mapping[str, float] | None = None) -> Reward:
         weights: by term; terms left out count 0. None: the paper's.
     """
     given = paper_weights() if weights is None else weights
-    return Reward(list(KINDS).index(kind), tuple(float(given.get(term.name, 0.0)) for term in TERMS))
+    damaged, burning, burnt_out, health = (float(given.get(term.name, 0.0)) for term in TERMS)
+    return Reward(list(KINDS).index(kind), (damaged, burning, burnt_out, health))
 
 
 def paper_weights() -> dict[str, float]:

@@ -29,7 +29,7 @@ SHOWN_OPTION = click.option(
 
 @click.group()
 def command() -> None:
-    """List the policies; show what a trained team does and why, or how two teams differ.
+    """List the policies; show what a trained team does and why, or how two teams differ; import a network.
 
     A team is a team file, or the name of a team that comes with fireworld.
     """
@@ -68,7 +68,7 @@ def show(*, team: str, states: tuple[str, ...], log: Path | None, limit: int, as
     A STATE is its number in recordings, 0 to 4319, or some of its features; then all states that have them are meant,
     and those visited in training are listed. A team that ranks targets has no states: its weights are listed, and what
     they come to in words; "above all" means weights of at least half the largest one, "also" of a fifth, "a little" of
-    a twentieth.
+    a twentieth. A team with a network has no states either: its layers are listed, and what it reads.
 
     \b
     fireworld policy show team.npz
@@ -105,7 +105,7 @@ def show(*, team: str, states: tuple[str, ...], log: Path | None, limit: int, as
 def diff(context: click.Context, *, first: str, second: str, actions_only: bool, limit: int, as_json: bool) -> None:
     """Compare team B with team A: in which states which brigade would act differently.
 
-    Of two teams that rank targets, the weights that differ are listed.
+    Of two teams that rank targets, the weights that differ are listed; of two networks, the layers.
 
     \b
     fireworld policy diff team.npz paper-cooperative
@@ -123,6 +123,38 @@ def diff(context: click.Context, *, first: str, second: str, actions_only: bool,
     else:
         print_blocks(difference.describe(limit=limit))
     context.exit(0 if same else 1)
+
+
+@command.command("import")
+@click.argument("model", metavar="NET.onnx", type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--output", metavar="TEAM.npz", required=True, type=click.Path(path_type=Path), help="Team file to write."
+)
+@click.option("--features", metavar="NAME,...", help="What its inputs are.  [default: the 13 features of a target]")
+@click.option("--own-targets", is_flag=True, help="Value all burning buildings of the site, not only the four named.")
+@click.option("--force", is_flag=True, help="Replace an existing file.")
+def import_network(*, model: Path, output: Path, features: str | None, own_targets: bool, force: bool) -> None:
+    """Make a team of a network in an ONNX model, by which all brigades value targets.
+
+    The model has one input, the features of targets in the order of docs/model.md, section 7, and one output, the
+    value; it consists of Gemm or MatMul and Add, with Relu or Tanh between them. Reading it needs the package onnx:
+    pip install 'fireworld[onnx]'.
+
+    \b
+    fireworld policy import net.onnx -o team.npz
+    fireworld run test-2 --policy team.npz
+
+    Exit code: 0 written, 2 no such model, or one with something else in it.
+    """
+    from fireworld.files import check_outputs
+    from fireworld.policy.teams.network_layers import FEATURES
+    from fireworld.policy.teams.network_team import NetworkTeam
+
+    check_outputs([output], force=force, inputs=[model])
+    reads = FEATURES if features is None else [name.strip() for name in features.split(",")]
+    team = NetworkTeam.from_onnx(model, features=reads, own_targets=own_targets)
+    team.save(output, force=force)
+    click.echo(f"{output}: {team.summary}, digest {team.digest[:12]}")
 
 
 def _show_history(team: Team, name: str, states: tuple[str, ...], path: Path, *, limit: int, as_json: bool) -> None:

@@ -6,46 +6,66 @@ Named tuples of arrays, because numba compiles and caches them ahead (a jitclass
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
+import numpy as np
 from numpy.typing import NDArray
 
 from fireworld.rewards import TERMS, Reward
 
 Array = NDArray[Any]
+Float64 = Annotated[Array, np.float64, 1]
+Float64x2 = Annotated[Array, np.float64, 2]
+Float64x3 = Annotated[Array, np.float64, 3]
+Float32 = Annotated[Array, np.float32, 1]
+Float32x2 = Annotated[Array, np.float32, 2]
+Float32x3 = Annotated[Array, np.float32, 3]
+Float32x4 = Annotated[Array, np.float32, 4]
+Int64 = Annotated[Array, np.int64, 1]
+Int64x2 = Annotated[Array, np.int64, 2]
+Int64x3 = Annotated[Array, np.int64, 3]
+Int32 = Annotated[Array, np.int32, 1]
+Int32x2 = Annotated[Array, np.int32, 2]
+Int32x3 = Annotated[Array, np.int32, 3]
+UInt64x2 = Annotated[Array, np.uint64, 2]
+UInt32 = Annotated[Array, np.uint32, 1]
+UInt8 = Annotated[Array, np.uint8, 1]
+UInt8x2 = Annotated[Array, np.uint8, 2]
+UInt8x3 = Annotated[Array, np.uint8, 3]
+"""Contiguous arrays by the type of their items and the number of their axes: `addresses` reads it from here."""
 
 
 class BuildingArrays(NamedTuple):
     """What is fixed of each building, (n,); and the k fires that are lit later on."""
 
-    building_id: Array  # int64, keys the building's random draws and breaks ties
-    order: Array  # uint32, in which the air exchange visits the buildings
-    capacity: Array  # float64, energy per degree (a float32 number)
-    initial_fuel: Array  # float32, energy
-    ignition_point: Array  # float64, degrees above ambient
-    emission: Array  # float64, energy radiated a step per K^4: wall_area * coefficient * Stefan-Boltzmann
-    inflammable: Array  # uint8
-    later_step: Array  # (k,) int64, rising: the step in which each later fire is lit
-    later_building: Array  # (k,) int64, the building that it is lit in
+    building_id: Int64  # keys the building's random draws and breaks ties
+    order: UInt32  # in which the air exchange visits the buildings
+    capacity: Float64  # energy per degree (a float32 number)
+    initial_fuel: Float32  # energy
+    ignition_point: Float64  # degrees above ambient
+    emission: Float64  # energy radiated a step per K^4: wall_area * coefficient * Stefan-Boltzmann
+    inflammable: UInt8
+    later_step: Int64  # (k,), rising: the step in which each later fire is lit
+    later_building: Int64  # (k,), the building that it is lit in
 
 
 class CoverArrays(NamedTuple):
     """Each building's block of air cells: rows along x, cells along y; rows padded to a multiple of four cells."""
 
-    x0: Array  # (n,) uint32, first row in the padded grid
-    y0: Array  # (n,) uint32, first cell in the padded grid
-    rows: Array  # (n,) uint32
-    width: Array  # (n,) uint32, multiple of 4
-    ptr: Array  # (n,) uint32, start in weight
-    weight: Array  # float64, energy per degree of difference: flow * cover * cell size; 0 where not covered
+    x0: UInt32  # (n,), first row in the padded grid
+    y0: UInt32  # (n,), first cell in the padded grid
+    rows: UInt32  # (n,)
+    width: UInt32  # (n,), multiple of 4
+    ptr: UInt32  # (n,), start in weight
+    weight: Float64  # energy per degree of difference: flow * cover * cell size; 0 where not covered
 
 
 class LinkArrays(NamedTuple):
     """Radiation links as CSR over the emitting buildings."""
 
-    ptr: Array  # (n+1,) uint32
-    building: Array  # uint32
-    share: Array  # float64 (a float32 number)
+    ptr: UInt32  # (n+1,)
+    building: UInt32
+    share: Float64  # (a float32 number)
 
 
 class FireConstants(NamedTuple):
@@ -64,55 +84,55 @@ class FireConstants(NamedTuple):
 class FireState(NamedTuple):
     """What burns: changed by every step."""
 
-    energy: Array  # (n,) float64
-    fuel: Array  # (n,) float32
-    water: Array  # (n,) int32, litres lying on the building
-    watered: Array  # (n,) uint8, 1 once water has reached it
-    fieryness: Array  # (n,) uint8, official code
-    air: Array  # (nx + 2, pitch) float64, degrees; a border of zeros around the nx * ny cells
-    warm: Array  # (4,) int64, box of the air that may differ from zero: first row, end, first cell, end
-    span: Array  # (2, nx + 2) uint64, cells of each row of the air that may differ from zero: first, end
-    rate: Array  # (n,) float64, burn rate of the step where a building burns
-    emitted: Array  # (n,) float64, scratch
-    scratch: Array  # (2, pitch) float64, scratch
+    energy: Float64  # (n,)
+    fuel: Float32  # (n,)
+    water: Int32  # (n,), litres lying on the building
+    watered: UInt8  # (n,), 1 once water has reached it
+    fieryness: UInt8  # (n,), official code
+    air: Float64x2  # (nx + 2, pitch), degrees; a border of zeros around the nx * ny cells
+    warm: Int64  # (4,), box of the air that may differ from zero: first row, end, first cell, end
+    span: UInt64x2  # (2, nx + 2), cells of each row of the air that may differ from zero: first, end
+    rate: Float64  # (n,), burn rate of the step where a building burns
+    emitted: Float64  # (n,), scratch
+    scratch: Float64x2  # (2, pitch), scratch
 
 
 class GeometryArrays(NamedTuple):
     """Where the buildings are and how big they are, (n,) float64; lengths in millimetres."""
 
-    x: Array  # centroid
-    y: Array
-    west: Array  # bounding box of the outline
-    south: Array
-    east: Array
-    north: Array
-    center_square: Array  # squared distance of the centroid from the city's centre
-    volume: Array  # m3
-    floor_area: Array  # m2, ground area * floors
+    x: Float64  # centroid
+    y: Float64
+    west: Float64  # bounding box of the outline
+    south: Float64
+    east: Float64
+    north: Float64
+    center_square: Float64  # squared distance of the centroid from the city's centre
+    volume: Float64  # m3
+    floor_area: Float64  # m2, ground area * floors
 
 
 class NearArrays(NamedTuple):
     """Which buildings belong to one fire site when both burn, as CSR."""
 
-    ptr: Array  # (n+1,) uint32
-    building: Array  # uint32
+    ptr: UInt32  # (n+1,)
+    building: UInt32
 
 
 class StreetArrays(NamedTuple):
     """The street graph; lengths in whole millimetres."""
 
-    node_x: Array  # (m,) float64
-    node_y: Array  # (m,) float64
-    first: Array  # (k,) int32, first node of each street
-    second: Array  # (k,) int32
-    length: Array  # (k,) int64
-    arc_ptr: Array  # (m+1,) int32, streets at each node, as CSR
-    arc_node: Array  # (2k,) int32, node at the other end
-    arc_street: Array  # (2k,) int32
-    access_street: Array  # (n,) int32, where each building is reached
-    access_offset: Array  # (n,) int64, from that street's first node
-    refuge: Array  # (refuges,) int32, buildings where tanks are refilled
-    hydrant_node: Array  # (hydrants,) int32
+    node_x: Float64  # (m,)
+    node_y: Float64  # (m,)
+    first: Int32  # (k,), first node of each street
+    second: Int32  # (k,)
+    length: Int64  # (k,)
+    arc_ptr: Int32  # (m+1,), streets at each node, as CSR
+    arc_node: Int32  # (2k,), node at the other end
+    arc_street: Int32  # (2k,)
+    access_street: Int32  # (n,), where each building is reached
+    access_offset: Int64  # (n,), from that street's first node
+    refuge: Int32  # (refuges,), buildings where tanks are refilled
+    hydrant_node: Int32  # (hydrants,)
 
 
 class CityArrays(NamedTuple):
@@ -140,6 +160,7 @@ class HealthConstants(NamedTuple):
     noise_mean: float
     noise_sd: float
     brigade_share: float
+    initial_hp: int
 
 
 class BrigadeConstants(NamedTuple):
@@ -177,54 +198,54 @@ class Constants(NamedTuple):
 class CivilianState(NamedTuple):
     """The civilians, (c,); they stay where they are."""
 
-    building: Array  # int32, -1 outdoors
-    x: Array  # float64, mm
-    y: Array  # float64, mm
-    full_hp: Array  # int32
-    hp: Array  # int32
-    damage: Array  # float64, health points lost per step
+    building: Int32  # -1 outdoors
+    x: Float64  # mm
+    y: Float64  # mm
+    full_hp: Int32
+    hp: Int32
+    damage: Float64  # health points lost per step
 
 
 class BrigadeState(NamedTuple):
     """The brigades, (b,)."""
 
-    street: Array  # int32, the street a brigade stands on
-    offset: Array  # int64, mm from that street's first node
-    x: Array  # float64, mm
-    y: Array  # float64, mm
-    tank: Array  # int32, litres
-    refilling: Array  # uint8, 1 from an empty tank until it is full again
-    action: Array  # int32, last choice, -1 none: what the others see
-    target: Array  # int32, building, -1 none
-    site: Array  # int32, number of the fire site, 0 none
-    activity: Array  # uint8, index into records.ACTIVITIES
-    refuge: Array  # int32, refuge building a brigade stands at when the step begins, -1 none
-    hydrant: Array  # int32, hydrant it stands at when the step begins, -1 none
-    inside: Array  # int32, building it is in, -1 on the street
-    sprayed: Array  # int32, litres in the last step
-    driven: Array  # int64, mm in the last step
-    hp: Array  # int32
-    damage: Array  # float64
+    street: Int32  # the street a brigade stands on
+    offset: Int64  # mm from that street's first node
+    x: Float64  # mm
+    y: Float64  # mm
+    tank: Int32  # litres
+    refilling: UInt8  # 1 from an empty tank until it is full again
+    action: Int32  # last choice, -1 none: what the others see
+    target: Int32  # building, -1 none
+    site: Int32  # number of the fire site, 0 none
+    activity: UInt8  # index into records.ACTIVITIES
+    refuge: Int32  # refuge building a brigade stands at when the step begins, -1 none
+    hydrant: Int32  # hydrant it stands at when the step begins, -1 none
+    inside: Int32  # building it is in, -1 on the street
+    sprayed: Int32  # litres in the last step
+    driven: Int64  # mm in the last step
+    hp: Int32
+    damage: Float64
 
 
 class SiteState(NamedTuple):
     """Fire sites: connected sets of burning buildings. At most n of them; counts[0] is how many are in use."""
 
-    counts: Array  # (3,) int32: sites in use, last number given, burning buildings
-    label: Array  # (n,) int32, number of the site of each burning building, 0 none: kept from step to step
-    place: Array  # (n,) int32, position of each burning building's site in the arrays below, -1 none
-    member: Array  # (n,) uint32, burning buildings, site after site
-    start: Array  # (n+1,) int32, start of each site in member
-    number: Array  # (n,) int32
-    volume: Array  # (n,) float64, m3
-    west: Array  # (n,) float64, mm, bounding box of the burning buildings
-    south: Array
-    east: Array
-    north: Array
-    center_square: Array  # (n,) float64, nearest burning building to the city's centre
-    civilian_square: Array  # (n,) float64, nearest burning building to an unreached civilian; inf if there is none
-    free_sides: Array  # (n,) uint8, bits N, E, S, W
-    building_civilian_square: Array  # (n,) float64, per burning building
+    counts: Int32  # (3,): sites in use, last number given, burning buildings
+    label: Int32  # (n,), number of the site of each burning building, 0 none: kept from step to step
+    place: Int32  # (n,), position of each burning building's site in the arrays below, -1 none
+    member: UInt32  # (n,), burning buildings, site after site
+    start: Int32  # (n+1,), start of each site in member
+    number: Int32  # (n,)
+    volume: Float64  # (n,), m3
+    west: Float64  # (n,), mm, bounding box of the burning buildings
+    south: Float64
+    east: Float64
+    north: Float64
+    center_square: Float64  # (n,), nearest burning building to the city's centre
+    civilian_square: Float64  # (n,), nearest burning building to an unreached civilian; inf if there is none
+    free_sides: UInt8  # (n,), bits N, E, S, W
+    building_civilian_square: Float64  # (n,), per burning building
 
 
 class WayState(NamedTuple):
@@ -234,9 +255,9 @@ class WayState(NamedTuple):
     every node, in their order, and its `line` is empty; it never changes and may be shared.
     """
 
-    line: Array  # (m + 1,) int64, 1 + the line with the ways to each node, 0 none; last, how often lines were asked for
-    table: Array  # (r, 3 + m) int64, a line each: what it is, below; then mm, the shortest way from every node
-    heap: Array  # (2, m + arcs) int64, scratch: lengths and nodes
+    line: Int64  # (m + 1,), 1 + the line with the ways to each node, 0 none; last, how often lines were asked for
+    table: Int64x2  # (r, 3 + m), a line each: what it is, below; then mm, the shortest way from every node
+    heap: Int64x2  # (2, m + arcs), scratch: lengths and nodes
 
 
 GOAL, KNOWN, USED, WAYS = 0, 1, 2, 3
@@ -247,12 +268,12 @@ line had been asked for when this one was; the first of its ways."""
 class Outcome(NamedTuple):
     """What a step was worth, as one array each of float64; below, what is where in them."""
 
-    reward: Array  # (6,) the TERMS, then at TOTAL and SUM_SO_FAR their sum and the return
-    stock: Array  # (4,) the TERMS as a stock
-    score: Array  # (3,) SCORES
-    counts: Array  # (4,) int32, COUNTS
-    water: Array  # (1,) litres sprayed so far
-    draws: Array  # (2,) DRAWS
+    reward: Float64  # (6,) the TERMS, then at TOTAL and SUM_SO_FAR their sum and the return
+    stock: Float64  # (4,) the TERMS as a stock
+    score: Float64  # (3,) SCORES
+    counts: Int32  # (4,), COUNTS
+    water: Float64  # (1,) litres sprayed so far
+    draws: Float64  # (2,) DRAWS
 
 
 TOTAL, SUM_SO_FAR = len(TERMS), len(TERMS) + 1
@@ -274,40 +295,88 @@ class WorldState(NamedTuple):
     ways: WayState
 
 
+class NetworkArrays(NamedTuple):
+    """A network that values targets, layer after layer; without layers there is none."""
+
+    feature: Int64  # (inputs,), the place of each feature that it reads among the 17 of a ranking
+    layer: Int64x2  # (layers, 4): inputs, outputs, activation, where its numbers begin
+    number: Float64  # of each layer the biases (outputs,), then the weights (inputs, outputs)
+
+
 class PolicyArrays(NamedTuple):
     """A policy that the kernels can follow by themselves, per brigade."""
 
-    kind: Array  # (b,) int32: 0 always one action, 1 random, 2 greedy in a table, 3 and 4 by a ranking of targets
-    action: Array  # (b,) int32, the action of kind 0
-    table_of: Array  # (b,) int32, the table of kind 2, the ranking of kinds 3 and 4
-    tables: Array  # (tables, states, 4) float64
-    rankings: Array  # (rankings, 17) float64, weights
-    epsilon: Array  # (1,) float64, probability of a random action instead of the greedy one
-    commit: Array  # (1,) int64, steps that a choice is kept for; 1: a new choice every step
+    kind: Int32  # (b,): 0 always one action, 1 random, 2 greedy in a table, 3 and 4 by what targets are worth, 5 given
+    action: Int32  # (b,), the action of kinds 0 and 5
+    table_of: Int32  # (b,), the table of kind 2, the ranking of kinds 3 and 4, the target of kind 5 and OWN_TARGET
+    tables: Float64x3  # (tables, states, 4)
+    rankings: Float64x2  # (rankings, 17), weights
+    network: NetworkArrays  # if it has layers, kinds 3 and 4 value targets by it instead of a ranking
+    epsilon: Float64  # (1,), probability of a random action instead of the greedy one
+    commit: Int64  # (1,), steps that a choice is kept for; 1: a new choice every step
 
 
 class Trace(NamedTuple):
     """What a team that learns leaves behind of an episode; b brigades, k steps and one more. No rows: nothing."""
 
-    state: Array  # (b, k + 1) int32, what a brigade saw: 0..4319, -1 where it did not look
-    action: Array  # (b, k + 1) uint8, what it did; 0 where it did nothing
-    choice: Array  # (b, k + 1) uint8, how it came to that: position in fireworld.records.CHOICES
-    reward: Array  # (terms, k) float64, of each step
+    state: Int32x2  # (b, k + 1), what a brigade saw: 0..4319, -1 where it did not look
+    action: UInt8x2  # (b, k + 1), what it did; 0 where it did nothing
+    choice: UInt8x2  # (b, k + 1), how it came to that: position in fireworld.records.CHOICES
+    reward: Float64x2  # (terms, k), of each step
 
 
 class Learner(NamedTuple):
     """What a team that learns changes and remembers; b brigades."""
 
-    learning: Array  # (1,) uint8, 0: leave everything as it is
-    rule: Array  # (1,) int64: 0 SARSA, 1 expected SARSA, 2 Q-learning
-    alpha: Array  # (1,) float64, learning rate
-    alpha_decay: Array  # (1,) float64: the rate of the n-th visit is alpha / (1 + alpha_decay * (n - 1))
-    gamma: Array  # (1,) float64, discount
-    tables: Array  # (tables, states, 4) float64, the policy's own
-    visits: Array  # (tables, states, 4) int64
-    state: Array  # (b,) int64, row of the last choice, -1 none
-    action: Array  # (b,) int64
-    reward: Array  # (b,) float64, discounted reward since
-    discount: Array  # (b,) float64, discount since
-    td_error: Array  # (b,) float64, error of the last update
+    learning: UInt8  # (1,), 0: leave everything as it is
+    rule: Int64  # (1,): 0 SARSA, 1 expected SARSA, 2 Q-learning
+    alpha: Float64  # (1,), learning rate
+    alpha_decay: Float64  # (1,): the rate of the n-th visit is alpha / (1 + alpha_decay * (n - 1))
+    gamma: Float64  # (1,), discount
+    tables: Float64x3  # (tables, states, 4), the policy's own
+    visits: Int64x3  # (tables, states, 4)
+    state: Int64  # (b,), row of the last choice, -1 none
+    action: Int64  # (b,)
+    reward: Float64  # (b,), discounted reward since
+    discount: Float64  # (b,), discount since
+    td_error: Float64  # (b,), error of the last update
     trace: Trace
+
+
+class Seen(NamedTuple):
+    """What the brigades saw and chose in a step; b brigades. No rows: nothing is noted."""
+
+    features: Int64x2  # (b, 8)
+    state: Int64  # (b,), -1 without a site
+    values: Float64x2  # (b, 5), of the four actions' targets and of the one chosen, where a ranking chooses
+    choice: UInt8  # (b,), how it came to its action: position in fireworld.records.CHOICES
+
+
+class Scratch(NamedTuple):
+    """What the steps of an episode write on; b brigades."""
+
+    features: Int64  # (8,)
+    action_before: Int32  # (b,)
+    target_before: Int32  # (b,)
+    values: Float64  # (5,)
+    described: Float64x2  # (n, 7); no rows where nobody ranks
+    described_at: Int64  # (n,), -1 at first
+    seen: Float64  # (17,)
+    work: Float64x2  # (2, w), w as `widest` says of the policy's network
+
+
+class Episode(NamedTuple):
+    """A world on its way, and all that takes part in it."""
+
+    city: CityArrays
+    constants: Constants
+    world: WorldState
+    policy: PolicyArrays
+    learner: Learner
+    seen: Seen
+    scratch: Scratch
+    clock: Int64  # (3,): seed, last step done, last step to do
+
+
+SEED, STEP, LAST_STEP = 0, 1, 2
+"""Places in the clock."""

@@ -8,8 +8,9 @@ from fireworld.kernels.draws import below, uniform
 from fireworld.kernels.jit import inner, kernel
 from fireworld.kernels.observation import N_ACTIONS
 
-FIXED, RANDOM, TABLE, RANK_NAMED, RANK_ALL = 0, 1, 2, 3, 4
-"""Kinds of policies. The last two do not choose in a state but among targets: `fireworld.kernels.ranking`."""
+FIXED, RANDOM, TABLE, RANK_NAMED, RANK_ALL, GIVEN = 0, 1, 2, 3, 4, 5
+"""Kinds of policies. Two do not choose in a state but among targets, `fireworld.kernels.ranking`; of the last, whoever
+runs the step says what the brigade does."""
 
 
 @inner

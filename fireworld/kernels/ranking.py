@@ -1,4 +1,4 @@
-"""Ranking: how much a brigade would like to fight a burning building, as a weighted sum of what it sees of it."""
+"""Ranking: how much a brigade would like to fight a burning building, by weights of what it sees of it or a network."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ from fireworld.kernels.arrays import (
     FireState,
     GeometryArrays,
     LinkArrays,
+    NetworkArrays,
     SiteState,
 )
-from fireworld.kernels.jit import inner, kernel
+from fireworld.kernels.jit import inlined, inner, kernel
+from fireworld.kernels.network import value_by_network
 from fireworld.kernels.observation import N_ACTIONS, find_target, site_place
 
 N_OF_BUILDING, N_OF_BRIGADE, N_OF_TEAM = 7, 3, 3
@@ -68,32 +70,29 @@ def describe_building(
 
 
 @inner
-def value_of_target(
+def describe_target(
     brigade: int,
     b: int,
     known: Array,
-    weights: Array,
     described: Array,
     brigades: BrigadeState,
     geometry: GeometryArrays,
     range_square: float,
-) -> float:
-    """Return a brigade's value of a building: its features, those of the brigade and the team, by the (17,) weights.
+    out: Array,
+) -> None:
+    """Write the 13 features of a building that a brigade sees into the first places of `out`, float64; MODEL 7.
 
     `known` (b,) is what the brigades go for, -1 nothing; `described` (7,) the building's features; the range in mm^2.
     """
-    value = 0.0
     for k in range(N_OF_BUILDING):
-        value += weights[k] * described[k]
+        out[k] = described[k]
     x, y = geometry.x[b], geometry.y[b]
     dx, dy = x - brigades.x[brigade], y - brigades.y[brigade]
     square = dx * dx + dy * dy
-    if square <= range_square:
-        value += weights[7]
-    else:
-        value += weights[8] * min((np.sqrt(square) - np.sqrt(range_square)) / METERS_100, METERS_MOST)
-    if brigades.target[brigade] == b:
-        value += weights[9]
+    out[7], out[8] = 1.0, 0.0
+    if square > range_square:
+        out[7], out[8] = 0.0, min((np.sqrt(square) - np.sqrt(range_square)) / METERS_100, METERS_MOST)
+    out[9] = 1.0 if brigades.target[brigade] == b else 0.0
     here, near = 0.0, 0.0
     for other in range(len(known)):
         target = known[other]
@@ -102,19 +101,16 @@ def value_of_target(
             near += 1.0 / (1.0 + (dx * dx + dy * dy) / METERS_50_SQUARE)
             if target == b:
                 here += 1.0
-    value += weights[10] * here + weights[11] * near
-    if here > 0.0 and here >= described[6] * described[6]:
-        value += weights[12]
-    return value
+    out[10], out[11] = here, near
+    out[12] = 1.0 if here > 0.0 and here >= described[6] * described[6] else 0.0
 
 
-@kernel
-def rank(
+@inlined
+def see_target(
     brigade: int,
-    own: bool,
+    b: int,
     step: int,
     known: Array,
-    weights: Array,
     described: Array,
     described_at: Array,
     brigades: BrigadeState,
@@ -125,6 +121,48 @@ def rank(
     sites: SiteState,
     fire_constants: FireConstants,
     brigade_constants: BrigadeConstants,
+    out: Array,
+) -> None:
+    """Write the 13 features of a building that a brigade sees; arguments as of `rank` and `describe_target`."""
+    if described_at[b] != step:
+        power = brigade_constants.power
+        describe_building(b, buildings, links, geometry, fire, sites, fire_constants, power, described[b])
+        described_at[b] = step
+    describe_target(brigade, b, known, described[b], brigades, geometry, brigade_constants.range_square, out)
+
+
+@inner
+def weigh(weights: Array, seen: Array) -> float:
+    """Return the value of a target by the (17,) weights of a ranking; `seen` (17,) are its features."""
+    value = 0.0
+    for k in range(10):
+        value += weights[k] * seen[k]
+    value += weights[10] * seen[10] + weights[11] * seen[11]  # first these two: digests hang on the order
+    for k in range(12, N_WEIGHTS):
+        value += weights[k] * seen[k]
+    return value
+
+
+@kernel
+def rank(
+    brigade: int,
+    own: bool,
+    step: int,
+    known: Array,
+    weights: Array,
+    network: NetworkArrays,
+    described: Array,
+    described_at: Array,
+    brigades: BrigadeState,
+    buildings: BuildingArrays,
+    links: LinkArrays,
+    geometry: GeometryArrays,
+    fire: FireState,
+    sites: SiteState,
+    fire_constants: FireConstants,
+    brigade_constants: BrigadeConstants,
+    seen: Array,
+    work: Array,
     values: Array,
 ) -> tuple[np.int64, np.int64]:
     """Return the action with the target that a brigade values most, and that target; -1, -1 without a site.
@@ -133,16 +171,16 @@ def rank(
     name a target of its own, all burning buildings of its site are instead, and its action is OWN_TARGET. Ties: the
     lowest action, the lowest building id.
 
-    `weights` (17,) are the ranking's, `known` (b,) what the brigades go for, as far as this one knows, -1 nothing. What
-    is known of a building is worked out once a step: in `described` (n, 7) float64, each row in the step of
-    `described_at` (n,) int64, -1 at first. Written: `values` (5,) float64, of the four targets, without the weights of
-    the actions where it may name its own, and of the one chosen.
+    `weights` (17,) are the ranking's; a network with layers values targets instead of them. `known` (b,) is what the
+    brigades go for, as far as this one knows, -1 nothing. What is known of a building is worked out once a step: in
+    `described` (n, 7) float64, each row in the step of `described_at` (n,) int64, -1 at first. Scratch is `seen` (17,)
+    float64 and `work` (2, w), w as `widest` says. Written: `values` (5,) float64, of the four targets, without the
+    weights of the actions where it may name its own, and of the one chosen.
     """
     best_action, best = np.int64(-1), np.int64(-1)
     site = site_place(brigade, brigades.site, sites)
     if site < 0:
         return best_action, best
-    power, range_square = brigade_constants.power, brigade_constants.range_square
     start, n_members = np.int64(sites.start[site]), sites.start[site + 1] - sites.start[site]
     best_value = 0.0
     for k in range(N_ACTIONS + (n_members if own else 0)):
@@ -150,13 +188,27 @@ def rank(
             b = np.int64(find_target(brigade, k, brigades, buildings, fire, geometry, sites))
         else:
             b = np.int64(sites.member[start + k - N_ACTIONS])
-        if described_at[b] != step:
-            describe_building(b, buildings, links, geometry, fire, sites, fire_constants, power, described[b])
-            described_at[b] = step
-        value = value_of_target(brigade, b, known, weights, described[b], brigades, geometry, range_square)
+        see_target(
+            brigade,
+            b,
+            step,
+            known,
+            described,
+            described_at,
+            brigades,
+            buildings,
+            links,
+            geometry,
+            fire,
+            sites,
+            fire_constants,
+            brigade_constants,
+            seen,
+        )
+        for action in range(N_ACTIONS):
+            seen[N_TARGET_FEATURES + action] = 1.0 if action == k and not own else 0.0
+        value = value_by_network(network, seen, work) if len(network.layer) > 0 else weigh(weights, seen)
         if k < N_ACTIONS:
-            if not own:
-                value += weights[N_TARGET_FEATURES + k]
             values[k] = value
             if own:
                 continue

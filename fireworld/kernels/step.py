@@ -1,51 +1,75 @@
-"""The phases of a step once the brigades have decided: the one list of them, for single steps and whole episodes."""
+"""The phases of a step but for the decisions: the one list of them, for single steps and whole episodes."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from fireworld.kernels.addresses import opener
 from fireworld.kernels.arrays import (
+    SEED,
+    STEP,
+    Array,
     BrigadeState,
     CityArrays,
     CivilianState,
     Constants,
+    Episode,
     FireState,
     HealthConstants,
-    Outcome,
-    WayState,
+    WorldState,
 )
 from fireworld.kernels.brigades import act, shelter
-from fireworld.kernels.fire import advance_fire, draw_burn_rates
+from fireworld.kernels.fire import advance_fire, draw_burn_rates, light
 from fireworld.kernels.health import harm
-from fireworld.kernels.jit import inner, kernel
+from fireworld.kernels.jit import inlined, inner, kernel
 from fireworld.kernels.outcome import assess
+from fireworld.kernels.sites import find_sites
 
 FIRST_CIVILIAN = np.int64(0)
 """Entity number of the first civilian, for the draws; the brigades' follow."""
 UNPROTECTED = 1.0
 
 
-@kernel
-def finish_step(
-    city: CityArrays,
-    fire: FireState,
-    civilians: CivilianState,
-    brigades: BrigadeState,
-    ways: WayState,
-    outcome: Outcome,
-    constants: Constants,
-    seed: int,
-    step: int,
-) -> None:
-    """Act, burn, hurt, assess: carry out what the brigades decided, and compute what the step is worth.
+opened_episode = opener(Episode)
 
-    Takes what it needs of the world, group by group: every array that Python hands over costs time.
+
+@kernel
+def look(row: Array) -> None:
+    """Begin the step after the last one done: light what is lit in it, and find the fire sites.
+
+    Args:
+        row: (k,) int64, the address row of an `Episode`, here and below.
     """
-    outcome.water[0] += act(brigades, fire, city.streets, ways, city.geometry, constants.brigades)
+    episode = opened_episode(row)
+    begin_step(episode.city, episode.world, episode.clock[STEP] + 1)
+
+
+@kernel
+def finish(row: Array) -> None:
+    """Carry out what the brigades decided in the step of the clock."""
+    episode = opened_episode(row)
+    finish_step(episode.city, episode.world, episode.constants, episode.clock[SEED], episode.clock[STEP])
+
+
+@inlined
+def begin_step(city: CityArrays, world: WorldState, step: int) -> None:
+    """Light what is lit in a step, and find the fire sites."""
+    buildings = city.buildings
+    light(buildings, world.fire, step)
+    find_sites(
+        buildings, city.links, city.near, city.geometry, world.fire, world.civilians, world.brigades, world.sites
+    )
+
+
+@inlined
+def finish_step(city: CityArrays, world: WorldState, constants: Constants, seed: int, step: int) -> None:
+    """Act, burn, hurt, assess: carry out what the brigades decided, and compute what the step is worth."""
+    fire, people, brigades, outcome = world.fire, world.civilians, world.brigades, world.outcome
+    outcome.water[0] += act(brigades, fire, city.streets, world.ways, city.geometry, constants.brigades)
     outcome.draws[0] = draw_burn_rates(city.buildings, fire, constants.fire, seed, step)
     advance_fire(city.buildings, city.cover, city.links, fire, constants.fire)
-    outcome.draws[1] = hurt(fire, civilians, brigades, constants.health, seed, step)
-    assess(fire, civilians, city.geometry, constants.reward, outcome)
+    outcome.draws[1] = hurt(fire, people, brigades, constants.health, seed, step)
+    assess(fire, people, city.geometry, constants.reward, outcome)
 
 
 @inner

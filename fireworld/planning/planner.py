@@ -11,12 +11,16 @@ from collections.abc import Callable, Iterable
 from dataclasses import astuple, dataclass
 from typing import Final
 
+import numpy as np
+
 from fireworld.errors import PolicyError, expected
+from fireworld.kernels.addresses import address_row
 from fireworld.kernels.arrays import CityArrays, WorldState
 from fireworld.policy.kernel import always
 from fireworld.policy.protocol import Decision, Observation, Policy
 from fireworld.records import ACTIONS
-from fireworld.simulation.state import NO_LEARNER, copy_into, copy_world, score_of
+from fireworld.simulation.bound import bind
+from fireworld.simulation.state import copy_into, copy_world, score_of
 
 Assignment = tuple[int, ...]
 """(b,) the action of each brigade."""
@@ -57,6 +61,8 @@ class Forecast:
     def __init__(self, observation: Observation, copy: WorldState, options: PlannerOptions) -> None:
         self._observation, self._copy, self._options = observation, copy, options
         self._policy = always(0).for_brigades(len(observation.world.brigades.action))
+        city_row = np.concatenate((address_row(observation.city), address_row(observation.constants)))
+        self._bound = bind(city_row, address_row(copy), len(copy.fire.energy), self._policy)
         self._values: dict[Assignment, float] = {}
 
     def value(self, assignment: Assignment) -> float:
@@ -75,12 +81,10 @@ class Forecast:
         return held
 
     def _roll_out(self, number: int) -> float:
-        from fireworld.kernels.episode import run_episode  # the largest kernel: compiled only where it is used
-
         moment, copy = self._observation, self._copy
         copy_into(copy, moment.world)
         seed, last_step = FIRST_SEED + number, moment.step + self._options.horizon - 1
-        run_episode(moment.city, copy, moment.constants, self._policy, NO_LEARNER, seed, moment.step, last_step)
+        self._bound.run(seed, moment.step - 1, last_step)
         score = score_of(copy)
         return score.score / score.score_max - BURNING_COST * score.n_burning
 

@@ -7,7 +7,7 @@ import math
 import operator
 import sys
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -143,6 +143,13 @@ def ask(policy: Policy, observation: Observation) -> Decision:
         raise
     except BaseException as error:
         raise _failure(policy, _moment(observation), error) from error
+
+
+def plain_actions(answers: Sequence[Any]) -> list[int] | None:
+    """Return the index of the paper's action in each answer; None if one of them is anything else."""
+    found = [None if isinstance(answer, bool | Decision) else _action_index(answer) for answer in answers]
+    named = [index for index in found if index is not None and index < len(ACTIONS)]
+    return named if len(named) == len(found) else None
 
 
 def keeps(policy: Policy, brigade: int, last_action: int, step: int) -> bool:

@@ -1,4 +1,4 @@
-"""Policies that the compiled episode follows by itself: fixed actions, random, tables, and rankings of targets."""
+"""Policies that the compiled episode follows by itself: fixed actions, random, tables, rankings and networks."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from fireworld.kernels.arrays import Array, CityArrays, PolicyArrays
+from fireworld.kernels.arrays import Array, CityArrays, NetworkArrays, PolicyArrays, Seen
 from fireworld.kernels.choice import (
     FIXED,
+    GIVEN,
     RANDOM,
     RANK_ALL,
     RANK_NAMED,
@@ -20,11 +21,14 @@ from fireworld.kernels.choice import (
     keeps_choice,
     table_state,
 )
+from fireworld.kernels.learning import EXPLORED, KEPT, NO_CHOICE
+from fireworld.kernels.network import widest
 from fireworld.kernels.ranking import N_OF_BUILDING, N_WEIGHTS, rank
-from fireworld.policy.protocol import Decision, Observation, Policy
+from fireworld.policy.protocol import Action, Decision, Observation, Policy
 from fireworld.records import ACTIONS
 
 NO_TABLES: Final = np.zeros((1, 1, 4))
+NO_NETWORK: Final = NetworkArrays(np.zeros(0, dtype=np.int64), np.zeros((0, 4), dtype=np.int64), np.zeros(0))
 
 
 @dataclass
@@ -44,13 +48,15 @@ class KernelPolicy(Policy):
     """Steps for which a choice is repeated."""
     rankings: Array = field(default_factory=lambda: np.zeros((1, N_WEIGHTS)))
     """(rankings, 17) float64, weights."""
+    network: NetworkArrays = NO_NETWORK
+    """What values targets instead of a ranking, if it has layers."""
     stateless = True
     _ready: PolicyArrays | None = field(default=None, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Raise ValueError for what the compiled episode and single steps would not do alike."""
         if self.commit > 1 and {RANK_NAMED, RANK_ALL} & set(self.kinds):
-            raise ValueError("a ranking chooses in every step: commit must be 1")
+            raise ValueError("what values targets chooses in every step: commit must be 1")
 
     def for_brigades(self, n_brigades: int) -> PolicyArrays:
         """Return the policy's arrays for a team."""
@@ -61,6 +67,7 @@ class KernelPolicy(Policy):
             table_of=np.array(self.table_of, dtype=np.int32)[turn],
             tables=np.ascontiguousarray(self.tables, dtype=np.float64),
             rankings=np.ascontiguousarray(self.rankings, dtype=np.float64),
+            network=self.network,
             epsilon=np.array([self.epsilon]),
             commit=np.array([self.commit], dtype=np.int64),
         )
@@ -69,6 +76,12 @@ class KernelPolicy(Policy):
         """Prepare for a run of a team."""
         del city, seed
         self._ready = self.for_brigades(n_brigades)
+
+    def ready(self, n_brigades: int) -> PolicyArrays:
+        """Return the arrays of the run begun, or of one that begins."""
+        if self._ready is None or len(self._ready.kind) != n_brigades:
+            self._ready = self.for_brigades(n_brigades)
+        return self._ready
 
     def decide(self, observation: Observation) -> Decision:
         """Choose as the compiled episode does."""
@@ -80,14 +93,8 @@ class KernelPolicy(Policy):
         action = int(choose(brigade, observation.state_index, ready, seed, step))
         if ready.kind[brigade] != TABLE:
             return Decision(action)
-        row = table_state(observation.state_index, ready.tables.shape[1])
-        values = ready.tables[ready.table_of[brigade], row]
-        return Decision(
-            action,
-            q_values=tuple(values.tolist()),
-            explored=bool(explores(brigade, ready, seed, step)),
-            epsilon=self.epsilon,
-        )
+        explored = bool(explores(brigade, ready, seed, step))
+        return _by_table(ready, brigade, action, observation.state_index, explored=explored)
 
     def keeps(self, brigade: int, last_action: int, step: int) -> bool:
         """Return whether a brigade repeats what it chose before."""
@@ -100,11 +107,52 @@ class KernelPolicy(Policy):
         content.update(repr(self.tables.shape).encode() + np.ascontiguousarray(self.tables, dtype="<f8").tobytes())
         if {RANK_NAMED, RANK_ALL} & set(self.kinds):
             content.update(np.ascontiguousarray(self.rankings, dtype="<f8").tobytes())
+        if len(self.network.layer):
+            for array, dtype in zip(self.network, ("<i8", "<i8", "<f8"), strict=True):
+                content.update(np.ascontiguousarray(array, dtype=dtype).tobytes())
         return content.hexdigest()
 
 
+def noted_decisions(
+    ready: PolicyArrays, seen: Seen, action: Array, target: Array, last_target: Array
+) -> tuple[Decision, ...]:
+    """Return what the brigades decided in a step that a kernel ran, as `decide` would have.
+
+    Args:
+        ready: the policy's arrays.
+        seen: what the kernel noted.
+        action: (b,), what they do.
+        target: (b,), what they go for.
+        last_target: (b,), what they went for in the step before.
+    """
+    decisions = []
+    for brigade, choice in enumerate(seen.choice.tolist()):
+        kind, act = ready.kind[brigade], int(action[brigade])
+        if choice == NO_CHOICE:
+            decisions.append(Decision(-1))
+        elif choice == KEPT:
+            decisions.append(Decision(act, target=int(last_target[brigade])))
+        elif kind in (RANK_NAMED, RANK_ALL):
+            *values, value = seen.values[brigade].tolist()
+            own = int(target[brigade]) if kind == RANK_ALL else None
+            decisions.append(Decision(act, target=own, q_values=tuple(values), value=value))
+        elif kind == TABLE:
+            decisions.append(_by_table(ready, brigade, act, int(seen.state[brigade]), explored=choice == EXPLORED))
+        elif kind == GIVEN and act == Action.OWN_TARGET:
+            decisions.append(Decision(act, target=int(target[brigade])))
+        else:
+            decisions.append(Decision(act))
+    return tuple(decisions)
+
+
+def _by_table(ready: PolicyArrays, brigade: int, action: int, state: int, *, explored: bool) -> Decision:
+    row = table_state(state, ready.tables.shape[1])
+    values = ready.tables[ready.table_of[brigade], row].tolist()
+    return Decision(action, q_values=tuple(values), explored=explored, epsilon=float(ready.epsilon[0]))
+
+
 def _by_rank(observation: Observation, ready: PolicyArrays) -> Decision:
-    """Choose the target that a brigade's ranking puts first."""
+    """Choose the target that a brigade values most, by its ranking or network."""
     brigade, city, world, constants = observation.brigade, observation.city, observation.world, observation.constants
     n = len(world.fire.energy)
     values = np.zeros(len(ACTIONS) + 1)
@@ -115,6 +163,7 @@ def _by_rank(observation: Observation, ready: PolicyArrays) -> Decision:
         observation.step,
         observation.known_targets,
         ready.rankings[ready.table_of[brigade]],
+        ready.network,
         np.zeros((n, N_OF_BUILDING)),
         np.full(n, -1),
         world.brigades,
@@ -125,6 +174,8 @@ def _by_rank(observation: Observation, ready: PolicyArrays) -> Decision:
         world.sites,
         constants.fire,
         constants.brigades,
+        np.zeros(N_WEIGHTS),
+        np.zeros((2, widest(ready.network))),
         values,
     )
     return Decision(
@@ -162,3 +213,13 @@ def from_rankings(rankings: Array, *, own_targets: bool) -> KernelPolicy:
     n = len(rankings)
     kind = RANK_ALL if own_targets else RANK_NAMED
     return KernelPolicy((kind,) * n, (0,) * n, tuple(range(n)), NO_TABLES, rankings=rankings)
+
+
+def from_network(network: NetworkArrays, *, own_targets: bool) -> KernelPolicy:
+    """Return the policy of brigades that all value targets by one network."""
+    return KernelPolicy((RANK_ALL if own_targets else RANK_NAMED,), (0,), (0,), NO_TABLES, network=network)
+
+
+def given(n_brigades: int) -> PolicyArrays:
+    """Return the arrays of a team that does what is written into them: `action`, and `table_of` for own targets."""
+    return KernelPolicy((GIVEN,), (0,), (0,), NO_TABLES).for_brigades(n_brigades)

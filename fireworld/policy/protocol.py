@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from fireworld.kernels.arrays import CityArrays, Constants, WorldState
 from fireworld.kernels.observation import find_target, site_place
-from fireworld.kernels.ranking import OWN_TARGET
+from fireworld.kernels.ranking import N_OF_BUILDING, N_TARGET_FEATURES, OWN_TARGET
+from fireworld.kernels.targets import describe_targets
 
 
 class Action(IntEnum):
@@ -82,6 +83,28 @@ class Observation:
         """The building that each of the four actions names."""
         one, two, three, four = (named_target(self.brigade, action, self.city, self.world) for action in range(4))
         return one, two, three, four
+
+    @cached_property
+    def target_features(self) -> NDArray[np.float64]:
+        """(4, 13) what the brigade sees of each of these targets, as rankings and networks do: docs/model.md, 7."""
+        n, out = len(self.world.fire.energy), np.zeros((len(self.targets), N_TARGET_FEATURES))
+        describe_targets(
+            self.brigade,
+            self.step,
+            self.known_targets,
+            np.zeros((n, N_OF_BUILDING)),
+            np.full(n, -1),
+            self.world.brigades,
+            self.city.buildings,
+            self.city.links,
+            self.city.geometry,
+            self.world.fire,
+            self.world.sites,
+            self.constants.fire,
+            self.constants.brigades,
+            out,
+        )
+        return out
 
     @cached_property
     def burning(self) -> NDArray[np.uint32]:

@@ -170,6 +170,7 @@ def health_constants(health: HealthParameters) -> HealthConstants:
         noise_mean=float(health.noise_mean),
         noise_sd=float(health.noise_sd),
         brigade_share=float(health.brigade_share),
+        initial_hp=health.initial_hp,
     )
 
 

@@ -15,7 +15,7 @@ from fireworld.arguments import ArgumentError, last_step_of, seed_of, settings_o
 from fireworld.errors import LogError, PolicyError, expected
 from fireworld.npz import read_npz
 from fireworld.outcome import Outcome
-from fireworld.policy.asking import begin
+from fireworld.policy.asking import begin, plain_actions
 from fireworld.policy.names import find_policy
 from fireworld.policy.protocol import Observation, Policy
 from fireworld.scenario import Scenario, find_scenario
@@ -114,7 +114,11 @@ class Session:
         """
         if self.done:
             raise ArgumentError(expected("step", "", "a world that is not done", "one that is", "try reset()"))
-        self._world.step(self._decider(actions))
+        plain = plain_actions(actions) if isinstance(actions, list | tuple) else None
+        if plain is not None and len(plain) == self.n_brigades:
+            self._world.act(plain)
+        else:
+            self._world.step(self._decider(actions))
         reward = self._world.state.outcome.reward
         return StepResult(float(reward[4]), self._world.terminated, self._world.truncated)
 

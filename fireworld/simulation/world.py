@@ -3,23 +3,40 @@
 from __future__ import annotations
 
 import copy
+import hashlib
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
 
 import numpy as np
 
 from fireworld.city.city import City
-from fireworld.kernels.arrays import BURNING, Array, CityArrays, Constants, Learner, PolicyArrays, WorldState
-from fireworld.kernels.fire import ignite, light
+from fireworld.kernels.addresses import address_row
+from fireworld.kernels.arrays import (
+    BURNING,
+    SEED,
+    STEP,
+    Array,
+    CityArrays,
+    Constants,
+    Learner,
+    PolicyArrays,
+    Seen,
+    WorldState,
+)
+from fireworld.kernels.fire import ignite
 from fireworld.kernels.observation import can_choose, observe
 from fireworld.kernels.outcome import assess
-from fireworld.kernels.sites import find_sites
-from fireworld.kernels.step import finish_step
+from fireworld.kernels.step import finish, look
 from fireworld.outcome import Outcome, outcome_at
 from fireworld.parameters import Parameters
 from fireworld.policy.asking import ask, complete, keeps
+from fireworld.policy.kernel import KernelPolicy, given, noted_decisions
 from fireworld.policy.protocol import Action, Decision, Observation, Policy, named_target
 from fireworld.rewards import Reward, reward_of
 from fireworld.scenario import document
+from fireworld.simulation.bound import NOTHING_SEEN, Bound, bind, fresh_seen
 from fireworld.simulation.city_arrays import (
     brigade_constants,
     city_arrays,
@@ -27,10 +44,13 @@ from fireworld.simulation.city_arrays import (
     health_constants,
     observation_constants,
 )
+from fireworld.simulation.packing import Packing
 from fireworld.simulation.placement import Placement
-from fireworld.simulation.state import NO_LEARNER, copy_world, fresh_world, rewards_of, score_of
+from fireworld.simulation.state import NO_LEARNER, fresh_world, rewards_of, score_of, take_snapshot
 
 NO_DECISION = Decision(-1)
+NOBODY: Final = given(0)
+"""Whoever decides is not asked by kernels."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +61,22 @@ class Start:
     city_arrays: CityArrays
     constants: Constants
     state: WorldState
+
+    @cached_property
+    def packing(self) -> Packing:
+        """Where the arrays of a world's state lie in its memory; and the memory of the state above."""
+        return Packing(self.state)
+
+    @cached_property
+    def row(self) -> Array:
+        """The address row of the city and the constants."""
+        return np.concatenate((address_row(self.city_arrays), address_row(self.constants)))
+
+    @cached_property
+    def frame(self) -> Array:
+        """West and south end of the streets, their width and height, (4,) mm."""
+        x, y = self.city_arrays.streets.node_x, self.city_arrays.streets.node_y
+        return np.array([x.min(), y.min(), max(np.ptp(x), 1.0), max(np.ptp(y), 1.0)])
 
 
 def prepare_start(
@@ -76,24 +112,30 @@ def prepare_start(
     return Start(city, arrays, constants, state)
 
 
-@dataclass(frozen=True)
+@dataclass
 class Choices:
     """What the brigades saw and decided in a step."""
 
     features: Array  # (b, 8) int64
     state_index: Array  # (b,) int64, -1 none
-    decisions: tuple[Decision, ...]  # (b,)
+    decide: Callable[[], tuple[Decision, ...]]
+    """Returns the decisions."""
+
+    @cached_property
+    def decisions(self) -> tuple[Decision, ...]:
+        """What each brigade decided, (b,)."""
+        return self.decide()
 
 
 class World:
     """A city, its team and its fire: `state` is everything that a step changes. Truncated after step `n_steps_max`."""
 
     def __init__(self, start: Start, *, seed: int, n_steps_max: int) -> None:
-        self.city, self.city_arrays, self.constants = start.city, start.city_arrays, start.constants
-        self.state = copy_world(start.state)
+        self.start, self.city, self.city_arrays, self.constants = start, start.city, start.city_arrays, start.constants
         self.seed = seed
         self.n_steps_max = n_steps_max
         self.step_number = 0
+        self._keep(start.packing.memory)
 
     @property
     def n_brigades(self) -> int:
@@ -126,8 +168,15 @@ class World:
     def copy(self) -> World:
         """Return a world in the same state, which shares nothing that a step changes."""
         copied = copy.copy(self)
-        copied.state = copy_world(self.state)
+        copied._keep(self.memory)  # noqa: SLF001 - a world as this one
         return copied
+
+    def _keep(self, memory: Array) -> None:
+        """Begin in the state of a memory, of which this world gets its own copy."""
+        self.memory = memory.copy()
+        self.state = self.start.packing.state(self.memory)
+        self._bound: Bound | None = None
+        self._seen, self._given = fresh_seen(self.n_brigades), given(self.n_brigades)
 
     def observe(self) -> tuple[Observation | None, ...]:
         """Return what each brigade sees before anyone decides in the next step; None of one that will not decide.
@@ -135,8 +184,8 @@ class World:
         The world stays as it is; the observations have its state in that moment, in arrays of their own.
         """
         ahead = self.copy()
+        ahead.look()
         ahead.step_number += 1
-        ahead._look()  # noqa: SLF001 - a world as this one
         brigades, sites, features = ahead.state.brigades, ahead.state.sites, np.zeros(8, dtype=np.int64)
         known, seen = brigades.target.copy(), list[Observation | None]()
         for brigade in range(self.n_brigades):
@@ -145,10 +194,17 @@ class World:
             seen.append(ahead._observation(brigade, features, state, known) if decides else None)  # noqa: SLF001
         return tuple(seen)
 
+    def look(self) -> None:
+        """Begin the coming step: light what is lit in it, and find the fire sites."""
+        look(self._bind(NOBODY, NO_LEARNER, NOTHING_SEEN).row)
+
     def step(self, policy: Policy) -> Choices:
         """Run one step: the brigades look and decide one after another, then come the phases of `finish_step`."""
+        ready = policy.ready(self.n_brigades) if isinstance(policy, KernelPolicy) else None
+        if ready is not None:
+            return self._step_in_kernel(ready)
+        self.look()
         self.step_number += 1
-        self._look()
         before, target_before = self.state.brigades.action.copy(), self.state.brigades.target.copy()
         try:
             choices = self._decide(complete(policy), before, target_before)
@@ -156,54 +212,57 @@ class World:
             self.step_number -= 1
             self.state.brigades.action[:], self.state.brigades.target[:] = before, target_before
             raise
-        state = self.state
-        finish_step(
-            self.city_arrays,
-            state.fire,
-            state.civilians,
-            state.brigades,
-            state.ways,
-            state.outcome,
-            self.constants,
-            self.seed,
-            self.step_number,
-        )
+        finish(self._bind(NOBODY, NO_LEARNER, NOTHING_SEEN).row)
         return choices
+
+    def _step_in_kernel(self, policy: PolicyArrays) -> Choices:
+        bound = self._bind(policy, NO_LEARNER, self._seen)
+        self.step_number = bound.run(self.seed, self.step_number, self.step_number + 1)
+        brigades, seen = self.state.brigades, Seen(*(array.copy() for array in self._seen))
+        made = brigades.action.copy(), brigades.target.copy(), bound.scratch.target_before.copy()
+        return Choices(seen.features, seen.state, lambda: noted_decisions(policy, seen, *made))
+
+    def act(self, actions: Sequence[int]) -> None:
+        """Run one step in which the brigades that choose do (b,) `actions`, 0..3: as `step` does, but nothing is noted.
+
+        For loops that others own.
+        """
+        bound = self._bind(self._given, NO_LEARNER, NOTHING_SEEN)
+        self._given.action[:] = actions
+        self.step_number = bound.run(self.seed, self.step_number, self.step_number + 1)
 
     def run(self, policy: PolicyArrays, learner: Learner = NO_LEARNER) -> int:
         """Run the whole episode in compiled code and return the last step; it comes out as step by step."""
-        if self.terminated or self.truncated:
-            return self.step_number
-        from fireworld.kernels.episode import run_episode  # the largest kernel: compiled only where it is used
-
-        self.step_number = int(
-            run_episode(
-                self.city_arrays,
-                self.state,
-                self.constants,
-                policy,
-                learner,
-                self.seed,
-                self.step_number + 1,
-                self.n_steps_max,
-            )
-        )
+        if not (self.terminated or self.truncated):
+            bound = self._bind(policy, learner, NOTHING_SEEN)
+            self.step_number = bound.run(self.seed, self.step_number, self.n_steps_max)
         return self.step_number
 
-    def _look(self) -> None:
-        city, state = self.city_arrays, self.state
-        if len(city.buildings.later_step):
-            light(city.buildings, state.fire, self.step_number)
-        find_sites(
-            city.buildings,
-            city.links,
-            city.near,
-            city.geometry,
-            state.fire,
-            state.civilians,
-            state.brigades,
-            state.sites,
-        )
+    def bound(self, policy: PolicyArrays, *, describes: bool = True) -> Bound:
+        """Return what kernels take of this world and a team, for loops of kernels of their own.
+
+        Args:
+            policy: the team.
+            describes: there is room for the features of buildings, whether the team needs them or not.
+        """
+        row = self.start.packing.row(self.memory, self.state.ways)
+        return bind(self.start.row, row, self.city.n_buildings, policy, describes=describes)
+
+    def digest(self) -> str:
+        """Return a digest of all that the rest of the run follows from: state, seed and step."""
+        found = hashlib.sha256(f"{self.seed} {self.step_number}".encode())
+        for name, array in take_snapshot(self.state).items():
+            found.update(name.encode() + array.tobytes())
+        return found.hexdigest()
+
+    def _bind(self, policy: PolicyArrays, learner: Learner, seen: Seen) -> Bound:
+        """Return what kernels take of this world and those who act in it, with the clock as it stands."""
+        bound = self._bound
+        if bound is None or bound.policy is not policy or bound.learner is not learner or bound.seen is not seen:
+            row = self.start.packing.row(self.memory, self.state.ways)
+            bound = self._bound = bind(self.start.row, row, self.city.n_buildings, policy, learner, seen)
+        bound.clock[SEED], bound.clock[STEP] = self.seed, self.step_number
+        return bound
 
     def _decide(self, policy: Policy, before: Array, target_before: Array) -> Choices:
         """Ask for all decisions; what the brigades did in the last step is (b,) `before` and `target_before`."""
@@ -224,7 +283,7 @@ class World:
                     decisions[brigade] = ask(policy, seen)
                 target = self._target(brigade, decisions[brigade])
             brigades.action[brigade], brigades.target[brigade] = decisions[brigade].action, target
-        return Choices(features=features, state_index=states, decisions=tuple(decisions))
+        return Choices(features=features, state_index=states, decide=lambda: tuple(decisions))
 
     def _can_keep(self, brigade: int, last: Decision) -> bool:
         """Return whether a choice can be repeated: a target of its own only while it burns in the brigade's site."""

@@ -148,6 +148,9 @@ except KeyboardInterrupt:
 """
 
 
-def test_ctrl_c_while_text_is_executed_ends_in_an_exit_code_too(here, fireworld_process):
-    (here / "text.py").write_text("def decide(observation):\n    exec('raise KeyboardInterrupt')\n")
-    assert fireworld_process("run", "quick", "--policy", "text:decide").code == 130
+@pytest.mark.parametrize(("last", "code"), [("", -signal.SIGINT), ("no_more()", 130)])
+def test_ctrl_c_while_text_is_executed_ends_in_an_exit_code_too(here, last, code):
+    lines = ("try: exec('raise KeyboardInterrupt')", "except KeyboardInterrupt: pass", last, "sys.exit(130)")
+    program = "\n".join(("import sys", "from fireworld.interrupt import no_more", *lines))
+    (here / "program.py").write_text(program)
+    assert subprocess.run([sys.executable, "-m", "program"], cwd=here, check=False).returncode == code

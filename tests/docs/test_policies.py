@@ -40,8 +40,11 @@ def test_of_several_classes_one_must_be_named(here, monkeypatch):
 
 @pytest.mark.slow
 def test_its_python_runs(here):
-    _, python, test = fenced(PAGE, "python")
-    exec(python, {"__name__": "__main__"})  # noqa: S102 - our own page
+    _, python, network, test = fenced(PAGE, "python")
+    names = {"__name__": "__main__"}
+    exec(python, names)  # noqa: S102 - our own page
+    exec(network, names)  # noqa: S102 - the same
+    assert find_policy("network.npz").digest == names["team"].policy().digest
     names = {}
     exec(test, names)  # noqa: S102 - our own page
     conformance = names["TestSteady"]()

@@ -291,12 +291,12 @@ def _altered_message(generator: random.Random, record_type: type[Any], data: byt
     fields = getattr(message_of(record_type), "fields", ())
     if not fields or generator.random() < 0.15:
         return _edited(data, [(generator.randrange(len(data) + 1), generator.randrange(4), generator.randbytes(2))])
-    record = decode(record_type, data)
-    item = generator.choice(fields)
-    value = _odd_value(generator, getattr(record, item.name), item)
     try:
+        record = decode(record_type, data)
+        item = generator.choice(fields)
+        value = _odd_value(generator, getattr(record, item.name), item)
         return encode(dataclasses.replace(record, **{item.name: value}))
-    except (ValueError, OverflowError, TypeError, LogError):  # what cannot be written cannot be read
+    except (ValueError, OverflowError, TypeError, LogError):  # altered before; what cannot be written cannot be read
         return data
 
 

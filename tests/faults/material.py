@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from tests.fuzz import test_onnx
 from tests.training.conftest import SHORT_WORDS, TINY
 
 MINE = """
@@ -46,10 +47,12 @@ def warm() -> None:
         importlib.import_module(f"fireworld.cli.{name.replace('-', '_')}")
     for name in (
         "matplotlib.pyplot",
+        "onnx",
         "pyarrow.parquet",
         "rerun",
         "fireworld.conformance.check",
         "fireworld.evaluation.compare",
+        "fireworld.evaluation.new_scenarios",
         "fireworld.recording.explanation",
         "fireworld.recording.fork",
         "fireworld.recording.golden.update",
@@ -87,6 +90,7 @@ def _make(folder: Path) -> None:
     _do("run", "quick", "--policy", "mine.py:Mine", *steps, "--record", "mine.mcap")
     _do(*TINY_TRAINING, "-o", "team.npz", "--record", "training.mcap")
     _do(*TINY_SEARCH, "-o", "ranking.npz", "--record", "search.mcap")
+    (folder / "net.onnx").write_bytes(test_onnx.GOOD)
     _do("golden", "add", "quick", "--policy", "chief", *steps, "--name", "plain", "--dir", "golden")
     for name, words in (("first", ()), ("second", ("--set", "brigades.n=3"))):
         _do("golden", "add", "quick", "--policy", "mine.py:Mine", *steps, *words, "--name", name, "--dir", "stale")

@@ -24,6 +24,8 @@ def main() -> None:
     import tests.fuzz.test_files
     import tests.fuzz.test_logs
     import tests.fuzz.test_maps
+    import tests.fuzz.test_networks
+    import tests.fuzz.test_onnx
     import tests.fuzz.test_osm
     import tests.fuzz.test_tables  # noqa: F401  # importing them fills TARGETS
 

@@ -23,6 +23,7 @@ def main() -> int:
     with atheris.instrument_imports(include=["fireworld", "recorder"]):
         import tests.fuzz.test_files
         import tests.fuzz.test_logs
+        import tests.fuzz.test_networks
         import tests.fuzz.test_tables  # noqa: F401  # importing them fills TARGETS
         from tests.fuzz.support import TARGETS
 

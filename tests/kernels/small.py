@@ -115,7 +115,7 @@ def burn(world: World, *buildings: int, code: int = 1) -> None:
     fieryness = world.state.fire.fieryness
     fieryness[(fieryness >= 1) & (fieryness <= 3)] = 5
     fieryness[list(buildings)] = code
-    world._look()
+    world.look()
 
 
 def site_numbers(world: World) -> dict[int, int]:

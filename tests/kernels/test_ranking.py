@@ -13,10 +13,11 @@ from fireworld.kernels.ranking import (
     N_WEIGHTS,
     OWN_TARGET,
     describe_building,
+    describe_target,
     rank,
-    value_of_target,
 )
 from fireworld.parameters import PAPER
+from fireworld.policy.kernel import NO_NETWORK
 from fireworld.policy.protocol import Action
 from fireworld.policy.teams.ranking_words import OF_BUILDING, WEIGHTS
 from fireworld.records import ACTION_NAMES, ACTIONS
@@ -47,14 +48,13 @@ def describe(world, b=0):
 
 
 def see(world, name, *, b=0, brigade=0, known=None):
-    """A feature of a building as the kernel weighs it: the value of a ranking that knows nothing else."""
-    tables, arrays = world.city_arrays, world.state
+    """A feature of a building as a brigade sees it."""
+    tables, arrays, out = world.city_arrays, world.state, np.full(N_TARGET_FEATURES, np.nan)
     known = np.full(world.n_brigades, -1, dtype=np.int32) if known is None else np.array(known, dtype=np.int32)
     described = np.array(list(describe(world, b).values()))
     range_square = world.constants.brigades.range_square
-    return value_of_target(
-        brigade, b, known, weights(**{name: 1.0}), described, arrays.brigades, tables.geometry, range_square
-    )
+    describe_target(brigade, b, known, described, arrays.brigades, tables.geometry, range_square, out)
+    return out[NAMES.index(name)]
 
 
 def one_fire(**others):
@@ -262,6 +262,7 @@ def ask(world, weighing, *, own, brigade=0, known=None, step=1, scratch=None):
         step,
         known,
         weighing,
+        NO_NETWORK,
         described,
         described_at,
         arrays.brigades,
@@ -272,6 +273,8 @@ def ask(world, weighing, *, own, brigade=0, known=None, step=1, scratch=None):
         arrays.sites,
         constants.fire,
         constants.brigades,
+        np.full(N_WEIGHTS, np.nan),
+        np.zeros((2, 0)),
         values,
     )
     return (int(action), int(target)), values.tolist()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -158,7 +160,7 @@ def test_a_building_on_the_edge_of_the_box_is_not_beyond_it():
     city = make_city(square(0, 0), square(40, 0), links={0: [1]})
     world = make_world(city)
     geometry = world.city_arrays.geometry._replace(east=np.array([40_000.0, 45_000.0]))
-    world.city_arrays = world.city_arrays._replace(geometry=geometry)
+    world.start = dataclasses.replace(world.start, city_arrays=world.city_arrays._replace(geometry=geometry))
     burn(world, 0)
     assert world.state.sites.free_sides[0] == 0
 

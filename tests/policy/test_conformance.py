@@ -12,6 +12,7 @@ from fireworld.policy.kernel import from_rankings, from_tables
 from fireworld.policy.names import BUILT_IN, find_policy
 from fireworld.policy.protocol import Action, Decision
 from fireworld.testing import PolicyConformance
+from tests.networks import make_network
 
 pytestmark = pytest.mark.slow
 
@@ -40,6 +41,11 @@ class TestRanking(PolicyConformance):
 
     def make_policy(self):
         return from_rankings(np.random.default_rng(1).normal(size=(2, 17)), own_targets=self.own_targets)
+
+
+class TestNetwork(TestRanking):
+    def make_policy(self):
+        return make_network(own_targets=self.own_targets).policy()
 
 
 class AlwaysNear:

@@ -10,7 +10,7 @@ from fireworld.city.city import Array, Float64Array
 from fireworld.parameters import BrigadeParameters
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.records import ACTIONS
-from tests.reference import fire, sites, team
+from tests.reference import fire, network, sites, team
 
 AMONG_NAMED, AMONG_ALL = 3, 4  # kinds of policies
 OWN_TARGET: Final = len(ACTIONS)
@@ -47,12 +47,17 @@ def choose(
         others: targets of the other brigades, as far as it knows, -1 none.
     """
     turn = who % len(policy.kinds)
-    weights = policy.rankings[policy.table_of[turn]]
-    n = len(weights) - len(ACTIONS)
+    weights, n = policy.rankings[policy.table_of[turn]], len(ACTIONS)
+
+    def worth(seen: Float64Array, named_by: Float64Array) -> float:
+        all_seen = np.concatenate([seen, named_by])
+        return network.value(policy.network, all_seen) if len(policy.network.layer) else float(all_seen @ weights)
+
     part = moment.found.members(moment.found.of_number(brigade.site))
-    seen = features(part, brigade, moment, last_target=last_target, others=others)
-    value = dict(zip(moment.found.member[part].tolist(), (seen @ weights[:n]).tolist(), strict=True))
+    rows = features(part, brigade, moment, last_target=last_target, others=others)
+    seen = dict(zip(moment.found.member[part].tolist(), rows, strict=True))
     if policy.kinds[turn] == AMONG_ALL:
+        value = {b: worth(row, np.zeros(n)) for b, row in seen.items()}
         ids = moment.site_tables.building_id
         return OWN_TARGET, max(value, key=lambda b: (value[b], -ids[b]))
     named = [
@@ -66,7 +71,7 @@ def choose(
         )
         for action in range(len(ACTIONS))
     ]
-    liked = [value[b] + weights[n + action] for action, b in enumerate(named)]
+    liked = [worth(seen[b], np.eye(n)[action]) for action, b in enumerate(named)]
     action = int(np.argmax(liked))
     return action, named[action]
 

@@ -19,6 +19,7 @@ from fireworld.city.streets import streets_of
 from fireworld.kernels.observation import observe
 from fireworld.parameters import PAPER
 from fireworld.policy.kernel import always, at_random, each_another, from_rankings, from_tables
+from fireworld.policy.teams.network_layers import SEEN
 from fireworld.records import ACTIVITIES
 from fireworld.rewards import reward_of
 from fireworld.scenario import load_scenario
@@ -26,6 +27,7 @@ from fireworld.simulation.built import build_scenario
 from fireworld.simulation.placement import Placement
 from fireworld.simulation.world import World, prepare_start
 from tests.kernels.small import assess
+from tests.networks import make_network
 from tests.reference import episode, outcome, random_draws, sites, team
 
 pytestmark = pytest.mark.slow
@@ -43,6 +45,8 @@ POLICIES = {
     "kept choices": from_tables(RANDOM.random((2, 4320, 4)), epsilon=0.5, commit=3),
     "ranking of named": from_rankings(RANDOM.normal(size=(2, 17)), own_targets=False),
     "ranking of all": from_rankings(RANDOM.normal(size=(2, 17)), own_targets=True),
+    "network of named": make_network(17, 9, 6, 1, features=SEEN).policy(),
+    "network of all": make_network(activation="relu", own_targets=True).policy(),
 }
 
 
@@ -156,7 +160,7 @@ def test_shipped_scenarios(scenario, policy):
         assert plain.outcome.water_litres > 0
 
 
-@pytest.mark.parametrize("policy", ["table", "kept choices", "ranking of named", "ranking of all"])
+@pytest.mark.parametrize("policy", ["table", "kept choices", "ranking of named", "ranking of all", "network of named"])
 def test_simultaneous_choices(policy):
     plain, _ = shipped("test-1", in_turn=False).run(policy, seed=3, n_steps=200)
     other, _ = shipped("test-1").run(policy, seed=3, n_steps=200)
@@ -198,7 +202,9 @@ def rough(seed: int) -> Play:
     return Play(city, tables, start)
 
 
-@pytest.mark.parametrize("policy", ["nearest-to-me", "random", "table", "ranking of named", "ranking of all"])
+@pytest.mark.parametrize(
+    "policy", ["nearest-to-me", "random", "table", "ranking of named", "ranking of all", "network of all"]
+)
 def test_a_town_where_everything_happens(policy):
     seen: set[int] = set()
     for seed in (1, 2, 3):
@@ -276,7 +282,7 @@ def test_sites_of_fires_that_jump_about(seed):
             plain.memory.label = found.label.astype(np.int64)
             for who, brigade in enumerate(plain.team):
                 brigade.site = compiled.state.brigades.site[who] = int(random.integers(0, last))
-        compiled._look()
+        compiled.look()
         seen = episode.look(play.tables, plain)
         assert found.label.tolist() == plain.memory.label.tolist()
         assert found.counts[1] == plain.memory.last_number

@@ -17,7 +17,7 @@ from fireworld.simulation.world import Choices
 from tests.kernels.small import assess, burn, make_city, make_world, square
 from tests.simulation.town import begin, policy_named, town, town_world
 
-NO_CHOICES = Choices(np.zeros((0, 8), dtype=np.int64), np.zeros(0, dtype=np.int64), ())
+NO_CHOICES = Choices(np.zeros((0, 8), dtype=np.int64), np.zeros(0, dtype=np.int64), lambda: ())
 FAR_APART = [square(200.0 * k, 0.0) for k in range(5)]
 
 
@@ -31,7 +31,7 @@ def told(record):
 def observe_change(world, change):
     """Record a step in which nothing happens but a change."""
     observer = Observer(world)
-    world._look()
+    world.look()
     change(world.state)
     return told(observer.record(NO_CHOICES))
 
@@ -74,7 +74,7 @@ def test_sites_that_merge_do_not_go_out():
     burn(world, 0, 2)
     observer = Observer(world)
     world.state.fire.fieryness[1] = 1
-    world._look()
+    world.look()
     assert [kind for kind, _ in told(observer.record(NO_CHOICES))] == ["ignited"]
 
 

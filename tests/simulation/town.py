@@ -17,8 +17,19 @@ from fireworld.rewards import Reward
 from fireworld.simulation.city_arrays import city_arrays
 from fireworld.simulation.placement import Placement
 from fireworld.simulation.world import World, prepare_start
+from tests.networks import make_network
 
-POLICIES = ("fixed", "each-another", "random", "table", "table-of-270", "ranking-of-named", "ranking-of-all")
+POLICIES = (
+    "fixed",
+    "each-another",
+    "random",
+    "table",
+    "table-of-270",
+    "ranking-of-named",
+    "ranking-of-all",
+    "network-of-named",
+    "network-of-all",
+)
 
 
 @lru_cache
@@ -49,6 +60,8 @@ def policy_named(name: str) -> KernelPolicy:
         "table-of-270": lambda: from_tables(random.normal(size=(1, 270, 4))),
         "ranking-of-named": lambda: from_rankings(random.normal(size=(2, 17)), own_targets=False),
         "ranking-of-all": lambda: from_rankings(random.normal(size=(2, 17)), own_targets=True),
+        "network-of-named": lambda: make_network().policy(),
+        "network-of-all": lambda: make_network(own_targets=True).policy(),
     }[name]()
 
 

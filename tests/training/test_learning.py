@@ -199,8 +199,8 @@ def test_the_compiled_episode_learns_as_the_textbook(seed, n_steps_max, terminat
         for brigade in range(3):
             textbook.learn(brigade, 0.0)
     else:  # the choices that would come next
+        world.look()
         world.step_number += 1
-        world._look()
         brigades = world.state.brigades
         world._decide(complete(textbook), brigades.action.copy(), brigades.target.copy())
     np.testing.assert_array_equal(learner.tables, textbook.tables)

@@ -13,11 +13,11 @@ from hypothesis import seed as seeded
 from tests.faults.bench import VERDICT_OR_REFUSED, Bench, as_process
 from tests.faults.material import SHORT_WORDS
 from tests.faults.outcomes import Outcome
-from tests.fuzz import support, test_files, test_logs, test_tables
+from tests.fuzz import support, test_files, test_logs, test_networks, test_tables
 from tests.fuzz.support import TARGETS, _edited
 
 NAME: Final = "fuzzed"
-SHARE: Final = 0.42
+SHARE: Final = 0.38
 TURN_SECONDS_MAX: Final = 60.0
 """CPU of a turn of a fuzz test: some hundred inputs, each of which may take a second."""
 TRAIN: Final = ("train", "in.yaml", *SHORT_WORDS, "--jobs", 1, "-o", "out.npz")
@@ -30,6 +30,8 @@ READERS: Final[dict[str, tuple[tuple[object, ...], ...]]] = {
         ("scenarios", "show", "in.yaml", "--yaml"),
         ("scenarios", "show", "in.yaml", "-o", "out.png"),
         ("compare", "chief", "easiest", "--scenarios", "in.yaml", "--seeds", 1, "--jobs", 1, *SHORT),
+        ("scenarios", "check", "in.yaml", "--seeds", 1, "--jobs", 1, *SHORT),
+        ("scenarios", "new", "--city", "in.yaml", "-o", "out.yaml", "--seeds", 1, "--jobs", 1, "--places", 2, *SHORT),
         ("golden", "add", "in.yaml", "--policy", "chief", "--steps", 2),
         TRAIN,
     ),
@@ -42,6 +44,12 @@ READERS: Final[dict[str, tuple[tuple[object, ...], ...]]] = {
         ("compare", "in.npz", "chief", "--scenarios", "quick", "--seeds", 1, "--jobs", 1, "--gate", *SHORT),
     ),
     "ranking.npz": (("policy", "show", "in.npz"), ("run", "quick", "--policy", "in.npz", "--steps", 2)),
+    "network.npz": (
+        ("policy", "show", "in.npz"),
+        ("policy", "diff", "in.npz", "team.npz"),
+        ("run", "quick", "--policy", "in.npz", "--steps", 2),
+    ),
+    "net.onnx": (("policy", "import", "in.onnx", "-o", "out.npz", "--features", "mine,volume"),),
     "known.parquet": (
         (
             "compare",
@@ -92,7 +100,7 @@ def run(generator: random.Random, bench: Bench) -> Outcome:
     bench.bring({"team.npz": "team.npz", "mini.npz": "traces/mini.npz", "mini.json": "traces/mini.json"})
     bench.processes = as_process(generator, 0.06)
     codes = {*VERDICT_OR_REFUSED, 3} if "--gate" in words else VERDICT_OR_REFUSED
-    if words[0] not in {"conformance", "policy", "compare"}:
+    if words[0] not in {"conformance", "policy", "compare"} and "new" not in words:
         codes = codes - {1}
     done = bench.call(words, codes=codes)
     left = [file for file in bench.files() if ".fireworld-" in file or (done.code == 2 and file.startswith("out"))]
@@ -129,6 +137,8 @@ def _good(bench: Bench, name: str) -> bytes:
         return (bench.material / "traces" / "mini.json").read_bytes()
     if name == "trace.npz":
         return test_files.npz(test_tables.ARRAYS)
+    if name == "network.npz":
+        return test_networks.TEAM.to_bytes()
     return (bench.material / name).read_bytes()
 
 

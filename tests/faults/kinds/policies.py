@@ -15,7 +15,7 @@ from tests.faults.material import N_STEPS
 from tests.faults.outcomes import Done, Outcome
 
 NAME: Final = "policies"
-SHARE: Final = 0.02
+SHARE: Final = 0.04
 SHORT: Final = ("--steps", N_STEPS)
 FEW: Final = ("--scenarios", "quick", "--seeds", 2, "--set", f"steps={N_STEPS}")
 GATE: Final = frozenset({0, 1, 3})

@@ -1,0 +1,59 @@
+"""Seeds of worlds: one for each episode of each worker, no two the same, and none of a test in a training."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from fireworld.arguments import seed_of, whole_number
+from fireworld.draws import EPISODE, hash_key
+
+WORKERS_MAX: Final = 1 << 11
+EPISODES_MAX: Final = 1 << 20
+TEST_BIT: Final = 1 << 31
+_HALF_BITS: Final = 16
+_HALF: Final = (1 << _HALF_BITS) - 1
+_ROUNDS: Final = 4
+
+
+@dataclass(frozen=True)
+class Seeds:
+    """The seeds that follow from one base.
+
+    Attributes:
+        base: of all of them, from 0 to 2**32 - 1.
+        test: seeds to test with: they have the highest of 32 bits, which no seed to learn with has.
+
+    Two episodes of one base never have the same seed, whoever plays them: number and worker are shuffled one to one.
+    """
+
+    base: int = 0
+    test: bool = False
+
+    def __post_init__(self) -> None:
+        """Raise ArgumentError for a base out of bounds."""
+        seed_of(self.base, name="base")
+
+    def seed(self, worker: int, episode: int) -> int:
+        """Return the seed of an episode.
+
+        Args:
+            worker: who plays it, as 0 up to the number of worlds; below 2048.
+            episode: its number among those of the worker; below 2**20.
+
+        Raises:
+            ArgumentError: a number out of bounds.
+        """
+        worker = whole_number("worker", worker, least=0, most=WORKERS_MAX - 1)
+        episode = whole_number("episode", episode, least=0, most=EPISODES_MAX - 1)
+        word = self._shuffled(episode * WORKERS_MAX + worker)
+        while word >= TEST_BIT:  # of the 32 bits that are shuffled, one is not for numbers
+            word = self._shuffled(word)
+        return word | (TEST_BIT if self.test else 0)
+
+    def _shuffled(self, word: int) -> int:
+        """Return another number of 32 bits for each: a Feistel network."""
+        left, right = word >> _HALF_BITS, word & _HALF
+        for number in range(_ROUNDS):
+            left, right = right, left ^ (hash_key(self.base, EPISODE, right, number) & _HALF)
+        return left << _HALF_BITS | right

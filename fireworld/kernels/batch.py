@@ -1,0 +1,272 @@
+"""Many worlds in one call: given decisions, one step of each, and what learners see of it next.
+
+A world that others step is left as its brigades see it: what is lit in the coming step is lit, and its fire sites are
+found. Decisions are the caller's; all else are the phases of `fireworld.kernels.step`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from fireworld.kernels.addresses import opener
+from fireworld.kernels.arrays import (
+    BURNING,
+    LAST_STEP,
+    SEED,
+    STEP,
+    Array,
+    Episode,
+    Float32x2,
+    Float32x3,
+    Float32x4,
+    Float64x2,
+    Int32x2,
+    Int32x3,
+    Int64,
+    Int64x2,
+    Int64x3,
+    UInt8,
+    UInt8x2,
+    UInt8x3,
+)
+from fireworld.kernels.fire import is_over
+from fireworld.kernels.jit import inlined, kernel
+from fireworld.kernels.observation import N_ACTIONS, can_choose, find_target, observe, site_place
+from fireworld.kernels.ranking import N_TARGET_FEATURES, OWN_TARGET, describe_building, see_target
+from fireworld.kernels.step import begin_step, finish_step, opened_episode
+
+
+class View(NamedTuple):
+    """What learners see of n worlds; b brigades at most, k targets of their own. What nobody wants has no rows."""
+
+    features: Int64x3  # (n, b, 8)
+    state: Int64x2  # (n, b): 0..4319, -1 without a site
+    mask: UInt8x3  # (n, b, 4 + k): the actions that a brigade may take; 0 alone where it chooses nothing
+    alive: UInt8x2  # (n, b)
+    chooses: UInt8x2  # (n, b): it acts in the coming step: alive, not refilling, and something burns
+    own: Int32x3  # (n, b, k): the burning buildings of its site, -1 where there are no more
+    targets: Float32x4  # (n, b, 4, 13): features of the targets that the actions name
+    team: Float32x2  # (n, 6), TEAM
+    burning: Int32x2  # (n, g): burning buildings, site after site, -1 where there are no more
+    buildings: Float32x3  # (n, g, 7): their features
+    brigades: Float32x3  # (n, b, 6), EACH
+    frame: Float64x2  # (n, 4), mm: west and south end of the city's streets, width and height; it is given
+
+
+TEAM = ("steps_left", "burning", "burnt_out", "water_damaged", "civilians_alive", "score")
+"""Of the team: the part of the steps that is left; parts of the buildings and the civilians; score / maximal score."""
+EACH = ("x", "y", "tank", "refilling", "health", "drives")
+"""Of each brigade: where it is, from 0 to 1 over the city; the parts of its tank and health; refilling, driving."""
+
+
+class Result(NamedTuple):
+    """What the last step of n worlds came to."""
+
+    reward: Float64x2  # (n, 6), as in `Outcome`
+    score: Float64x2  # (n, 3), SCORES
+    counts: Int32x2  # (n, 4), COUNTS
+    terminated: UInt8  # (n,)
+    truncated: UInt8  # (n,)
+    seed: Int64  # (n,)
+    step: Int64  # (n,), last step done
+
+
+class Batch(NamedTuple):
+    """What n worlds take and give."""
+
+    actions: Int32x2  # (n, b): 0..3 as named; 4 + j: the j-th of `View.own`
+    shown: View
+    result: Result
+
+
+opened_batch = opener(Batch)
+
+
+@kernel
+def show_worlds(rows: Array, batch_row: Array, indices: Array, begun: bool) -> None:
+    """Let learners see worlds that have just begun, or come from elsewhere.
+
+    Args:
+        rows: (n, r) int64, address rows of an `Episode` each.
+        batch_row: (k,) int64, address row of the `Batch`.
+        indices: (m,) int64, of the worlds.
+        begun: their coming step has begun.
+    """
+    batch = opened_batch(batch_row)
+    for k in range(len(indices)):
+        i = indices[k]
+        episode = opened_episode(rows[i])
+        if not begun:
+            begin_step(episode.city, episode.world, episode.clock[STEP] + 1)
+        show(i, episode, batch)
+
+
+@kernel
+def step_worlds(rows: Array, batch_row: Array, indices: Array, decided: bool) -> None:
+    """Run a step of worlds, none of which has ended; arguments as for `show_worlds`.
+
+    `decided`: their brigades have taken their turns, and `Batch.actions` is nothing more.
+    """
+    batch = opened_batch(batch_row)
+    for k in range(len(indices)):
+        i = indices[k]
+        episode = opened_episode(rows[i])
+        if not decided:
+            for brigade in range(len(episode.world.brigades.action)):
+                follow(brigade, batch.actions[i, brigade], i, episode, batch)
+        clock = episode.clock
+        clock[STEP] += 1
+        finish_step(episode.city, episode.world, episode.constants, clock[SEED], clock[STEP])
+        begin_step(episode.city, episode.world, clock[STEP] + 1)
+        show(i, episode, batch)
+
+
+@kernel
+def take_turn(row: Array, batch_row: Array, i: int, brigade: int) -> None:
+    """Let one brigade decide, and the next one see what it does; `row`: of world i."""
+    batch, episode = opened_batch(batch_row), opened_episode(row)
+    follow(brigade, batch.actions[i, brigade], i, episode, batch)
+    if brigade + 1 < len(episode.world.brigades.action):
+        show_brigade(brigade + 1, i, episode, batch)
+
+
+@inlined
+def follow(brigade: int, action: int, i: int, episode: Episode, batch: Batch) -> None:
+    """Write down what a brigade of world i decides; one that chooses nothing does nothing."""
+    city, world = episode.city, episode.world
+    brigades, sites = world.brigades, world.sites
+    target = -1
+    if not can_choose(brigade, brigades.hp, brigades.refilling, sites.counts):
+        action = -1
+    elif action >= N_ACTIONS:
+        target, action = batch.shown.own[i, brigade, action - N_ACTIONS], OWN_TARGET
+    else:
+        target = find_target(brigade, action, brigades, city.buildings, world.fire, city.geometry, sites)
+    brigades.action[brigade], brigades.target[brigade] = action, target
+
+
+@inlined
+def show(i: int, episode: Episode, batch: Batch) -> None:
+    """Write what is seen of world i, in whose coming step the fire sites are found, and what its last step came to."""
+    city, world, clock = episode.city, episode.world, episode.clock
+    outcome, view, result = world.outcome, batch.shown, batch.result
+    for k in range(len(outcome.reward)):
+        result.reward[i, k] = outcome.reward[k]
+    for k in range(len(outcome.score)):
+        result.score[i, k] = outcome.score[k]
+    for k in range(len(outcome.counts)):
+        result.counts[i, k] = outcome.counts[k]
+    result.seed[i], result.step[i] = clock[SEED], clock[STEP]
+    over = is_over(outcome.counts[BURNING], city.buildings.later_step, clock[STEP])
+    result.terminated[i] = over
+    result.truncated[i] = not over and clock[STEP] >= clock[LAST_STEP]
+    episode.scratch.described_at[:] = -1
+    n_buildings, n_civilians = len(world.fire.energy), max(len(world.civilians.hp), 1)
+    team = view.team[i]
+    team[0] = (clock[LAST_STEP] - clock[STEP]) / max(clock[LAST_STEP], 1)
+    for k in range(3):
+        team[1 + k] = outcome.counts[(0, 2, 1)[k]] / n_buildings
+    team[4] = outcome.counts[3] / n_civilians
+    team[5] = outcome.score[0] / outcome.score[1]
+    for brigade in range(len(world.brigades.action)):
+        show_brigade(brigade, i, episode, batch)
+    if len(view.burning):
+        show_buildings(i, episode, view)
+
+
+@inlined
+def show_brigade(brigade: int, i: int, episode: Episode, batch: Batch) -> None:
+    """Write what a brigade of world i sees."""
+    world, constants, view = episode.world, episode.constants, batch.shown
+    brigades, sites = world.brigades, world.sites
+    view.state[i, brigade] = observe(
+        brigade, brigades.action, brigades.site, sites, constants.observation, view.features[i, brigade]
+    )
+    chooses = can_choose(brigade, brigades.hp, brigades.refilling, sites.counts)
+    view.alive[i, brigade], view.chooses[i, brigade] = brigades.hp[brigade] > 0, chooses
+    mask, own = view.mask[i, brigade], view.own[i, brigade]
+    mask[0] = 1
+    for action in range(1, N_ACTIONS):
+        mask[action] = chooses
+    place = site_place(brigade, brigades.site, sites)
+    first, n_members = 0, 0
+    if place >= 0:
+        first, n_members = sites.start[place], sites.start[place + 1] - sites.start[place]
+    for k in range(len(own)):
+        there = chooses and k < n_members
+        mask[N_ACTIONS + k] = there
+        own[k] = sites.member[first + k] if there else -1
+    if len(view.targets):
+        for action in range(N_ACTIONS):
+            show_target(action, brigade, place >= 0, i, episode, view)
+    if len(view.brigades):
+        show_position(brigade, i, episode, view)
+
+
+@inlined
+def show_target(action: int, brigade: int, has_site: bool, i: int, episode: Episode, view: View) -> None:
+    """Write the features of the building that an action names for a brigade; MODEL 7."""
+    city, world, constants, scratch = episode.city, episode.world, episode.constants, episode.scratch
+    shown = view.targets[i, brigade, action]
+    if not has_site:
+        shown[:] = 0.0
+        return
+    see_target(
+        brigade,
+        find_target(brigade, action, world.brigades, city.buildings, world.fire, city.geometry, world.sites),
+        episode.clock[STEP] + 1,
+        world.brigades.target,
+        scratch.described,
+        scratch.described_at,
+        world.brigades,
+        city.buildings,
+        city.links,
+        city.geometry,
+        world.fire,
+        world.sites,
+        constants.fire,
+        constants.brigades,
+        scratch.seen,
+    )
+    for k in range(N_TARGET_FEATURES):
+        shown[k] = scratch.seen[k]
+
+
+@inlined
+def show_position(brigade: int, i: int, episode: Episode, view: View) -> None:
+    """Write the state of a brigade itself."""
+    brigades, frame, shown = episode.world.brigades, view.frame[i], view.brigades[i, brigade]
+    shown[0] = (brigades.x[brigade] - frame[0]) / frame[2]
+    shown[1] = (brigades.y[brigade] - frame[1]) / frame[3]
+    shown[2] = brigades.tank[brigade] / max(episode.constants.brigades.tank, 1)
+    shown[3] = brigades.refilling[brigade]
+    shown[4] = brigades.hp[brigade] / max(episode.constants.health.initial_hp, 1)
+    shown[5] = brigades.driven[brigade] > 0
+
+
+@inlined
+def show_buildings(i: int, episode: Episode, view: View) -> None:
+    """Write the burning buildings of world i and their features, as many as there is room for."""
+    city, world, sites, scratch = episode.city, episode.world, episode.world.sites, episode.scratch
+    n_burning = sites.counts[2]
+    for k in range(view.burning.shape[1]):
+        if k >= n_burning:
+            view.burning[i, k] = -1
+            view.buildings[i, k, :] = 0.0
+            continue
+        b = sites.member[k]
+        view.burning[i, k] = b
+        power = episode.constants.brigades.power
+        describe_building(
+            b,
+            city.buildings,
+            city.links,
+            city.geometry,
+            world.fire,
+            sites,
+            episode.constants.fire,
+            power,
+            scratch.described[b],
+        )
+        for j in range(scratch.described.shape[1]):
+            view.buildings[i, k, j] = scratch.described[b, j]

@@ -1,0 +1,70 @@
+"""Networks: the value of a target by layers of weighted sums of what a brigade sees of it."""
+
+from __future__ import annotations
+
+from fireworld.kernels.arrays import Array, NetworkArrays
+from fireworld.kernels.jit import inner, kernel
+
+LINEAR, RELU, TANH = 0, 1, 2
+"""Activations: what is done to the sums of a layer."""
+TANH_MOST = 20.0
+"""From there on the hyperbolic tangent is 1 in double precision."""
+
+
+@kernel
+def widest(network: NetworkArrays) -> int:
+    """Return the most inputs or outputs that a layer has; 0 without layers."""
+    width = len(network.feature)
+    for k in range(len(network.layer)):
+        width = max(width, network.layer[k, 1])
+    return width
+
+
+@kernel
+def value_by_network(network: NetworkArrays, seen: Array, work: Array) -> float:
+    """Return the value of a target by a network with layers; MODEL 8.
+
+    Every sum begins with the bias and takes the inputs in their order, so that it has the same bits on every machine.
+    `seen` (17,) float64 are the features of the target; `work` (2, w) float64, w as `widest` says, is written.
+    """
+    number, row = network.number, 0
+    for i in range(len(network.feature)):
+        work[row, i] = seen[network.feature[i]]
+    for k in range(len(network.layer)):
+        n_in, n_out, activation, place = network.layer[k]
+        came, out, row = work[row], work[1 - row, :n_out], 1 - row
+        for j in range(n_out):
+            out[j] = number[place + j]
+        for i in range(n_in):
+            place += n_out
+            add_multiple(came[i], number[place : place + n_out], out)
+        if activation == RELU:
+            for j in range(n_out):
+                out[j] = max(out[j], 0.0)
+        elif activation == TANH:
+            for j in range(n_out):
+                out[j] = tanh(out[j])
+    return work[row, 0]
+
+
+@inner
+def add_multiple(factor: float, numbers: Array, out: Array) -> None:
+    """Add a multiple of some numbers to `out`, both (k,) float64; processors do several at a time."""
+    for j in range(len(out)):
+        out[j] += factor * numbers[j]
+
+
+@inner
+def tanh(x: float) -> float:
+    """Return the hyperbolic tangent, to 1e-15 of it, from + - * / alone: libraries' differ between processors.
+
+    For x / 64 it is up / down, a convergent of Lambert's continued fraction; tanh(2 y) = 2 t / (1 + t^2), t = tanh(y),
+    taken six times, leads to x.
+    """
+    part = min(max(x, -TANH_MOST), TANH_MOST) / 64.0
+    square = part * part
+    up = part * (1.0 + square * (17325.0 + square * (378.0 + square)) / 135135.0)
+    down = 1.0 + square * (62370.0 + square * (3150.0 + square * 28.0)) / 135135.0
+    for _ in range(6):
+        up, down = 2.0 * up * down, down * down + up * up
+    return up / down

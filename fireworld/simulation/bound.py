@@ -1,0 +1,93 @@
+"""A world bound to those who act in it: all arrays that a kernel takes, and the row that says where they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from fireworld.kernels.addresses import address_row
+from fireworld.kernels.arrays import LAST_STEP, SEED, STEP, Array, Learner, PolicyArrays, Scratch, Seen
+from fireworld.kernels.choice import RANK_ALL, RANK_NAMED
+from fireworld.kernels.network import widest
+from fireworld.kernels.observation import N_ACTIONS, N_FEATURES
+from fireworld.kernels.ranking import N_OF_BUILDING, N_WEIGHTS
+from fireworld.simulation.state import NO_LEARNER
+
+
+@dataclass(frozen=True)
+class Bound:
+    """What kernels take of a world on its way; its arrays must outlive the row."""
+
+    policy: PolicyArrays
+    learner: Learner
+    seen: Seen
+    scratch: Scratch
+    clock: Array  # (3,) int64: seed, last step done, last step to do
+    row: Array  # (k,) int64, of an `Episode`
+
+    def run(self, seed: int, step: int, last_step: int) -> int:
+        """Run the steps after `step` up to the last one, or until nothing burns; return the last step run."""
+        from fireworld.kernels.episode import run_episode  # the largest kernel: compiled only where it is used
+
+        self.clock[SEED], self.clock[STEP], self.clock[LAST_STEP] = seed, step, last_step
+        run_episode(self.row)
+        return int(self.clock[STEP])
+
+
+def bind(
+    city_row: Array,
+    state_row: Array,
+    n_buildings: int,
+    policy: PolicyArrays,
+    learner: Learner = NO_LEARNER,
+    seen: Seen | None = None,
+    *,
+    describes: bool = False,
+) -> Bound:
+    """Bind a world to those who act in it.
+
+    Args:
+        city_row: address row of the city and the constants.
+        state_row: of the world's state.
+        n_buildings: buildings of the city.
+        policy: the team.
+        learner: what learns.
+        seen: where it is noted what the brigades see and choose; None: nowhere.
+        describes: there is room for the features of buildings, even if the team does not rank them.
+    """
+    ranks = describes or bool(np.isin(policy.kind, (RANK_NAMED, RANK_ALL)).any())
+    scratch, clock = fresh_scratch(policy, n_buildings if ranks else 0), np.zeros(3, dtype=np.int64)
+    noted = NOTHING_SEEN if seen is None else seen
+    rows = [address_row(group) for group in (policy, learner, noted, scratch)]
+    clock_row = clock.__array_interface__["data"][0], len(clock)
+    return Bound(policy, learner, noted, scratch, clock, np.concatenate((city_row, state_row, *rows, clock_row)))
+
+
+def fresh_scratch(policy: PolicyArrays, n_described: int) -> Scratch:
+    """Return what the steps of a team write on; `n_described`: buildings of the city if it ranks them, else 0."""
+    n_brigades = len(policy.kind)
+    return Scratch(
+        features=np.zeros(N_FEATURES, dtype=np.int64),
+        action_before=np.zeros(n_brigades, dtype=np.int32),
+        target_before=np.zeros(n_brigades, dtype=np.int32),
+        values=np.zeros(N_ACTIONS + 1),
+        described=np.zeros((n_described, N_OF_BUILDING)),
+        described_at=np.full(n_described, -1),
+        seen=np.zeros(N_WEIGHTS),
+        work=np.zeros((2, widest(policy.network))),
+    )
+
+
+def fresh_seen(n_brigades: int) -> Seen:
+    """Return room for what the brigades see and choose in a step; 0 brigades: nothing is noted."""
+    return Seen(
+        features=np.zeros((n_brigades, N_FEATURES), dtype=np.int64),
+        state=np.zeros(n_brigades, dtype=np.int64),
+        values=np.zeros((n_brigades, N_ACTIONS + 1)),
+        choice=np.zeros(n_brigades, dtype=np.uint8),
+    )
+
+
+NOTHING_SEEN: Final = fresh_seen(0)
