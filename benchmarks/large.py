@@ -45,7 +45,7 @@ READ: Final = {
     "render, a film": "render a.mcap -o film.gif",
     "export --parquet": "export a.mcap --parquet tables",
     "recover": "recover a.mcap -o recovered.mcap",
-    "fork in the middle": "fork a.mcap --at {half} --policy each-another --record fork.mcap",
+    "fork, in the middle": "fork a.mcap --at {half} --policy each-another --record fork.mcap",
     "explain, 20 replays": "explain a.mcap b.mcap --budget 20",
 }
 """By what the table calls it: a command; `a.mcap` and `b.mcap` are the runs under the two policies."""
