@@ -10,11 +10,14 @@ from functools import cache, partial
 import numpy as np
 
 from benchmarks.fires import KINDS, LOTS, Kind, city_of, every_eighth, from_the_middle
+from benchmarks.large import five_fires
 from benchmarks.runs import SEED, new_world, placement_of, run_silently, world_of
 from benchmarks.timing import Contender, Row, compare
 from fireworld.parameters import PAPER, Parameters
 from fireworld.policy.kernel import KernelPolicy, always
 from fireworld.records import ACTIONS
+from fireworld.scenario import parse_scenario
+from fireworld.simulation.built import build_scenario
 from fireworld.simulation.state import copy_into, copy_world
 from fireworld.simulation.world import World
 from tests.reference import episode
@@ -119,10 +122,24 @@ def stepping_row(size: int, n_steps: int, *, seconds: float) -> Row:
     return compare("world", f"episode of {n_steps} steps, spreading fire", label, ours, baseline, seconds=seconds)
 
 
+def scale_row(columns: int, depth: int, *, seconds: float) -> Row:
+    """Time a step of five fires, for each building: in a large city against the same in one of 1000 buildings."""
+
+    def contender(columns: int, depth: int) -> Contender:
+        built = build_scenario(parse_scenario(five_fires(columns, depth, steps=N_STEPS), source="five fires"))
+        world = built.world(seed=SEED)
+        n = world.city.n_buildings
+        return Contender(f"{n} buildings", partial(run_compiled, policy=POLICY), again(world), parts=N_STEPS * n)
+
+    ours, baseline = contender(columns, depth), contender(40, 25)
+    return compare("world", "a step, for each building", "five spreading fires", ours, baseline, seconds=seconds)
+
+
 def rows(*, quick: bool) -> Iterator[Row]:
     """Yield the rows of the world."""
     seconds = 0.3 if quick else 2.0
     for size in list(LOTS)[:2] if quick else LOTS:
         for kind in KINDS:
             yield episode_row(size, kind, seconds=seconds)
+    yield scale_row(*((60, 40) if quick else (400, 250)), seconds=seconds)
     yield stepping_row(100 if quick else 1000, N_STEPS, seconds=seconds)

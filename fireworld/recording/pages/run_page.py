@@ -16,14 +16,14 @@ from fireworld_viewer.pictures.figure_files import plain_style, png_bytes
 from fireworld_viewer.pictures.maps import draw_steps
 from fireworld_viewer.story.narration import event_lines
 from fireworld_viewer.story.series import Counts, count_choices
-from fireworld_viewer.story.steps import evenly_spaced
+from fireworld_viewer.story.steps import evenly_spaced, select_steps
 
 from fireworld.errors import one_line
 from fireworld.files import check_output, write_file
 from fireworld.html_page import compared_row, html_credit, html_figure, html_page, html_table, text_cell
 from fireworld.outcome import NOT_RECORDED, QUANTITIES
 from fireworld.recording.inputs import AnyRun, open_one_or_two, run_name
-from fireworld.records import ACTION_NAMES, EVENT_KINDS, StoredRun
+from fireworld.records import ACTION_NAMES, EVENT_KINDS, Recording, StoredRun
 from fireworld.version import simulator_version
 
 _STYLE: Final = """
@@ -49,18 +49,20 @@ def report(logs: AnyRun | Sequence[AnyRun], output: Path | str, *, force: bool =
     """
     check_output(Path(output), endings=ENDINGS, force=force)
     runs = open_one_or_two(logs)
+    maps = evenly_spaced(runs, _MAPS)
+    shown = [select_steps(run) for run in runs]  # each file is read once
     with plain_style():
-        images = {
-            "maps": png_bytes(draw_steps(runs, evenly_spaced(runs, _MAPS))),
-            "curves": png_bytes(draw_curves(runs)),
-        }
+        images = {"maps": png_bytes(draw_steps(shown, maps)), "curves": png_bytes(draw_curves(shown))}
         if any(map(_has_decisions, runs)):
-            images["timeline"] = png_bytes(draw_timeline(runs))
-    write_file(Path(output), _run_page(runs, images))
+            images["timeline"] = png_bytes(draw_timeline(shown))
+    write_file(Path(output), _run_page(runs, shown, images))
 
 
-def _run_page(logs: Sequence[StoredRun], images: Mapping[str, bytes]) -> str:
-    """Write the page, with PNG files: "maps" and "curves" of all runs, "timeline" of decisions if there is one."""
+def _run_page(logs: Sequence[StoredRun], shown: Sequence[Recording], images: Mapping[str, bytes]) -> str:
+    """Write the page, with PNG files: "maps" and "curves" of all runs, "timeline" of decisions if there is one.
+
+    `shown` are the steps of the runs, to be read often.
+    """
     names = _names(logs)
     title = " against ".join(one_line(log.header.title) for log in logs)
     rewarded = not all(log.header.lacks("rewards") for log in logs)
@@ -79,10 +81,10 @@ def _run_page(logs: Sequence[StoredRun], images: Mapping[str, bytes]) -> str:
         "<h2>Decisions</h2>",
         *([html_figure(images["timeline"], "White where a brigade made no choice: it refilled, or nothing burned.")]
           if "timeline" in images else []),
-        *(part for log, name in zip(logs, names, strict=True) for part in _decisions(log, name)),
+        *(part for steps, name in zip(shown, names, strict=True) for part in _decisions(steps, name)),
         "<h2>Events</h2>",
-        _event_counts(logs, names),
-        *(part for log, name in zip(logs, names, strict=True) for part in _events_of_note(log, name)),
+        _event_counts(shown, names),
+        *(part for steps, name in zip(shown, names, strict=True) for part in _events_of_note(steps, name)),
         f"<h2>{'Where it comes from' if imported else 'How to get the same again'}</h2>",
         *(part for log, name in zip(logs, names, strict=True) for part in _repetition(log, name)),
         *_scenarios(logs, names),
@@ -123,7 +125,7 @@ def _outcome_of(log: StoredRun) -> dict[str, str]:
     }
 
 
-def _decisions(log: StoredRun, name: str) -> Iterator[str]:
+def _decisions(log: Recording, name: str) -> Iterator[str]:
     """Write how often each brigade chose which action, and which targets it named itself."""
     if not _has_decisions(log):
         yield f"<p>{escape(name)}: {NOT_RECORDED}.</p>"
@@ -153,7 +155,7 @@ def _decisions(log: StoredRun, name: str) -> Iterator[str]:
             yield f"<p>The {_TARGETS_SHOWN} targets that each brigade pursued longest; {more} more are left out.</p>"
 
 
-def _has_decisions(log: StoredRun) -> bool:
+def _has_decisions(log: Recording) -> bool:
     return not log.header.lacks("decisions")
 
 
@@ -162,7 +164,7 @@ def _share(one: Counts, n: int) -> str:
     return f'{n} <span class="interval">{100 * n / max(1, total):.0f}&nbsp;%</span>' if n else "0"
 
 
-def _event_counts(logs: Sequence[StoredRun], names: Sequence[str]) -> str:
+def _event_counts(logs: Sequence[Recording], names: Sequence[str]) -> str:
     """Write how often each kind of event happened, and when first and last."""
     found = [_steps_by_kind(log) for log in logs]
     known = dict.fromkeys([*EVENT_KINDS, *(kind for steps in found for kind in steps)])
@@ -179,7 +181,7 @@ def _count_cells(steps: Sequence[int]) -> tuple[str, str]:
     return str(len(steps)), str(steps[0]) if steps[0] == steps[-1] else f"{steps[0]} to {steps[-1]}"
 
 
-def _steps_by_kind(log: StoredRun) -> dict[str, list[int]]:
+def _steps_by_kind(log: Recording) -> dict[str, list[int]]:
     steps: dict[str, list[int]] = {kind: [] for kind in EVENT_KINDS}
     for step, kinds in zip(log.steps.tolist(), log.ragged("/events", "kind"), strict=True):
         for kind in np.asarray(kinds).tolist():
@@ -192,7 +194,7 @@ def _event_kind(kind: int) -> str:
     return EVENT_KINDS[kind] if kind < len(EVENT_KINDS) else f"kind {kind}"
 
 
-def _events_of_note(log: StoredRun, name: str) -> Iterator[str]:
+def _events_of_note(log: Recording, name: str) -> Iterator[str]:
     """List what happened to people, fires that are out, and the first of what happens often."""
     kinds = [_event_kind(kind) for row in log.ragged("/events", "kind") for kind in np.asarray(row).tolist()]
     met: set[str] = set()
