@@ -9,8 +9,8 @@ from typing import Final
 
 __version__ = "0.1.0"
 _SIMULATOR: Final = (
-    "city", "draws.py", "kernels", "parameters.py", "planning", "policy", "rewards.py", "scenario", "scores.py",
-    "simulation",
+    "city", "draws.py", "events.py", "kernels", "parameters.py", "planning", "policy", "rewards.py", "scenario",
+    "scores.py", "simulation",
 )  # fmt: skip
 _SHOWN: Final = 12
 

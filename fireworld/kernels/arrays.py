@@ -27,6 +27,7 @@ Int64x3 = Annotated[Array, np.int64, 3]
 Int32 = Annotated[Array, np.int32, 1]
 Int32x2 = Annotated[Array, np.int32, 2]
 Int32x3 = Annotated[Array, np.int32, 3]
+UInt64 = Annotated[Array, np.uint64, 1]
 UInt64x2 = Annotated[Array, np.uint64, 2]
 UInt32 = Annotated[Array, np.uint32, 1]
 UInt8 = Annotated[Array, np.uint8, 1]
@@ -348,8 +349,15 @@ class Seen(NamedTuple):
 
     features: Int64x2  # (b, 8)
     state: Int64  # (b,), -1 without a site
-    values: Float64x2  # (b, 5), of the four actions' targets and of the one chosen, where a ranking chooses
     choice: UInt8  # (b,), how it came to its action: position in fireworld.records.CHOICES
+    explored: UInt8  # (b,), 1 where that was a random draw
+    action_values: Float64x2  # (b, 4), of the four actions, by the table, ranking or network that chose; else 0
+    target_value: Float64  # (b,), of the target, where a ranking or network chose; else 0
+    valued: UInt8  # (2,), whether anyone chose BY_TABLE, and BY_RANK
+
+
+BY_TABLE, BY_RANK = 0, 1
+"""Where a choice's values come from; places in `Seen.valued`."""
 
 
 class Scratch(NamedTuple):

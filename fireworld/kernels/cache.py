@@ -44,13 +44,15 @@ UNUSED_DAYS_MAX: Final = 30
 DAY_SECONDS: Final = 86400.0
 
 _SOURCES: Final = Path(__file__).parent
+COMPILED_ELSEWHERE: Final = ("draws.py", "events.py", "records.py", "rewards.py", "scores.py")
+"""Files beside the folder of kernels that have functions and constants which are compiled with them."""
 
 
 def sources_digest() -> str:
     """Digest all kernel sources, their data, the constants compiled into them and the version of the compiler."""
     versions = f"{numba.__version__} {llvmlite.__version__} {sys.version_info[:2]} {OPEN}"
     digest = hashlib.sha256(versions.encode())
-    for path in [*sorted(_SOURCES.iterdir()), _SOURCES.parent / "draws.py", _SOURCES.parent / "rewards.py"]:
+    for path in [*sorted(_SOURCES.iterdir()), *(_SOURCES.parent / name for name in COMPILED_ELSEWHERE)]:
         if path.suffix in {".py", ".npy"}:
             digest.update(path.name.encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]

@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
-from fireworld.kernels.arrays import BURNING, LAST_STEP, SEED, STEP, TOTAL, Array, Episode
-from fireworld.kernels.choice import GIVEN, RANK_ALL, RANK_NAMED, choose, explores, keeps_choice, table_state
+from fireworld.kernels.arrays import (
+    BURNING,
+    BY_RANK,
+    BY_TABLE,
+    LAST_STEP,
+    SEED,
+    STEP,
+    TOTAL,
+    Array,
+    Episode,
+    Seen,
+)
+from fireworld.kernels.choice import GIVEN, RANK_ALL, RANK_NAMED, TABLE, choose, explores, keeps_choice, table_state
 from fireworld.kernels.fire import is_over, light
-from fireworld.kernels.jit import inlined, kernel
+from fireworld.kernels.jit import inlined, inner, kernel
 from fireworld.kernels.learning import (
     EXPLORED,
     GREEDY,
@@ -19,10 +30,18 @@ from fireworld.kernels.learning import (
     take_reward,
     update,
 )
-from fireworld.kernels.observation import can_choose, find_target, observe
+from fireworld.kernels.observation import N_ACTIONS, can_choose, find_target, observe
 from fireworld.kernels.ranking import OWN_TARGET, rank
 from fireworld.kernels.sites import find_sites
 from fireworld.kernels.step import finish_step, opened_episode
+
+
+@inner
+def note_values(brigade: int, values: Array, source: int, seen: Seen) -> None:
+    """Note the values of the actions, (4,), by which a brigade chose; `source`: BY_TABLE or BY_RANK."""
+    seen.valued[source] = 1
+    for action in range(N_ACTIONS):
+        seen.action_values[brigade, action] = values[action]
 
 
 @inlined
@@ -57,12 +76,16 @@ def run_steps(episode: Episode) -> None:  # noqa: C901, PLR0912, PLR0915 - to ha
             known_before[brigade] = brigades.target[brigade]
         in_turn = constants.observation.in_turn
         shown, known = (brigades.action, brigades.target) if in_turn else (before, known_before)
+        if noting:
+            seen.valued[:] = 0
         for brigade in range(n_brigades):
             action, target, choice = -1, -1, NO_CHOICE
             if noting:
                 seen.state[brigade] = observe(
                     brigade, shown, brigades.site, sites, constants.observation, seen.features[brigade]
                 )
+                seen.action_values[brigade] = 0.0
+                seen.target_value[brigade] = 0.0
             if learning:
                 note_choice(brigade, step - 1, -1, 0, NO_CHOICE, learner)
             if can_choose(brigade, brigades.hp, brigades.refilling, sites.counts):
@@ -101,12 +124,18 @@ def run_steps(episode: Episode) -> None:  # noqa: C901, PLR0912, PLR0915 - to ha
                         constants.brigades,
                         scratch.seen,
                         scratch.work,
-                        seen.values[brigade] if noting else values,
+                        values,
                     )
+                    if noting:
+                        note_values(brigade, values, BY_RANK, seen)
+                        seen.target_value[brigade] = values[N_ACTIONS]
                 else:
                     state = observe(brigade, shown, brigades.site, sites, constants.observation, features)
                     action = choose(brigade, state, policy, seed, step)
                     choice = EXPLORED if explores(brigade, policy, seed, step) else GREEDY
+                    if noting and policy.kind[brigade] == TABLE:
+                        row = table_state(state, policy.tables.shape[1])
+                        note_values(brigade, policy.tables[policy.table_of[brigade], row], BY_TABLE, seen)
                     if learning:
                         row = table_state(state, policy.tables.shape[1])
                         choose_and_learn(brigade, policy.table_of[brigade], row, action, policy.epsilon[0], learner)
@@ -116,7 +145,7 @@ def run_steps(episode: Episode) -> None:  # noqa: C901, PLR0912, PLR0915 - to ha
             brigades.action[brigade] = action
             brigades.target[brigade] = target
             if noting:
-                seen.choice[brigade] = choice
+                seen.choice[brigade], seen.explored[brigade] = choice, choice == EXPLORED
         if step > last_step:
             break
         clock[STEP] = step

@@ -94,7 +94,9 @@ class KernelPolicy(Policy):
         if ready.kind[brigade] != TABLE:
             return Decision(action)
         explored = bool(explores(brigade, ready, seed, step))
-        return _by_table(ready, brigade, action, observation.state_index, explored=explored)
+        row = table_state(observation.state_index, ready.tables.shape[1])
+        values = tuple(ready.tables[ready.table_of[brigade], row].tolist())
+        return Decision(action, q_values=values, explored=explored, epsilon=float(ready.epsilon[0]))
 
     def keeps(self, brigade: int, last_action: int, step: int) -> bool:
         """Return whether a brigade repeats what it chose before."""
@@ -133,22 +135,17 @@ def noted_decisions(
         elif choice == KEPT:
             decisions.append(Decision(act, target=int(last_target[brigade])))
         elif kind in (RANK_NAMED, RANK_ALL):
-            *values, value = seen.values[brigade].tolist()
             own = int(target[brigade]) if kind == RANK_ALL else None
-            decisions.append(Decision(act, target=own, q_values=tuple(values), value=value))
+            values = tuple(seen.action_values[brigade].tolist())
+            decisions.append(Decision(act, target=own, q_values=values, value=float(seen.target_value[brigade])))
         elif kind == TABLE:
-            decisions.append(_by_table(ready, brigade, act, int(seen.state[brigade]), explored=choice == EXPLORED))
+            values, epsilon = tuple(seen.action_values[brigade].tolist()), float(ready.epsilon[0])
+            decisions.append(Decision(act, q_values=values, explored=choice == EXPLORED, epsilon=epsilon))
         elif kind == GIVEN and act == Action.OWN_TARGET:
             decisions.append(Decision(act, target=int(target[brigade])))
         else:
             decisions.append(Decision(act))
     return tuple(decisions)
-
-
-def _by_table(ready: PolicyArrays, brigade: int, action: int, state: int, *, explored: bool) -> Decision:
-    row = table_state(state, ready.tables.shape[1])
-    values = ready.tables[ready.table_of[brigade], row].tolist()
-    return Decision(action, q_values=tuple(values), explored=explored, epsilon=float(ready.epsilon[0]))
 
 
 def _by_rank(observation: Observation, ready: PolicyArrays) -> Decision:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -29,11 +31,18 @@ class Bound:
 
     def run(self, seed: int, step: int, last_step: int) -> int:
         """Run the steps after `step` up to the last one, or until nothing burns; return the last step run."""
-        from fireworld.kernels.episode import run_episode  # the largest kernel: compiled only where it is used
-
         self.clock[SEED], self.clock[STEP], self.clock[LAST_STEP] = seed, step, last_step
-        run_episode(self.row)
+        _run_episode()(self.row)
         return int(self.clock[STEP])
+
+
+@cache
+def _run_episode() -> Callable[[Array], None]:
+    """Return the largest kernel: it is imported only where it is used, and once."""
+    from fireworld.kernels.episode import run_episode
+
+    kernel: Callable[[Array], None] = run_episode
+    return kernel
 
 
 def bind(
@@ -85,8 +94,11 @@ def fresh_seen(n_brigades: int) -> Seen:
     return Seen(
         features=np.zeros((n_brigades, N_FEATURES), dtype=np.int64),
         state=np.zeros(n_brigades, dtype=np.int64),
-        values=np.zeros((n_brigades, N_ACTIONS + 1)),
         choice=np.zeros(n_brigades, dtype=np.uint8),
+        explored=np.zeros(n_brigades, dtype=np.uint8),
+        action_values=np.zeros((n_brigades, N_ACTIONS)),
+        target_value=np.zeros(n_brigades),
+        valued=np.zeros(2, dtype=np.uint8),
     )
 
 

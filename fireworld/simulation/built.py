@@ -53,20 +53,30 @@ class BuiltScenario:
 
     def city_record(self) -> CityRecord:
         """Return the city as it is recorded."""
+        return self._city_record
+
+    @cached_property
+    def _city_record(self) -> CityRecord:
         return city_record(self.city, self.placement, self.scenario.resolved_parameters)
+
+    @cached_property
+    def _carried(self) -> tuple[str, dict[str, bytes]]:
+        """The scenario's digest, and the files that a replay needs."""
+        return self.scenario.digest, attachments(self.scenario)
 
     def header(self, *, seed: int, policy: str, policy_digest: str, n_steps_max: int) -> RunHeader:
         """Return what identifies a run of this scenario."""
+        digest, files = self._carried
         return RunHeader(
             scenario=self.scenario.name,
-            scenario_digest=self.scenario.digest,
+            scenario_digest=digest,
             seed=seed,
             policy=policy,
             policy_digest=policy_digest,
             fireworld_version=__version__,
             simulator_digest=simulator_digest(),
             n_steps_max=n_steps_max,
-            attachments=attachments(self.scenario),
+            attachments=dict(files),
         )
 
 

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from dataclasses import fields
+from typing import Any, Final
 
 import numpy as np
 
 from fireworld.city.city import City
 from fireworld.city.outlines import without_repeats
-from fireworld.draws import STEP, hash_key
-from fireworld.kernels.arrays import DRAWS, Array
-from fireworld.kernels.brigades import REFILLING
+from fireworld.kernels.addresses import address_row, fields_of
+from fireworld.kernels.arrays import Array
+from fireworld.kernels.observation import N_FEATURES
+from fireworld.kernels.recorded import Before, Happened, Recorded, most_events, record_step
 from fireworld.parameters import Parameters
 from fireworld.policy.words import FEATURES
 from fireworld.records import (
+    DTYPES,
     SNAPSHOT_EVERY_STEPS,
     Brigades,
     Buildings,
@@ -26,11 +28,12 @@ from fireworld.records import (
     Observations,
     Snapshot,
     StepRecord,
+    filled,
 )
-from fireworld.simulation.changes import BURNING, events_of, fire_changes, zero_against_more
+from fireworld.simulation.choices import Choices
 from fireworld.simulation.placement import Placement
 from fireworld.simulation.state import rewards_of, score_of, take_snapshot
-from fireworld.simulation.world import Choices, World
+from fireworld.simulation.world import World
 
 
 def city_record(city: City, placement: Placement, parameters: Parameters) -> CityRecord:
@@ -84,157 +87,145 @@ def _in_metres(name: str, points_mm: Array) -> dict[str, Any]:
     return {f"{name}_{axis}_m": points_mm[:, k] / 1000.0 for k, axis in enumerate("xy")}
 
 
+NO_BYTES: Final = np.zeros(0, dtype=np.uint8)
+NO_INTS: Final = np.zeros(0, dtype=np.int32)
+NO_NUMBERS: Final = np.zeros(0)
+NO_CHOICES: Final = Choices(np.zeros((0, N_FEATURES), dtype=np.int64), np.zeros(0, dtype=np.int64))
+NOTHING_SEEN: Final = Observations(*[np.zeros(0, DTYPES[item.metadata["wire"]]) for item in fields(Observations)])
+NOTHING_CHOSEN: Final = Decisions(NO_INTS, NO_INTS, NO_BYTES, NO_NUMBERS, 0.0, NO_NUMBERS, NO_NUMBERS)
+NO_EVENTS: Final = Events(NO_BYTES, NO_INTS)
+NO_CIVILIANS: Final = Civilians(NO_INTS, NO_NUMBERS)
+OF_BRIGADES: Final = ("x_m", "y_m", "driven_m", "site", "state_index", *(feature.name for feature in FEATURES))
+"""What `Recorded` has of each brigade."""
+
+
 class Observer:
     """Watches one world. Call `record` before the first step and after each one."""
 
     def __init__(self, world: World) -> None:
         self.world = world
-        self._remember()
+        self._before, self._recorded, self._happened = _before(world), _fresh_recorded(world), _no_events(world)
+        own = (address_row(group) for group in (self._before, self._recorded, self._happened))
+        self._row = np.concatenate((address_row(world.city_arrays.buildings), world.row(), *own))
 
     def record(self, choices: Choices | None = None) -> StepRecord:
         """Return the record of the step just done, with what `World.step` returned; without that, of the start."""
-        world = self.world
-        events = self._events() if choices is not None else events_of([])
+        world, made = self.world, self._recorded
+        seen = choices if choices is not None else NO_CHOICES
+        record_step(self._row, world.seed, world.step_number, seen.features, seen.state_index)
+        n_sites, n_events = made.n_sites.item(), self._happened.n.item()
+        key, (burn_rate_sum, health_sum) = made.key.item(), world.state.outcome.draws.tolist()
         snapshot_due = world.step_number % SNAPSHOT_EVERY_STEPS == 0
-        record = StepRecord(
-            step=world.step_number,
-            draws=Draws(
-                key=hash_key(world.seed, STEP, 0, world.step_number),
-                **dict(zip(DRAWS, world.state.outcome.draws.tolist(), strict=True)),
-            ),
-            observations=self._observations(choices),
-            decisions=self._decisions(choices),
-            brigades=self._brigades(),
-            buildings=self._buildings(),
-            civilians=Civilians(hp=world.state.civilians.hp.copy(), damage=world.state.civilians.damage.copy()),
-            rewards=rewards_of(world.state),
-            score=score_of(world.state),
-            events=events,
-            terminated=world.terminated,
-            truncated=world.truncated,
-            snapshot=Snapshot(take_snapshot(world.state)) if snapshot_due else None,
-        )
-        self._remember()
-        return record
-
-    def _watched(self) -> dict[str, Array]:
-        """Return the arrays that events follow from."""
-        state = self.world.state
-        return {
-            "fieryness": state.fire.fieryness,
-            "civilian_hp": state.civilians.hp,
-            "civilian_damage": state.civilians.damage,
-            "brigade_hp": state.brigades.hp,
-            "brigade_damage": state.brigades.damage,
-            "tank": state.brigades.tank,
-            "refilling": state.brigades.refilling,
+        step = {
+            "step": world.step_number,
+            "draws": filled(Draws, {"key": key, "burn_rate_sum": burn_rate_sum, "health_sum": health_sum}),
+            "observations": self._observations(n_sites) if choices is not None else NOTHING_SEEN,
+            "decisions": self._decisions(choices) if choices is not None else NOTHING_CHOSEN,
+            "brigades": self._brigades(),
+            "buildings": self._buildings(),
+            "civilians": self._civilians(),
+            "rewards": rewards_of(world.state),
+            "score": score_of(world.state),
+            "events": self._events(n_events) if choices is not None and n_events else NO_EVENTS,
+            "terminated": world.terminated,
+            "truncated": world.truncated,
+            "snapshot": Snapshot(take_snapshot(world.state)) if snapshot_due else None,
         }
+        return filled(StepRecord, step)
 
-    def _remember(self) -> None:
-        self._before = {name: array.copy() for name, array in self._watched().items()}
+    def _observations(self, n_sites: int) -> Observations:
+        made = self._recorded
+        seen = {
+            "site": made.site.copy(),
+            "free_edges": made.free_edges.copy(),
+            "distance_from_center": made.distance_from_center.copy(),
+            "distance_from_civilian": made.distance_from_civilian.copy(),
+            "volume": made.volume.copy(),
+            "others_easiest": made.others_easiest.copy(),
+            "others_nearest_to_civilian": made.others_nearest_to_civilian.copy(),
+            "others_nearest_to_center": made.others_nearest_to_center.copy(),
+            "others_nearest_to_me": made.others_nearest_to_me.copy(),
+            "state_index": made.state_index.copy(),
+            "site_id": made.site_id[:n_sites].copy(),
+            "site_free_sides": made.site_free_sides[:n_sites].copy(),
+            "site_n_burning": made.site_n_burning[:n_sites].copy(),
+            "site_volume_m3": made.site_volume_m3[:n_sites].copy(),
+            "site_west_m": made.site_west_m[:n_sites].copy(),
+            "site_south_m": made.site_south_m[:n_sites].copy(),
+            "site_east_m": made.site_east_m[:n_sites].copy(),
+            "site_north_m": made.site_north_m[:n_sites].copy(),
+        }
+        return filled(Observations, seen)
 
-    def _observations(self, choices: Choices | None) -> Observations:
-        arrays = self.world.state
-        sites, n = arrays.sites, int(arrays.sites.counts[0])
-        if choices is None:
-            features = np.zeros((8, 0), dtype=np.uint8)
-            states, site, n = np.zeros(0, dtype=np.int32), np.zeros(0, dtype=np.int32), 0
-        else:
-            features = choices.features.T.astype(np.uint8, order="C")  # so that each feature lies in one piece
-            states = choices.state_index.astype(np.int32)
-            site = np.where(arrays.brigades.site > 0, arrays.brigades.site, np.int32(-1))
-        order = sites.number[:n].argsort(kind="stable")
-        return Observations(
-            site=site,
-            **{feature.name: column for feature, column in zip(FEATURES, features, strict=True)},
-            state_index=states,
-            site_id=sites.number[order],
-            site_free_sides=sites.free_sides[order],
-            site_n_burning=sites.start[order + 1] - sites.start[order],
-            site_volume_m3=sites.volume[order],
-            site_west_m=sites.west[order] / 1000.0,
-            site_south_m=sites.south[order] / 1000.0,
-            site_east_m=sites.east[order] / 1000.0,
-            site_north_m=sites.north[order] / 1000.0,
-        )
-
-    def _decisions(self, choices: Choices | None) -> Decisions:
-        if choices is None:
-            empty = np.zeros(0, dtype=np.int32)
-            return Decisions(empty, empty, empty.astype(np.uint8), np.zeros(0), 0.0, np.zeros(0))
-        brigades = self.world.state.brigades
-        decisions = choices.decisions
-        known = any(decision.q_values is not None for decision in decisions)
-        ranked = any(decision.value is not None for decision in decisions)
-        values = [decision.q_values or (0.0, 0.0, 0.0, 0.0) for decision in decisions] if known else []
-        return Decisions(
-            action=brigades.action.copy(),
-            target=brigades.target.copy(),
-            explored=np.array([decision.explored for decision in decisions], dtype=np.uint8),
-            q_values=np.array(values, dtype=np.float64).ravel(),
-            epsilon=max((float(decision.epsilon) for decision in decisions), default=0.0),
-            td_error=np.zeros(0),
-            target_value=np.array(
-                [decision.value or 0.0 for decision in decisions] if ranked else [], dtype=np.float64
-            ),
-        )
+    def _decisions(self, choices: Choices) -> Decisions:
+        brigades, (explored, q_values, epsilon, target_value) = self.world.state.brigades, choices.reasons
+        made = {
+            "action": brigades.action.copy(),
+            "target": brigades.target.copy(),
+            "explored": explored,
+            "q_values": q_values,
+            "epsilon": epsilon,
+            "td_error": NO_NUMBERS,
+            "target_value": target_value,
+        }
+        return filled(Decisions, made)
 
     def _brigades(self) -> Brigades:
-        brigades = self.world.state.brigades
-        return Brigades(
-            x_m=brigades.x / 1000.0,
-            y_m=brigades.y / 1000.0,
-            activity=brigades.activity.copy(),
-            tank_litres=brigades.tank.copy(),
-            sprayed_litres=brigades.sprayed.copy(),
-            driven_m=brigades.driven / 1000.0,
-            hp=brigades.hp.copy(),
-            damage=brigades.damage.copy(),
-        )
+        made, brigades = self._recorded, self.world.state.brigades
+        done = {
+            "x_m": made.x_m.copy(),
+            "y_m": made.y_m.copy(),
+            "activity": brigades.activity.copy(),
+            "tank_litres": brigades.tank.copy(),
+            "sprayed_litres": brigades.sprayed.copy(),
+            "driven_m": made.driven_m.copy(),
+            "hp": brigades.hp.copy(),
+            "damage": brigades.damage.copy(),
+        }
+        return filled(Brigades, done)
 
     def _buildings(self) -> Buildings:
-        fire = self.world.state.fire
-        temperature = fire.energy / self.world.city_arrays.buildings.capacity
-        return Buildings(
-            temperature=(np.rint(temperature * TEMPERATURE_STEPS) / TEMPERATURE_STEPS).astype(np.float32),
-            energy=fire.energy.copy(),
-            fuel_share=fire.fuel / self.world.city_arrays.buildings.initial_fuel,
-            water_litres=fire.water.copy(),
-            fieryness=fire.fieryness.copy(),
-        )
+        made, fire = self._recorded, self.world.state.fire
+        burning = {
+            "temperature": made.temperature.copy(),
+            "energy": fire.energy.copy(),
+            "fuel_share": made.fuel_share.copy(),
+            "water_litres": fire.water.copy(),
+            "fieryness": fire.fieryness.copy(),
+        }
+        return filled(Buildings, burning)
 
-    def _events(self) -> Events:
-        """Return what changed, in the order of the phases."""
-        before, now = self._before, self._watched()
-        refilled = zero_against_more(now["refilling"], before["refilling"])
-        activity = self.world.state.brigades.activity
-        return events_of(
-            [
-                ("refilled", [brigade for brigade in refilled if activity[brigade] == REFILLING]),
-                ("tank-empty", zero_against_more(now["tank"], before["tank"])),
-                *self._fire_events(),
-                ("civilian-hurt", zero_against_more(before["civilian_damage"], now["civilian_damage"])),
-                ("civilian-died", zero_against_more(now["civilian_hp"], before["civilian_hp"])),
-                ("brigade-hurt", zero_against_more(before["brigade_damage"], now["brigade_damage"])),
-                ("brigade-died", zero_against_more(now["brigade_hp"], before["brigade_hp"])),
-            ]
-        )
+    def _civilians(self) -> Civilians:
+        civilians = self.world.state.civilians
+        return filled(Civilians, vars(NO_CIVILIANS) | {"hp": civilians.hp.copy(), "damage": civilians.damage.copy()})
 
-    def _fire_events(self) -> list[tuple[str, Sequence[int]]]:
-        """Return what happened to buildings and sites."""
-        code, site = self.world.state.fire.fieryness, self.world.state.sites.label
-        found = fire_changes(self._before["fieryness"], code)
-        return [*found.events, ("site-out", _sites_out(site, code, found.stopped) if found.stopped else [])]
+    def _events(self, n_events: int) -> Events:
+        kind, entity = self._happened.kind[:n_events].copy(), self._happened.entity[:n_events].copy()
+        return filled(Events, {"kind": kind, "entity": entity})
 
 
-TEMPERATURE_STEPS = 64.0
-"""Recorded temperatures are rounded to this part of a degree: noise in the last bits would not compress."""
-
-
-def _sites_out(site: Array, code: Array, stopped: Sequence[int]) -> list[int]:
-    """List, rising, the sites that the buildings that burn no more belonged to, and in which nothing else burns."""
-    touched = set(site[stopped].tolist()) - {0}
-    n_burning = np.bincount(
-        site[(code >= BURNING.start) & (code < BURNING.stop)], minlength=max(touched, default=0) + 1
+def _before(world: World) -> Before:
+    """Return what events of the next step follow from."""
+    fire, civilians, brigades = world.state.fire, world.state.civilians, world.state.brigades
+    return Before(
+        fieryness=fire.fieryness.copy(),
+        civilian_hp=civilians.hp.copy(),
+        civilian_damage=civilians.damage.copy(),
+        brigade_hp=brigades.hp.copy(),
+        brigade_damage=brigades.damage.copy(),
+        tank=brigades.tank.copy(),
+        refilling=brigades.refilling.copy(),
     )
-    return [number for number in sorted(touched) if n_burning[number] == 0]
+
+
+def _fresh_recorded(world: World) -> Recorded:
+    """Return room for what is recorded of a world."""
+    n, b = world.city.n_buildings, world.n_brigades
+    lengths = {"key": 1, "n_sites": 1} | dict.fromkeys(OF_BRIGADES, b)
+    return Recorded(*(np.zeros(lengths.get(name, n), dtype) for name, (dtype, _) in fields_of(Recorded)))
+
+
+def _no_events(world: World) -> Happened:
+    """Return room for the events of a step."""
+    n = most_events(world.city.n_buildings, len(world.state.civilians.hp), world.n_brigades)
+    return Happened(np.zeros(1, dtype=np.int64), np.zeros(n, dtype=np.uint8), np.zeros(n, dtype=np.int32))

@@ -27,7 +27,7 @@ from fireworld.kernels.arrays import (
     WorldState,
 )
 from fireworld.parameters import Parameters
-from fireworld.records import Rewards, Score
+from fireworld.records import Rewards, Score, filled
 from fireworld.rewards import TERMS
 from fireworld.simulation.city_arrays import air_shape
 from fireworld.simulation.placement import Placement
@@ -42,6 +42,8 @@ WAYS: Final = "ways"
 """The group of what a world remembers of its streets: no part of a snapshot, a copy or a comparison."""
 REWARDS: Final = (*(term.name for term in TERMS), "total", "sum_so_far")
 """Fields of `Rewards` in the order of the outcome's array."""
+SCORE: Final = (*SCORES, *COUNTS, "water_used_litres")
+"""Fields of `Score` in the order of the outcome's arrays."""
 
 
 def warm_spans(warm: Array, shape: tuple[int, ...]) -> Array:
@@ -199,15 +201,14 @@ def fresh_world(city: City, streets: StreetArrays, parameters: Parameters, place
 
 def rewards_of(world: WorldState) -> Rewards:
     """Return what the last step was worth, as it is recorded."""
-    return Rewards(**dict(zip(REWARDS, world.outcome.reward.tolist(), strict=True)))
+    return filled(Rewards, dict(zip(REWARDS, world.outcome.reward.tolist(), strict=True)))
 
 
 def score_of(world: WorldState) -> Score:
     """Return how the world stands, as it is recorded."""
     outcome = world.outcome
-    scores = dict(zip(SCORES, outcome.score.tolist(), strict=True))
-    counts = dict(zip(COUNTS, outcome.counts.tolist(), strict=True))
-    return Score(**scores, **counts, water_used_litres=outcome.water.item())
+    values = *outcome.score.tolist(), *outcome.counts.tolist(), outcome.water.item()
+    return filled(Score, dict(zip(SCORE, values, strict=True)))
 
 
 def named_arrays(world: WorldState | CityArrays) -> Iterator[tuple[str, Array]]:

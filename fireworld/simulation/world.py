@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -32,11 +32,12 @@ from fireworld.kernels.step import finish, look
 from fireworld.outcome import Outcome, outcome_at
 from fireworld.parameters import Parameters
 from fireworld.policy.asking import ask, complete, keeps
-from fireworld.policy.kernel import KernelPolicy, given, noted_decisions
+from fireworld.policy.kernel import KernelPolicy, given
 from fireworld.policy.protocol import Action, Decision, Observation, Policy, named_target
 from fireworld.rewards import Reward, reward_of
 from fireworld.scenario import document
 from fireworld.simulation.bound import NOTHING_SEEN, Bound, bind, fresh_seen
+from fireworld.simulation.choices import Choices, NotedChoices
 from fireworld.simulation.city_arrays import (
     brigade_constants,
     city_arrays,
@@ -110,21 +111,6 @@ def prepare_start(
     assess(state.fire, state.civilians, arrays.geometry, constants.reward, state.outcome)
     state.outcome.reward[:] = 0.0  # the start is not rewarded
     return Start(city, arrays, constants, state)
-
-
-@dataclass
-class Choices:
-    """What the brigades saw and decided in a step."""
-
-    features: Array  # (b, 8) int64
-    state_index: Array  # (b,) int64, -1 none
-    decide: Callable[[], tuple[Decision, ...]]
-    """Returns the decisions."""
-
-    @cached_property
-    def decisions(self) -> tuple[Decision, ...]:
-        """What each brigade decided, (b,)."""
-        return self.decide()
 
 
 class World:
@@ -218,9 +204,9 @@ class World:
     def _step_in_kernel(self, policy: PolicyArrays) -> Choices:
         bound = self._bind(policy, NO_LEARNER, self._seen)
         self.step_number = bound.run(self.seed, self.step_number, self.step_number + 1)
-        brigades, seen = self.state.brigades, Seen(*(array.copy() for array in self._seen))
+        brigades, seen = self.state.brigades, Seen(*[array.copy() for array in self._seen])
         made = brigades.action.copy(), brigades.target.copy(), bound.scratch.target_before.copy()
-        return Choices(seen.features, seen.state, lambda: noted_decisions(policy, seen, *made))
+        return NotedChoices(policy, seen, *made)
 
     def act(self, actions: Sequence[int]) -> None:
         """Run one step in which the brigades that choose do (b,) `actions`, 0..3: as `step` does, but nothing is noted.
@@ -238,6 +224,10 @@ class World:
             self.step_number = bound.run(self.seed, self.step_number, self.n_steps_max)
         return self.step_number
 
+    def row(self) -> Array:
+        """Return the address row of the state."""
+        return self.start.packing.row(self.memory, self.state.ways)
+
     def bound(self, policy: PolicyArrays, *, describes: bool = True) -> Bound:
         """Return what kernels take of this world and a team, for loops of kernels of their own.
 
@@ -245,8 +235,7 @@ class World:
             policy: the team.
             describes: there is room for the features of buildings, whether the team needs them or not.
         """
-        row = self.start.packing.row(self.memory, self.state.ways)
-        return bind(self.start.row, row, self.city.n_buildings, policy, describes=describes)
+        return bind(self.start.row, self.row(), self.city.n_buildings, policy, describes=describes)
 
     def digest(self) -> str:
         """Return a digest of all that the rest of the run follows from: state, seed and step."""
@@ -259,8 +248,7 @@ class World:
         """Return what kernels take of this world and those who act in it, with the clock as it stands."""
         bound = self._bound
         if bound is None or bound.policy is not policy or bound.learner is not learner or bound.seen is not seen:
-            row = self.start.packing.row(self.memory, self.state.ways)
-            bound = self._bound = bind(self.start.row, row, self.city.n_buildings, policy, learner, seen)
+            bound = self._bound = bind(self.start.row, self.row(), self.city.n_buildings, policy, learner, seen)
         bound.clock[SEED], bound.clock[STEP] = self.seed, self.step_number
         return bound
 
@@ -283,7 +271,7 @@ class World:
                     decisions[brigade] = ask(policy, seen)
                 target = self._target(brigade, decisions[brigade])
             brigades.action[brigade], brigades.target[brigade] = decisions[brigade].action, target
-        return Choices(features=features, state_index=states, decide=lambda: tuple(decisions))
+        return Choices(features, states, decisions)
 
     def _can_keep(self, brigade: int, last: Decision) -> bool:
         """Return whether a choice can be repeated: a target of its own only while it burns in the brigade's site."""

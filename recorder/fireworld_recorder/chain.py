@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import replace
+import struct
+from collections.abc import Mapping
 from typing import Any, Final
 
-from fireworld.records import STEP_TOPICS, CityRecord, StepRecord
+from fireworld.records import STEP_TOPICS, CityRecord, StepRecord, filled
 from fireworld_recorder.codec import Buffer, encode
 from fireworld_recorder.kind import RUN, LogKind
 from fireworld_recorder.schema import Commit
@@ -14,7 +15,9 @@ from fireworld_recorder.schema import Commit
 SCENE_PREFIX: Final = "/scene/"
 """What the topics begin with that show a step to other tools: derived from it, not chained, any number in a step."""
 
-_PARTS: Final = [(topic.topic, topic.topic[1:]) for topic in STEP_TOPICS]
+TOPICS_OF_A_STEP: Final[Mapping[str, str]] = {topic.topic: topic.topic[1:] for topic in STEP_TOPICS}
+"""Topics without snapshot and commit, and what they are called in a `StepRecord`."""
+_LENGTH: Final = struct.Struct("<Q")
 
 
 class Chain:
@@ -28,12 +31,19 @@ class Chain:
     def __init__(self, first: Buffer, kind: LogKind = RUN) -> None:
         self.hash = hashlib.sha256(kind.format.encode() + bytes(first)).digest()
         self._unchained = kind.unchained
+        self._heads: dict[str, bytes] = {}  # what comes before the messages of a topic, empty if it is left out
         self._parts: list[Buffer] = []  # of the step under way: one long call of the hash beats many short ones
 
     def add(self, topic: str, data: Buffer) -> None:
         """Add a message of the step under way but /commit; what follows from others and the scene are left out."""
-        if topic not in self._unchained and not topic.startswith(SCENE_PREFIX):
-            self._update(topic, data)
+        head = self._heads.get(topic)
+        if head is None:
+            chained = topic not in self._unchained and not topic.startswith(SCENE_PREFIX)
+            head = self._heads[topic] = _head(topic) if chained else b""
+        if head:
+            self._parts.append(head)
+            self._parts.append(_LENGTH.pack(len(data)))
+            self._parts.append(data)
 
     def commit(self, *, step: int, terminated: bool, truncated: bool) -> Commit:
         """End the step under way and return its commit."""
@@ -42,19 +52,26 @@ class Chain:
 
     def seal(self, commit: Any) -> Any:
         """End what is under way with a commit whose hash is empty; return the commit with its hash."""
-        self._update(commit.topic, encode(commit))
-        self.hash = hashlib.sha256(b"".join((self.hash, *self._parts))).digest()
+        data = encode(commit)
+        parts = (self.hash, *self._parts, _head(commit.topic), _LENGTH.pack(len(data)), data)
+        self.hash = hashlib.sha256(b"".join(parts)).digest()
         self._parts.clear()
-        return replace(commit, hash=self.hash)
-
-    def _update(self, topic: str, data: Buffer) -> None:
-        self._parts += (topic.encode(), b"\0", len(data).to_bytes(8, "little"), data)
+        return filled(type(commit), vars(commit) | {"hash": self.hash})
 
 
-def step_messages(record: StepRecord) -> list[tuple[str, bytes]]:
-    """Encode the topics of a step in the order in which things happen, without snapshot and commit."""
+def _head(topic: str) -> bytes:
+    return topic.encode() + b"\0"
+
+
+def step_messages(record: StepRecord, topics: Mapping[str, str] = TOPICS_OF_A_STEP) -> list[tuple[str, bytes]]:
+    """Encode the topics of a step in the order in which things happen, without snapshot and commit.
+
+    Args:
+        record: the step.
+        topics: which ones: what they are called in a record, by topic.
+    """
     parts = vars(record)
-    return [(topic, encode(parts[name])) for topic, name in _PARTS]
+    return [(topic, encode(parts[name])) for topic, name in topics.items()]
 
 
 class Digest:

@@ -11,15 +11,14 @@ import contextlib
 import math
 import struct
 from collections.abc import Iterator, Mapping
-from typing import Any, Final, NamedTuple, TypeVar
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from fireworld.errors import LogError
-from fireworld.records import DTYPES, Array, Snapshot
+from fireworld.records import DTYPES, Array, Record, Snapshot
 from fireworld_recorder.schema import NamedArray, message_of, varint
 
-RecordType = TypeVar("RecordType")
 Buffer = bytes | memoryview
 
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
@@ -53,24 +52,24 @@ class _Layout(NamedTuple):
     plan: list[tuple[Any, ...]]  # what `encode` needs of each; plain tuples, because named ones unpack slowly
 
 
-_LAYOUTS: Final[dict[type[Any], _Layout]] = {}
+class _Layouts(dict[type[Any], _Layout]):
+    """The layouts of record types; each is worked out once."""
+
+    def __missing__(self, record_type: type[Any]) -> _Layout:
+        zeros = {"string": "", "bytes": b"", "bool": False, "double": 0.0, "float": 0.0}
+        layout = _Layout({}, [])
+        for item in sorted(message_of(record_type).fields, key=lambda field: field.number):
+            wire_type = _BYTES if item.repeated else _WIRE_TYPES.get(item.wire, _BYTES)
+            tag = varint(item.number << 3 | wire_type)
+            dtype = np.dtype(DTYPES[item.wire]) if item.repeated else None
+            packing = None if item.repeated else _STRUCTS.get(item.wire)
+            absent = packing.pack(0) if packing else b""
+            layout.slots[item.number] = _Slot(item.name, item.wire, wire_type, dtype, zeros.get(item.wire, 0))
+            layout.plan.append((item.name, dtype, {}, item.wire, packing, tag, absent))
+        return self.setdefault(record_type, layout)
 
 
-def _layout(record_type: type[Any]) -> _Layout:
-    """Return the layout of a record type; worked out once."""
-    if record_type in _LAYOUTS:
-        return _LAYOUTS[record_type]
-    zeros = {"string": "", "bytes": b"", "bool": False, "double": 0.0, "float": 0.0}
-    layout = _Layout({}, [])
-    for item in sorted(message_of(record_type).fields, key=lambda field: field.number):
-        wire_type = _BYTES if item.repeated else _WIRE_TYPES.get(item.wire, _BYTES)
-        tag = varint(item.number << 3 | wire_type)
-        dtype = np.dtype(DTYPES[item.wire]) if item.repeated else None
-        packing = None if item.repeated else _STRUCTS.get(item.wire)
-        absent = packing.pack(0) if packing else b""
-        layout.slots[item.number] = _Slot(item.name, item.wire, wire_type, dtype, zeros.get(item.wire, 0))
-        layout.plan.append((item.name, tag, item.wire, dtype, item.wire == "uint8", packing, absent))
-    return _LAYOUTS.setdefault(record_type, layout)
+_LAYOUTS: Final = _Layouts()
 
 
 def encode(record: Any) -> bytes:
@@ -79,28 +78,31 @@ def encode(record: Any) -> bytes:
     Raises:
         ValueError: an array is not one-dimensional, or a value does not fit its declared type.
     """
-    parts: list[bytes] = []
+    parts: list[bytes] = []  # filled by `append`, which is faster here than adding tuples
     values = vars(record)
-    for name, tag, wire, dtype, small, packing, absent in _layout(type(record)).plan:
+    for name, dtype, heads, wire, packing, tag, absent in _LAYOUTS[type(record)].plan:
         value = values[name]
         if dtype is not None:
             body = value.tobytes() if value.dtype is dtype and value.ndim == 1 else _cast(value, dtype, name)
-            if not body:
-                continue
-            if small and not body.isascii():
+            if wire == "uint8" and not body.isascii():
                 raise ValueError(f"{name}: a value above 127 in a uint8 column")
-            parts += (tag, varint(len(body)), body)
         elif packing is not None:
             try:
                 body = packing.pack(value)
             except struct.error as error:
                 raise ValueError(f"{name}: {value!r} does not fit {wire}") from error
             if body != absent:
-                parts += (tag, body)
+                parts.append(tag)
+                parts.append(body)
+            continue
         else:
             body = value.encode() if wire == "string" else value
-            if body:
-                parts += (tag, varint(len(body)), body)
+        if body:
+            head = heads.get(len(body))  # tag and length: what comes before as many bytes
+            if head is None:
+                head = heads[len(body)] = tag + varint(len(body))
+            parts.append(head)
+            parts.append(body)
     return b"".join(parts)
 
 
@@ -213,9 +215,9 @@ def _read(slot: _Slot, wire_type: int, raw: Any) -> Any:
     return _STRUCTS[slot.wire].unpack(raw)[0]
 
 
-def decode(record_type: type[RecordType], data: Buffer) -> RecordType:
+def decode(record_type: type[Record], data: Buffer) -> Record:
     """Decode a record; unknown fields are skipped, absent ones are zero or empty."""
-    layout = _layout(record_type).slots
+    layout = _LAYOUTS[record_type].slots
     values: dict[str, Any] = {}
     for number, wire_type, raw in walk(data):
         slot = layout.get(number)
@@ -232,7 +234,7 @@ def decode(record_type: type[RecordType], data: Buffer) -> RecordType:
 
 def decode_field(record_type: type[Any], number: int, data: Buffer) -> Any:
     """Decode one field and step over the others."""
-    slot = _layout(record_type).slots[number]
+    slot = _LAYOUTS[record_type].slots[number]
     for found, wire_type, raw in walk(data):
         if found == number:
             return _read(slot, wire_type, raw)

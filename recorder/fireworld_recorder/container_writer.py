@@ -6,6 +6,7 @@ all else about a step. So the records that come with each step are packed here, 
 
 from __future__ import annotations
 
+import functools
 import struct
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
@@ -27,12 +28,21 @@ DENSE_SHARE: Final = 0.4
 """After a chunk that was compressed to a smaller share than this, no field of the next one gets blocks of its own."""
 
 # Plain integers, because members of an enumeration are slow to pack.
-_MESSAGE_OPCODE, _MESSAGE_INDEX_OPCODE = int(Opcode.MESSAGE), int(Opcode.MESSAGE_INDEX)
+_MESSAGE_OPCODE, _MESSAGE_INDEX_OPCODE, _CHUNK_OPCODE, _CHUNK_INDEX_OPCODE = (
+    int(opcode) for opcode in (Opcode.MESSAGE, Opcode.MESSAGE_INDEX, Opcode.CHUNK, Opcode.CHUNK_INDEX)
+)
 _HEAD: Final = struct.Struct("<BQ")
-_MESSAGE: Final = struct.Struct("<BQHIQQ")
-_MESSAGE_BYTES: Final = _MESSAGE.size - _HEAD.size
+_MESSAGE: Final = struct.Struct("<BQH")
+_STAMP: Final = struct.Struct("<IQQ")
+"""Sequence, log and publish time: what follows the channel in the record of a message, before the payload."""
+_BEFORE_PAYLOAD: Final = _MESSAGE.size + _STAMP.size
+_COUNTED: Final = _BEFORE_PAYLOAD - _HEAD.size
+"""Bytes before the payload that count in the record's length."""
 _COMPRESSION: Final = b"\x04\0\0\0zstd"
 _CHUNK: Final = struct.Struct("<BQQQQI8sQ")
+_MESSAGE_INDEX: Final = struct.Struct("<BQHI")
+_PLACE: Final = struct.Struct("<QQ")
+"""Time and position of a message."""
 _SUMMARY: Final = (
     Opcode.SCHEMA,
     Opcode.CHANNEL,
@@ -61,6 +71,7 @@ class ContainerWriter:
         self._checksum = 0
         self._registrations: list[bytes] = []  # those that no chunk holds yet
         self._summary: dict[Opcode, list[bytes]] = {opcode: [] for opcode in _SUMMARY}
+        self._chunk_indexes = self._summary[Opcode.CHUNK_INDEX]
         self._n_messages: dict[int, int] = {}
         self._times: list[int] = []
         self._write(MAGIC, _packed(records.Header(profile, library)))
@@ -82,13 +93,9 @@ class ContainerWriter:
     def register(self, topic: str, *, schema_name: str, schema: bytes, encoding: str) -> int:
         """Add a channel with its schema to the next chunk; return its number, which is from 1 on."""
         number = len(self._summary[Opcode.CHANNEL]) + 1
-        pair = {
-            Opcode.SCHEMA: records.Schema(number, schema, encoding, schema_name),
-            Opcode.CHANNEL: records.Channel(number, topic, encoding, {}, number),
-        }
-        for opcode, item in pair.items():
-            record = _packed(item)
-            self._registrations.append(record)
+        pair = _registration(number, topic, schema_name, schema, encoding)
+        self._registrations += pair
+        for opcode, record in zip((Opcode.SCHEMA, Opcode.CHANNEL), pair, strict=True):
             self._summary[opcode].append(record)
         return number
 
@@ -101,14 +108,19 @@ class ContainerWriter:
             sequence: of all of them.
         """
         parts, self._registrations = self._registrations, []
-        position = sum(map(len, parts))
-        entries: dict[int, list[int]] = {}  # of each channel: time and position of every message
+        position, stamp = sum(map(len, parts)), _STAMP.pack(sequence, time, time)
+        places: dict[int, bytes] = {}  # of each channel: time and position of every message
+        n_messages = self._n_messages
         cuts: list[int] = []
         for channel, payload in messages:
             n_bytes = len(payload)
-            parts += (_MESSAGE.pack(_MESSAGE_OPCODE, _MESSAGE_BYTES + n_bytes, channel, sequence, time, time), payload)
-            entries.setdefault(channel, []).extend((time, position))
-            position += _MESSAGE.size
+            parts.append(_MESSAGE.pack(_MESSAGE_OPCODE, _COUNTED + n_bytes, channel))
+            parts.append(stamp)
+            parts.append(payload)
+            place = _PLACE.pack(time, position)
+            places[channel] = places[channel] + place if channel in places else place
+            n_messages[channel] = n_messages.get(channel, 0) + 1
+            position += _BEFORE_PAYLOAD
             if self._dense and n_bytes > LONG_FIELD_BYTES:
                 cuts += [position + edge for field in long_fields(payload, LONG_FIELD_BYTES) for edge in field]
             position += n_bytes
@@ -116,7 +128,7 @@ class ContainerWriter:
         packed = self._compress(block, cuts)
         self._dense = len(packed) > DENSE_SHARE * len(block)
         head = _CHUNK.pack(
-            Opcode.CHUNK,
+            _CHUNK_OPCODE,
             _CHUNK.size - _HEAD.size + len(packed),
             time,
             time,
@@ -125,8 +137,8 @@ class ContainerWriter:
             _COMPRESSION,
             len(packed),
         )
-        indexes = [_message_index(channel, found) for channel, found in entries.items()]
-        self._index(entries, indexes, time=time, n_bytes=len(block), n_packed=len(packed))
+        indexes = [_index_head(channel, len(found)) + found for channel, found in places.items()]
+        self._index(places, time=time, n_bytes=len(block), n_packed=len(packed))
         self._write(head, packed, *indexes)
         self._file.flush()
 
@@ -171,31 +183,31 @@ class ContainerWriter:
             start = cut
         return b"".join((*parts, frame.compress(view[start:]), frame.flush()))
 
-    def _index(
-        self, entries: Mapping[int, list[int]], indexes: Sequence[bytes], *, time: int, n_bytes: int, n_packed: int
-    ) -> None:
+    def _index(self, places: Mapping[int, bytes], *, time: int, n_bytes: int, n_packed: int) -> None:
         """Add the chunk that is written next to the index of the summary."""
         chunk_bytes = _CHUNK.size + n_packed
-        offset = self._n_bytes + chunk_bytes
-        places: list[int] = []
-        for (channel, found), index in zip(entries.items(), indexes, strict=True):
-            self._n_messages[channel] = self._n_messages.get(channel, 0) + len(found) // 2
-            places += (channel, offset)
-            offset += len(index)
-        body = struct.pack(
-            f"<QQQQI{'HQ' * len(indexes)}Q8sQQ",
-            time,
-            time,
-            self._n_bytes,
-            chunk_bytes,
-            10 * len(indexes),
-            *places,
-            offset - self._n_bytes - chunk_bytes,
-            _COMPRESSION,
-            n_packed,
-            n_bytes,
+        first = offset = self._n_bytes + chunk_bytes
+        offsets: list[int] = []
+        for channel, found in places.items():
+            offsets += (channel, offset)
+            offset += _MESSAGE_INDEX.size + len(found)
+        layout = _chunk_index(len(places))
+        self._chunk_indexes.append(
+            layout.pack(
+                _CHUNK_INDEX_OPCODE,
+                layout.size - _HEAD.size,
+                time,
+                time,
+                self._n_bytes,
+                chunk_bytes,
+                10 * len(places),
+                *offsets,
+                offset - first,
+                _COMPRESSION,
+                n_packed,
+                n_bytes,
+            )
         )
-        self._summary[Opcode.CHUNK_INDEX].append(_HEAD.pack(Opcode.CHUNK_INDEX, len(body)) + body)
         self._times.append(time)
 
     def _write(self, *parts: bytes) -> None:
@@ -213,8 +225,21 @@ def _packed(record: records.McapRecord) -> bytes:
     return data
 
 
-def _message_index(channel: int, entries: Sequence[int]) -> bytes:
-    """Pack the index of a channel's messages in a chunk; entries: time and position of each."""
-    n_bytes = 8 * len(entries)
-    head = (_MESSAGE_INDEX_OPCODE, 2 + 4 + n_bytes, channel, n_bytes)
-    return struct.pack(f"<BQHI{len(entries)}Q", *head, *entries)
+@functools.lru_cache(maxsize=1024)
+def _registration(number: int, topic: str, schema_name: str, schema: bytes, encoding: str) -> tuple[bytes, bytes]:
+    """Pack the records of a schema and of its channel; every log of a kind begins with the same."""
+    one = records.Schema(number, schema, encoding, schema_name)
+    other = records.Channel(number, topic, encoding, {}, number)
+    return _packed(one), _packed(other)
+
+
+@functools.cache
+def _index_head(channel: int, n_bytes: int) -> bytes:
+    """Return what comes before the places of a channel's messages in their index, (n_bytes) of them."""
+    return _MESSAGE_INDEX.pack(_MESSAGE_INDEX_OPCODE, _MESSAGE_INDEX.size - _HEAD.size + n_bytes, channel, n_bytes)
+
+
+@functools.cache
+def _chunk_index(n_channels: int) -> struct.Struct:
+    """Return the layout of an index of a chunk with messages of so many channels."""
+    return struct.Struct(f"<BQQQQQI{'HQ' * n_channels}Q8sQQ")

@@ -14,7 +14,7 @@ from typing import IO, Any, Final, Protocol, Self
 from fireworld.errors import OutputError, expected
 from fireworld.files import check_output, give_name
 from fireworld.records import CityRecord, RunHeader, Snapshot, StepRecord, absent_names
-from fireworld_recorder.chain import Chain, step_messages
+from fireworld_recorder.chain import TOPICS_OF_A_STEP, Chain, step_messages
 from fireworld_recorder.codec import encode, encode_snapshot
 from fireworld_recorder.container import CHUNK_BYTES_MAX
 from fireworld_recorder.container_writer import ContainerWriter
@@ -124,9 +124,12 @@ class StepFile:
         Raises:
             OutputError: the disk is full, or another fault of the output.
         """
-        with self._guard():
+        try:  # as `_guard` does, which takes longer
             self._write(step, messages)
-            self.n_commits += 1
+        except BaseException as error:
+            self._fail(error)
+            raise
+        self.n_commits += 1
 
     def close(self) -> None:
         """Write the index and give the log its name.
@@ -197,14 +200,17 @@ class StepFile:
         """Turn faults of the output into one-line errors, and stop writing after one."""
         try:
             yield
-        except OSError as error:
-            self.abort()
+        except BaseException as error:
+            self._fail(error)
+            raise
+
+    def _fail(self, error: BaseException) -> None:
+        """Stop writing; raise OutputError if the error is one of the system's."""
+        self.abort()
+        if isinstance(error, OSError):
             reason = "no space is left on the disk" if error.errno == errno.ENOSPC else error.strerror or str(error)
             kept = f"; {self.n_commits} {self.kind.unit}s are safe in {self.partial}" if self._holds_steps else ""
             raise OutputError(f"{self.path}: cannot be written: {reason}{kept}") from error
-        except BaseException:
-            self.abort()
-            raise
 
 
 def _begin_file(path: Path, *, replace: bool) -> IO[bytes]:
@@ -295,6 +301,7 @@ class LogWriter(StepFile):
             force=force,
             scratch_suffix=scratch_suffix,
         )
+        self._topics = {topic: name for topic, name in TOPICS_OF_A_STEP.items() if topic in self._channel_ids}
 
     @property
     def digest(self) -> str:
@@ -305,7 +312,7 @@ class LogWriter(StepFile):
         """Write one step; when this returns a kill cannot lose it. Errors are those of `commit`."""
         if record.step <= self._last_step:
             raise ValueError(f"steps are written in rising order, got {record.step} after {self._last_step}")
-        messages = [(topic, data) for topic, data in step_messages(record) if topic in self._channel_ids]
+        messages = step_messages(record, self._topics)
         for topic, data in messages:
             self._chain.add(topic, data)
         if record.snapshot is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import os
 import shutil
@@ -140,6 +141,20 @@ class TestStore:
         monkeypatch.setenv("HOME", "/nonexistent")
         assert Store().folders == []
         assert not Path("/nonexistent").exists()
+
+
+def test_whatever_kernels_are_made_of_is_part_of_the_digest():
+    ground = {path.stem for path in cache._SOURCES.parent.glob("*.py")} - {"__init__", "files", "interrupt"}
+    found, looked_at = set(), [path for path in cache._SOURCES.glob("*.py") if path.stem not in {"cache", "jit"}]
+    while looked_at:
+        for node in ast.walk(ast.parse(looked_at.pop().read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.ImportFrom) or node.module is None:
+                continue
+            names = [alias.name for alias in node.names] if node.module == "fireworld" else [node.module.split(".")[-1]]
+            new = {name for name in names if name in ground and node.module.count(".") <= 1} - found
+            found |= new
+            looked_at += [cache._SOURCES.parent / f"{name}.py" for name in new]
+    assert {f"{name}.py" for name in found - {"errors"}} == set(cache.COMPILED_ELSEWHERE)
 
 
 def test_kernels_elsewhere_are_not_kept():

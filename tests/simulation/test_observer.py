@@ -11,13 +11,13 @@ from fireworld.kernels.brigades import REFILLING
 from fireworld.parameters import PAPER, Parameters
 from fireworld.policy.kernel import always
 from fireworld.records import ACTIVITIES, DTYPES, EVENT_KINDS, SNAPSHOT_EVERY_STEPS, STEP_TOPICS
+from fireworld.simulation.choices import Choices
 from fireworld.simulation.observer import Observer, city_record
 from fireworld.simulation.placement import Placement
-from fireworld.simulation.world import Choices
 from tests.kernels.small import assess, burn, make_city, make_world, square
 from tests.simulation.town import begin, policy_named, town, town_world
 
-NO_CHOICES = Choices(np.zeros((0, 8), dtype=np.int64), np.zeros(0, dtype=np.int64), lambda: ())
+NO_CHOICES = Choices(np.zeros((0, 8), dtype=np.int64), np.zeros(0, dtype=np.int64))
 FAR_APART = [square(200.0 * k, 0.0) for k in range(5)]
 
 

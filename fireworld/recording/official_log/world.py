@@ -9,6 +9,16 @@ import numpy as np
 
 from fireworld import scores
 from fireworld.errors import LogError, expected
+from fireworld.events import (
+    BRIGADE_DIED,
+    BRIGADE_HURT,
+    CIVILIAN_DIED,
+    CIVILIAN_HURT,
+    FIRE_EVENTS,
+    TANK_EMPTY,
+    fire_event,
+    zero_against_more,
+)
 from fireworld.recording.official_log import names
 from fireworld.recording.official_log.city import FULL_HP, Cast
 from fireworld.recording.official_log.parts import Entity
@@ -26,7 +36,6 @@ from fireworld.records import (
     Score,
     StepRecord,
 )
-from fireworld.simulation.changes import BURNING, BURNT_OUT, events_of, fire_changes, zero_against_more
 
 NOT_RECORDED: Final = (
     "city.volume_m3", "city.initial_fuel", "city.heat_capacity", "city.ignition_point", "city.wall_area_m2",
@@ -37,6 +46,8 @@ NOT_RECORDED: Final = (
 )  # fmt: skip
 """What no official log has."""
 
+_BURNING: Final = (1, 2, 3)
+_BURNT_OUT: Final = 8
 _NONE: Final = np.zeros(0)
 _NO_DRAWS: Final = Draws(0, 0.0, 0.0)
 _NOTHING_SEEN: Final = Observations(*[_NONE] * 18)
@@ -199,17 +210,17 @@ class World:
     def _events(self) -> Events:
         """Return what happened in the step, as far as it can be seen in a log."""
         if self.step == 0:
-            return events_of([])
+            return _events_of([])
         before, now = self._before, self._watched()
-        found: list[tuple[str, Sequence[int]]] = [
-            ("tank-empty", zero_against_more(now[f"{names.FIRE_BRIGADE}.water"], before[f"{names.FIRE_BRIGADE}.water"]))
-        ]
-        found += fire_changes(before["fieryness"], now["fieryness"]).events
-        for kind, who in ((names.CIVILIAN, "civilian"), (names.FIRE_BRIGADE, "brigade")):
-            hurt = zero_against_more(before[f"{kind}.damage"], now[f"{kind}.damage"])
-            died = zero_against_more(now[f"{kind}.hp"], before[f"{kind}.hp"])
-            found += [(f"{who}-hurt", hurt), (f"{who}-died", died)]
-        return events_of(found)
+        tank = f"{names.FIRE_BRIGADE}.water"
+        found = [(TANK_EMPTY, zero_against_more(now[tank], before[tank]).nonzero()[0])]
+        found += _fire_events(before["fieryness"], now["fieryness"])
+        people = ((names.CIVILIAN, CIVILIAN_HURT, CIVILIAN_DIED), (names.FIRE_BRIGADE, BRIGADE_HURT, BRIGADE_DIED))
+        for kind, hurt, died in people:
+            damage, hp = f"{kind}.damage", f"{kind}.hp"
+            found.append((hurt, zero_against_more(before[damage], now[damage]).nonzero()[0]))
+            found.append((died, zero_against_more(now[hp], before[hp]).nonzero()[0]))
+        return _events_of(found)
 
     def _score(self) -> Score:
         """Return both scores and the counts, by the rules of the model, section 6."""
@@ -221,12 +232,28 @@ class World:
             score=scores.paper_score(n_alive, healthy, saved, area) if area else 0.0,
             score_max=n + 1.0,
             score_now=n_alive * scores.exp_of_minus(scores.unhealth(healthy)),
-            n_burning=int(np.isin(code, BURNING).sum()),
-            n_water_damaged=int(((code > BURNING[-1]) & (code < BURNT_OUT)).sum()),
-            n_burnt_out=int((code == BURNT_OUT).sum()),
+            n_burning=int(np.isin(code, _BURNING).sum()),
+            n_water_damaged=int(((code > _BURNING[-1]) & (code < _BURNT_OUT)).sum()),
+            n_burnt_out=int((code == _BURNT_OUT).sum()),
             n_civilians_alive=n_alive,
             water_used_litres=0.0,
         )
+
+
+def _fire_events(before: Array, code: Array) -> list[tuple[int, Sequence[int]]]:
+    """Return what happened to buildings, by kind; `before`, `code`: (n,) fieryness."""
+    changed = (code != before).nonzero()[0].tolist()
+    events = {building: fire_event(int(before[building]), int(code[building])) for building in changed}
+    return [(kind, [building for building, event in events.items() if event == kind]) for kind in FIRE_EVENTS]
+
+
+def _events_of(found: Sequence[tuple[int, Sequence[int]]]) -> Events:
+    """Return events by kind and entity as they are recorded, in the order given."""
+    kinds = [kind for kind, entities in found for _ in entities]
+    return Events(
+        kind=np.array(kinds, dtype=np.uint8),
+        entity=np.array([entity for _, entities in found for entity in entities], dtype=np.int32),
+    )
 
 
 def _floor_area(building: Entity) -> float:
