@@ -16,12 +16,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from fireworld.envs.autoreset import Autoreset as Autoreset
+    from fireworld.envs.many_worlds import Worlds as Worlds
+    from fireworld.envs.many_worlds import worlds as worlds
     from fireworld.envs.seeds import Seeds as Seeds
-    from fireworld.envs.worlds import Autoreset as Autoreset
-    from fireworld.envs.worlds import Worlds as Worlds
-    from fireworld.envs.worlds import worlds as worlds
 
-_ROOMS = {"Autoreset": "worlds", "Seeds": "seeds", "Worlds": "worlds", "worlds": "worlds"}
+_ROOMS = {
+    "Autoreset": "autoreset",
+    "Seeds": "seeds",
+    "Worlds": "many_worlds",
+    "worlds": "many_worlds",
+}
+"""The module that each name lives in; none has the name of a function."""
 
 __all__ = [*sorted(_ROOMS)]  # noqa: PLE0604 - the names are those of the table
 
