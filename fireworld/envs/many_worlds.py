@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import hashlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Unpack
 
@@ -224,10 +224,11 @@ class Worlds:
         for name, wanted in self._layout().items():
             if head.get(name) != wanted:
                 raise LogError(expected("snapshot", name, "those of these worlds", "others"))
+        seeds = seeds_in(head)
         number = within(held, "episode_number", self.episode_number, least=-1, most=EPISODES_MAX - 1)
         ended = fitting(held, "ended", self._ended)
         self._bound.check(held)
-        self.seeds = Seeds(head["base"], test=head["test"])
+        self.seeds = seeds
         self.episode_number[:], self._ended[:] = number, ended
         self._bound.take(held)
         self._share = score_share(self._bound.result)
@@ -348,6 +349,14 @@ def worlds(
         seeds=seeds if isinstance(seeds, Seeds) else Seeds(seed_of(seeds, name="seeds")),
         first_worker=whole_number("first_worker", first_worker, least=0, most=WORKERS_MAX - n),
     )
+
+
+def seeds_in(head: Mapping[str, Any]) -> Seeds:
+    """Return the seeds of a snapshot; LogError if they make no sense."""
+    try:
+        return Seeds(head.get("base"), test=head.get("test") is True)  # type: ignore[arg-type]  # checked there
+    except ArgumentError as error:
+        raise LogError(f"snapshot: {error}") from None
 
 
 def _again(make: type[Worlds], setup: Setup, n: int, options: dict[str, Any], snapshot: bytes) -> Worlds:

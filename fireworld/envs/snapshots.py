@@ -36,7 +36,7 @@ def unpack(form: str, snapshot: bytes) -> tuple[dict[str, Any], dict[str, Array]
     """
     try:
         held = read_npz(io.BytesIO(snapshot))
-        head = json.loads(str(held.pop("head")))
+        head = dict(json.loads(str(held.pop("head"))))
         found = head["format"]
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise LogError(expected("snapshot", "", "the bytes of a snapshot", str(error) or "others")) from None

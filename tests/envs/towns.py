@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -101,3 +102,8 @@ def reference(scenario: dict[str, Any], seed: int, choices: str = "simultaneous"
 
 def shipped(name: str, **values: Any) -> Scenario:
     return find_scenario(name).with_values(values)
+
+
+def pickled(value: Any) -> Any:
+    """Return what comes out of a pickle."""
+    return pickle.loads(pickle.dumps(value))  # noqa: S301 - our own
