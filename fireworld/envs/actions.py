@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fireworld.arguments import ArgumentError
+from fireworld.arguments import ArgumentError, whole_number
 from fireworld.errors import expected
 from fireworld.kernels.arrays import Array
 from fireworld.kernels.batch import View
@@ -36,6 +36,19 @@ def checked_actions(actions: Any, view: View, *, playing: Array) -> Array:
         forbidden = (allowed == 0) & (view.chooses != 0) & playing[:, None]
         _refuse(forbidden, array, "an action that its action_mask allows")
     return array
+
+
+def checked_action(action: object, view: View, brigade: int) -> int:
+    """Return the action of a brigade of a single world.
+
+    Raises:
+        ArgumentError: it is no action, or the mask forbids it.
+    """
+    where = f"brigade {brigade}"
+    number = whole_number(f"step: {where}: action", action, least=0, most=view.mask.shape[2] - 1)
+    if view.own.shape[2] and view.chooses[0, brigade] and not view.mask[0, brigade, number]:
+        raise ArgumentError(expected("step", where, "an action that its action_mask allows", number))
+    return number
 
 
 def _refuse(wrong: Array, actions: Array, wanted: str) -> None:

@@ -6,7 +6,7 @@ import copy
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Unpack
+from typing import Any, Final, Self, Unpack
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from fireworld.kernels.arrays import COUNTS, Array
 from fireworld.kernels.observation import N_ACTIONS
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.scenario import Scenario
+from fireworld.simulation.built import BuiltScenario
 from fireworld.simulation.world import World
 
 _FORM: Final = "fireworld-worlds/1"
@@ -59,6 +60,7 @@ class Worlds:
         setup: what they are made of.
         n: how many there are.
         n_brigades: of the largest team.
+        n_buildings: of the largest city.
         autoreset: when a world that has ended begins anew.
         seeds: of the episodes.
         episode_number: (n,) of each world, 0 at first, -1 before that.
@@ -80,6 +82,7 @@ class Worlds:
         self._threads, self._first_worker, self._others = threads, first_worker, others
         self._built = setup.build()
         self.n_brigades = max(built.n_brigades for built in self._built)
+        self.n_buildings = max(built.city.n_buildings for built in self._built)
         self.episode_number = np.full(n, -1, dtype=np.int64)
         self._ended = np.ones(n, dtype=np.bool_)
         self._share: Array = np.ones(n)
@@ -181,6 +184,10 @@ class Worlds:
         """Return a copy of a world, in the moment when its brigades look."""
         return self._bound.world(*self._indices((index,)).tolist()).copy()
 
+    def built(self, index: int) -> BuiltScenario:
+        """Return the scenario that a world is of, as it is built."""
+        return self._built[int(self._bound.playing[index])]
+
     def digest(self) -> str:
         """Return a digest of the states of all worlds: where it is equal, the same actions lead to the same end."""
         found = hashlib.sha256()
@@ -253,15 +260,15 @@ class Worlds:
             "first_worker": self._first_worker,
             "others": self._others,
         }
-        return _again, (type(self), self.setup, self.n, options, self.snapshot())
+        return again, (type(self), (self.setup, self.n), options, self.snapshot())
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> Worlds:
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         copied = memo[id(self)] = type(self).__new__(type(self))
         own = {name: getattr(self, name).copy() for name in ("episode_number", "_ended", "_share")}
         vars(copied).update(vars(self) | own | {"_bound": self._bound.another()})  # what is built never changes
         return copied
 
-    def __copy__(self) -> Worlds:
+    def __copy__(self) -> Self:
         return copy.deepcopy(self)
 
     def __repr__(self) -> str:
@@ -359,8 +366,8 @@ def seeds_in(head: Mapping[str, Any]) -> Seeds:
         raise LogError(f"snapshot: {error}") from None
 
 
-def _again(make: type[Worlds], setup: Setup, n: int, options: dict[str, Any], snapshot: bytes) -> Worlds:
+def again(make: type[Worlds], arguments: tuple[Any, ...], options: dict[str, Any], snapshot: bytes) -> Worlds:
     """Make worlds again of what a pickle holds."""
-    made = make(setup, n, **options)
+    made = make(*arguments, **options)
     made.restore(snapshot)
     return made

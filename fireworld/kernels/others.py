@@ -26,7 +26,8 @@ def step_among_others(row: Array, batch_row: Array, i: int, brigade: int) -> Non
     batch, episode = opened_batch(batch_row), opened_episode(row)
     brigades, scratch, clock = episode.world.brigades, episode.scratch, episode.clock
     in_turn = episode.constants.observation.in_turn
-    scratch.action_before[:], scratch.target_before[:] = brigades.action, brigades.target
+    for other in range(len(brigades.action)):
+        scratch.action_before[other], scratch.target_before[other] = brigades.action[other], brigades.target[other]
     follow(brigade, batch.actions[i, brigade], i, episode, batch)
     for other in range(brigade + 1 if in_turn else 0, len(brigades.action)):
         if other != brigade:
