@@ -9,12 +9,18 @@ from pettingzoo.utils.env import AECEnv
 
 from fireworld.arguments import ArgumentError
 from fireworld.envs.agents import AgentsForm, ByAgent, agent_view
-from fireworld.envs.forms import FormOptions, metadata_of
+from fireworld.envs.forms import FormOptions, metadata_of, world_seed_in
 from fireworld.envs.setup import Scenarios
 from fireworld.errors import LogError, expected
 
-_BY_AGENT: Final = {"rewards": float, "_cumulative_rewards": float, "terminations": bool, "truncations": bool}
-"""What is remembered of every agent, by the names that PettingZoo gives it, and its type."""
+_NUMBER: Final = (int, float)  # PettingZoo clears rewards to a whole 0
+_BY_AGENT: Final[Mapping[str, tuple[type, ...]]] = {
+    "rewards": _NUMBER,
+    "_cumulative_rewards": _NUMBER,
+    "terminations": (bool,),
+    "truncations": (bool,),
+}
+"""What is remembered of every agent, by the names that PettingZoo gives it, and its types."""
 _SELECTED: Final = ("agent_selection", "_skip_agent_selection")
 
 
@@ -35,9 +41,11 @@ class TurnsEnv(AgentsForm, AECEnv):  # type: ignore[misc]  # pettingzoo has no t
         self._start([])
 
     def reset(self, seed: int | None = None, options: Mapping[str, Any] | None = None) -> None:
-        """Begin the next episode; with a seed, episode 0 of those that follow from it. Options there are none."""
-        del options
-        self.worlds.reset(seed=seed)
+        """Begin the next episode; with a seed, episode 0 of those that follow from it.
+
+        Of the options, `world_seed` is the seed of its random draws, to play an episode again.
+        """
+        self.worlds.reset(seed=seed, world_seeds=world_seed_in(options))
         self._rendering.begin(self.worlds)
         self._start(self._living(self.worlds.observe()))
         self._select_from(0)
@@ -75,8 +83,8 @@ class TurnsEnv(AgentsForm, AECEnv):  # type: ignore[misc]  # pettingzoo has no t
         self.agents = agents
         self.agent_selection: str = self.possible_agents[0]
         self._skip_agent_selection: str | None = None
-        for table, kind in _BY_AGENT.items():
-            setattr(self, table, {name: kind(0) for name in agents})
+        self.rewards, self._cumulative_rewards = (dict.fromkeys(agents, 0.0) for _ in range(2))
+        self.terminations, self.truncations = (dict.fromkeys(agents, False) for _ in range(2))
         self._inform()
 
     def _inform(self) -> None:

@@ -9,7 +9,7 @@ import gymnasium
 
 from fireworld.arguments import ArgumentError, whole_number
 from fireworld.envs.agents import agent_info, agent_view
-from fireworld.envs.forms import DEFAULT, FormOptions, OneWorldForm, metadata_of
+from fireworld.envs.forms import DEFAULT, FormOptions, OneWorldForm, metadata_of, world_seed_in
 from fireworld.envs.setup import Scenarios
 from fireworld.envs.spaces import action_space, agent_space
 from fireworld.errors import LogError, expected
@@ -49,13 +49,15 @@ class BrigadeEnv(OneWorldForm, gymnasium.Env[dict[str, Any], int]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Begin the next episode; with a seed, episode 0 of those that follow from it. Options there are none.
+        """Begin the next episode; with a seed, episode 0 of those that follow from it.
+
+        Of the options, `world_seed` is the seed of its random draws, to play an episode again.
 
         Raises:
             PolicyError: the others' policy fails.
         """
         gymnasium.Env.reset(self, seed=seed, options=options)  # a generator that Gymnasium asks for; nothing uses it
-        self.worlds.reset(seed=seed)
+        self.worlds.reset(seed=seed, world_seeds=world_seed_in(options))
         self._rendering.begin(self.worlds)
         self.worlds.begin_among_others(self.brigade)
         return self._beginning()

@@ -6,6 +6,7 @@ import copy
 import hashlib
 import json
 import secrets
+from collections.abc import Mapping
 from typing import Any, ClassVar, Final, Self, Unpack
 
 import numpy as np
@@ -173,3 +174,8 @@ def seeds_of(seed: object) -> Seeds:
     if isinstance(seed, Seeds):
         return seed
     return Seeds(secrets.randbits(32) if seed is None else seed_of(seed))
+
+
+def world_seed_in(options: Mapping[str, Any] | None) -> list[int] | None:
+    """Return the seed that the options of a reset name for its world, if they do."""
+    return [options["world_seed"]] if options and "world_seed" in options else None

@@ -99,21 +99,32 @@ class Worlds:
         """Actions of a brigade: the paper's four, then those of its own targets."""
         return N_ACTIONS + self.setup.own_targets
 
-    def reset(self, *, seed: int | None = None, indices: Iterable[int] | None = None) -> dict[str, Array]:
+    def reset(
+        self,
+        *,
+        seed: int | None = None,
+        indices: Iterable[int] | None = None,
+        world_seeds: Sequence[int] | Array | None = None,
+    ) -> dict[str, Array]:
         """Begin the next episode of worlds, and return what is seen of all.
 
         Args:
             seed: begin with episode 0 again, and seeds that follow from this base; None: with the next episode.
-            indices: of the worlds; None: all.
+            indices: of the worlds, each once; None: all.
+            world_seeds: of the random draws of each of them, to play an episode again; None: those that follow.
 
         Raises:
             ArgumentError: an argument that makes no sense.
         """
-        which = np.arange(self.n) if indices is None else np.unique(self._indices(indices))
-        if seed is not None:
-            self.seeds = Seeds(seed_of(seed), test=self.seeds.test)
+        which = self._indices(range(self.n) if indices is None else indices)
+        base = None if seed is None else Seeds(seed_of(seed), test=self.seeds.test)
+        given = None if world_seeds is None else [seed_of(one, name="world_seeds") for one in world_seeds]
+        if given is not None and len(given) != len(which):
+            raise ArgumentError(expected("reset", "world_seeds", f"{len(which)}, one of each world", len(given)))
+        if base is not None:
+            self.seeds = base
             self.episode_number[which] = -1
-        self._next_episode(which)
+        self._next_episode(which, given)
         return self.observe()
 
     def step(self, actions: Array | Sequence[Sequence[int]]) -> Stepped:
@@ -170,7 +181,7 @@ class Worlds:
         Raises:
             ArgumentError: there is no such world, or it has not begun.
         """
-        source, target = self._indices((source, target)).tolist()
+        source, target = (int(self._indices((index,))[0]) for index in (source, target))
         if self.episode_number[source] < 0:
             raise ArgumentError(expected("fork", f"world {source}", "one that has begun", "one that has not"))
         chosen = None if seed is None else seed_of(seed)
@@ -303,10 +314,10 @@ class Worlds:
     def _scenario_of(self, index: int, episode: int) -> int:
         return (index + episode) % len(self._built)
 
-    def _next_episode(self, which: Array) -> None:
-        for index in which.tolist():
+    def _next_episode(self, which: Array, world_seeds: Sequence[int] | None = None) -> None:
+        for place, index in enumerate(which.tolist()):
             episode = int(self.episode_number[index]) + 1
-            seed = self.seeds.seed(self._first_worker + index, episode)
+            seed = self.seeds.seed(self._first_worker + index, episode) if world_seeds is None else world_seeds[place]
             self._bound.begin(index, self._scenario_of(index, episode), seed)
             self.episode_number[index], self._ended[index] = episode, False
         self._show(which, begun=False)
@@ -317,7 +328,7 @@ class Worlds:
 
     def _indices(self, indices: Iterable[int]) -> Array:
         found = [whole_number("index", index, least=0, most=self.n - 1) for index in indices]
-        return np.array(found, dtype=np.int64)
+        return np.array(list(dict.fromkeys(found)), dtype=np.int64)
 
 
 def worlds(

@@ -9,7 +9,7 @@ from pettingzoo.utils.env import ParallelEnv
 
 from fireworld.arguments import ArgumentError
 from fireworld.envs.agents import AgentsForm, ByAgent
-from fireworld.envs.forms import FormOptions, metadata_of
+from fireworld.envs.forms import FormOptions, metadata_of, world_seed_in
 from fireworld.envs.setup import Scenarios
 from fireworld.errors import expected, nearest
 
@@ -29,9 +29,11 @@ class TeamEnv(AgentsForm, ParallelEnv):  # type: ignore[misc]  # pettingzoo has 
         self._name_agents()
 
     def reset(self, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[ByAgent, ByAgent]:
-        """Begin the next episode; with a seed, episode 0 of those that follow from it. Options there are none."""
-        del options
-        self.worlds.reset(seed=seed)
+        """Begin the next episode; with a seed, episode 0 of those that follow from it.
+
+        Of the options, `world_seed` is the seed of its random draws, to play an episode again.
+        """
+        self.worlds.reset(seed=seed, world_seeds=world_seed_in(options))
         self._rendering.begin(self.worlds)
         return self._beginning()
 

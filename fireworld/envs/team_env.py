@@ -6,7 +6,7 @@ from typing import Any, Unpack
 
 import gymnasium
 
-from fireworld.envs.forms import DEFAULT, FormOptions, OneWorldForm, metadata_of
+from fireworld.envs.forms import DEFAULT, FormOptions, OneWorldForm, metadata_of, world_seed_in
 from fireworld.envs.setup import Scenarios
 from fireworld.envs.spaces import in_int8, team_actions, team_space
 from fireworld.kernels.arrays import Array
@@ -28,9 +28,12 @@ class WholeTeamEnv(OneWorldForm, gymnasium.Env[dict[str, Any], Array]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Begin the next episode; with a seed, episode 0 of those that follow from it. Options there are none."""
+        """Begin the next episode; with a seed, episode 0 of those that follow from it.
+
+        Of the options, `world_seed` is the seed of its random draws, to play an episode again.
+        """
         gymnasium.Env.reset(self, seed=seed, options=options)  # a generator that Gymnasium asks for; nothing uses it
-        self.worlds.reset(seed=seed)
+        self.worlds.reset(seed=seed, world_seeds=world_seed_in(options))
         self._rendering.begin(self.worlds)
         return self._beginning()
 

@@ -74,14 +74,15 @@ class TeamVectorEnv(Form, VectorEnv[Seen, Array, Array]):
 
         Args:
             seed: begin with episode 0 again, and seeds that follow from this base; None: with the next episode.
-            options: `reset_mask`, (num_envs,) bool, the worlds to reset; all if it is left out.
+            options: `reset_mask`, (num_envs,) bool, the worlds to reset, all if it is left out; `world_seeds`, the
+                seeds of their random draws, to play episodes again.
 
         Raises:
             ArgumentError: an argument that makes no sense.
         """
         VectorEnv.reset(self, seed=seed, options=options)  # a generator that Gymnasium asks for; nothing uses it
         mask = self._mask(options or {})
-        self.worlds.reset(seed=seed, indices=np.flatnonzero(mask))
+        self.worlds.reset(seed=seed, indices=np.flatnonzero(mask), world_seeds=(options or {}).get("world_seeds"))
         self._rendering.begin(self.worlds)
         return in_int8(self.worlds.observe()), self._infos(self.worlds.info(), mask)
 
