@@ -123,7 +123,8 @@ class TeamVectorEnv(Form, VectorEnv[Seen, Array, Array]):
     def close(self, **kwargs: Any) -> None:
         """End threads and view; called again, it does nothing."""
         del kwargs
-        Form.close(self)
+        if "worlds" in vars(self):  # Gymnasium closes what is thrown away, even if it could not be made
+            Form.close(self)
         self.closed = True
 
     def _beginning(self) -> tuple[Seen, dict[str, Any]]:
