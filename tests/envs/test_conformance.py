@@ -14,7 +14,7 @@ import pytest
 
 import fireworld as fw
 from tests.envs.extra import MISSING, needs_extra
-from tests.envs.towns import HOT, LATER, SMALL, deadly
+from tests.envs.towns import HOT, LATER, SMALL, deadly, pickled
 
 pytestmark = needs_extra()
 
@@ -25,6 +25,7 @@ if not MISSING:
     from fireworld.envs.check.checks import COLUMNS, Check, run_check, table_of
     from fireworld.envs.check.everything import checks_of
     from fireworld.envs.check.logs import follow
+    from fireworld.envs.check.players import PLAYERS, exact, play, randomly
     from fireworld.envs.check.states import check_copies, check_forks, check_seeds, check_snapshots
     from fireworld.envs.check.vectors import compare_with_single
 
@@ -99,7 +100,7 @@ BROKEN = {
         "many_worlds:Worlds.__deepcopy__",
         lambda _: lambda self, _: self,
         lambda: check_copies("whole team", SMALL),
-        "a pickle is in another state|a copy changes what it is of|goes another way",
+        "a copy changes what it is of|goes another way",
     ),
     "a fork with other draws": (
         "bound_worlds:BoundWorlds.draw_anew",
@@ -191,3 +192,15 @@ def test_observations_are_in_their_spaces_to_the_end(tmp_path):
                 over = terminated or truncated
             assert seen in env.observation_space
             assert info["step"] == env.worlds.world(0).step_number
+
+
+@pytest.mark.parametrize("form", PLAYERS if not MISSING else [])
+def test_pickles_go_the_same_way(form):
+    player = PLAYERS[form]
+    env = player.make(SMALL, seed=3, observation="graph", own_targets=4)
+    assert exact(player.begin(pickled(env))) == exact(player.begin(env))
+    for _ in range(3):
+        play(player, env, 11, randomly(1))
+        other = pickled(env)
+        assert other.digest() == env.digest()
+        assert exact(play(player, other, 30, randomly(2))) == exact(play(player, env, 30, randomly(2)))
