@@ -99,6 +99,12 @@ def test_a_missing_extra_is_named_in_one_line(names, name, missing):
     assert rest in {f"{one} is not installed; try pip install 'fireworld[gym]'" for one in missing.split("|")}
 
 
+def test_checks_need_the_extra():
+    code = BLOCKED.format(names=["gymnasium"]) + "import runpy; runpy.run_module('fireworld.envs.check')"
+    hint = "gymnasium is not installed; try pip install 'fireworld[gym]'"
+    assert run(code) == f"fireworld.envs.check: fireworld.envs.team: {hint}\n"
+
+
 def test_worlds_need_no_library():
     code = BLOCKED.format(names=["gymnasium", "pettingzoo"]) + "w = envs.worlds('quick', 2); w.reset(); print(w)"
     assert run(code) == "<Worlds 2 of quick: 2 brigades, features>\n"
