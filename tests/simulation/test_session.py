@@ -1,5 +1,6 @@
 """`fireworld.world`: the caller owns the loop, and what happens is what happens in a run."""
 
+import numpy as np
 import pytest
 
 import fireworld as fw
@@ -51,6 +52,15 @@ def test_what_is_seen_is_what_the_first_brigade_sees_in_a_run():
             assert seen[0].state_index == record.observations.state_index[0]
         session.step(decisions)
     assert session.outcome == run.outcome, "looking changes nothing"
+
+
+def test_actions_by_name_number_or_decision_are_the_same():
+    several = ("nearest-to-me", fw.Action.NEAREST_TO_ME, 3, np.int64(3), fw.Decision(3))
+    sessions = [world("quick", seed=4, set=QUICK) for _ in several]
+    for _ in range(12):
+        rewards = {session.step([action] * 2).reward for session, action in zip(sessions, several, strict=True)}
+        assert len(rewards) == 1
+    assert len({session.snapshot() for session in sessions}) == 1
 
 
 def test_saved_restored_and_copied():

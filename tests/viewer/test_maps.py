@@ -115,6 +115,16 @@ def test_many_brigades_on_one_spot_stand_in_rows(small):
     assert x[0] == x[8] == x[16] == 30.0
 
 
+def test_many_brigades_at_the_edge_of_the_map_stay_on_it(small):
+    bare = maps.draw_map(small.city).axes[0].get_xlim()
+    axes = maps.draw_map(small.city, brigades_xy=np.array([[bare[1] - 1.0, 30.0]] * 20)).axes[0]
+    balls = next(item for item in axes.collections if len(item.get_offsets()) == 20)
+    x, y = np.asarray(balls.get_offsets()).T
+    assert x.max() < bare[1]
+    assert len(set(zip(x.tolist(), y.tolist(), strict=True))) == 20
+    assert all(text.get_clip_on() for text in axes.texts if text.get_text() == "19")
+
+
 def test_titles_say_what_when_and_how_well(small):
     figure = maps.draw_steps([small], [12])
     assert texts_of(figure) == [

@@ -96,6 +96,7 @@ class CityMap:
 
         self.axes, self.city = axes, city
         west, east, south, north = extent_m(city)
+        self._east_m = east
         axes.set(xlim=(west, east), ylim=(south, north), aspect="equal", xticks=[], yticks=[], facecolor=GROUND)
         axes.spines[:].set_visible(False)
         self._scale = float(np.clip(inches / WIDTH_INCHES, _SMALLEST_SCALE, 1.0))
@@ -114,7 +115,7 @@ class CityMap:
             for index in np.asarray(city.refuge_building)
         ]
         self._apart_m = self._m_per_point * np.array([7.0, 7.0])
-        xy = _side_by_side(np.column_stack([city.civilian_x_m, city.civilian_y_m]), self._apart_m)
+        xy = _side_by_side(np.column_stack([city.civilian_x_m, city.civilian_y_m]), self._apart_m, east)
         edge: dict[str, Any] = {"edgecolors": INK, "linewidths": 0.8 * self._scale}
         self._civilians: Any = axes.scatter(xy[:, 0], xy[:, 1], s=34 * self._scale, zorder=6, **edge)
         self._balls = axes.scatter(
@@ -123,7 +124,8 @@ class CityMap:
         self._gauges = PolyCollection([], facecolors="white", edgecolors=INK, linewidths=0.8, zorder=7)
         self._water = PolyCollection([], facecolors=hexadecimal(colors.WATER_RGB), edgecolors="none", zorder=7.1)
         self._numbers = [
-            axes.text(0.0, 0.0, str(index), va="center_baseline", zorder=7.2, **bold) for index in range(n_brigades)
+            axes.text(0.0, 0.0, str(index), va="center_baseline", zorder=7.2, clip_on=True, **bold)
+            for index in range(n_brigades)
         ]
         lines = self._way_casing, self._ways, self._jet_casing, self._jets
         for item in (self._buildings, *lines, self._gauges, self._water):
@@ -143,14 +145,14 @@ class CityMap:
         self._buildings.set_facecolor(list(map(tuple, faces)))
         hp = np.asarray(state.civilian_hp)
         if state.civilian_xy_m is not None:
-            self._civilians.set_offsets(_side_by_side(state.civilian_xy_m, self._apart_m))
+            self._civilians.set_offsets(_side_by_side(state.civilian_xy_m, self._apart_m, self._east_m))
         self._civilians.set_facecolor(colors.health_rgb(hp, np.asarray(self.city.civilian_hp)) / 255.0)
         self._civilians.set_edgecolor(["white" if points <= 0 else INK for points in hp.tolist()])  # seen on black
         self._civilians.set_paths([_marker("X" if points <= 0 else "o") for points in hp.tolist()])
         self._show_brigades(state.brigades or BrigadeMarks(xy_m=np.zeros((0, 2))))
 
     def _show_brigades(self, brigades: BrigadeMarks) -> None:
-        xy = _side_by_side(brigades.xy_m, self._m_per_point * np.array([21.0, 15.0]))
+        xy = _side_by_side(brigades.xy_m, self._m_per_point * np.array([21.0, 15.0]), self._east_m)
         n = len(xy)
         activity = np.full(n, _SPRAYING) if brigades.activity is None else np.asarray(brigades.activity, dtype=np.int64)
         self._balls.set_offsets(xy)
@@ -221,17 +223,22 @@ def _unit_rgb(rgb: Sequence[colors.Rgb]) -> NDArray[np.float64]:
     return np.array(rgb) / 255.0
 
 
-def _side_by_side(xy: NDArray[np.float64], apart_m: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Move eastward what would cover something of a lower number, into a row below where a row is full: (n, 2) both."""
+def _side_by_side(xy: NDArray[np.float64], apart_m: NDArray[np.float64], east_m: float) -> NDArray[np.float64]:
+    """Move eastward what would cover something of a lower number, into a row below where a row is full: (n, 2) both.
+
+    A row is also full where the map ends, at `east_m`; the next one then begins further west.
+    """
     placed = np.array(xy, dtype=np.float64).reshape(-1, 2)
     for index in range(1, len(placed)):
+        end = min(xy[index, 0] + (_ABREAST - 0.5) * apart_m[0], max(xy[index, 0], east_m - 0.5 * apart_m[0]))
         while True:
             covers = (np.abs(placed[:index] - placed[index]) < 0.999 * apart_m).all(axis=1)
             if not covers.any():
                 break
             placed[index, 0] = placed[:index][covers, 0].max() + apart_m[0]
-            if placed[index, 0] - xy[index, 0] > (_ABREAST - 0.5) * apart_m[0]:
-                placed[index] = xy[index, 0], placed[index, 1] - apart_m[1]
+            if placed[index, 0] > end:
+                start = min(xy[index, 0], end - (_ABREAST - 1) * apart_m[0])
+                placed[index] = start, placed[index, 1] - apart_m[1]
     return placed
 
 
