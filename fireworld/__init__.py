@@ -55,9 +55,9 @@ if TYPE_CHECKING:
     from fireworld.scenario import scenarios as scenarios
     from fireworld.simulation.session import Session as Session
     from fireworld.simulation.session import world as world
-    from fireworld.training.log.episode_run import replay_episode as replay_episode
     from fireworld.training.log.reader import TrainingLog as TrainingLog
     from fireworld.training.log.reader import open_training as open_training
+    from fireworld.training.log.replay import replay_episode as replay_episode
     from fireworld.training.train import train as train
 
 _ROOMS = {
@@ -95,7 +95,7 @@ _ROOMS = {
     "open_training": "training.log.reader",
     "policies": "policy.names",
     "recover": "recording.export",
-    "replay_episode": "training.log.episode_run",
+    "replay_episode": "training.log.replay",
     "reproduce": "reproduction.reproduce",
     "run": "recording.record",
     "scenarios": "scenario",

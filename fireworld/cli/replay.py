@@ -49,7 +49,7 @@ def command(
 
     if noun_of(log) == "training":  # else the error is the only line
         announce_compilation()
-    from fireworld.training.log.episode_run import replay_episode, replay_every
+    from fireworld.training.log.replay import replay_episode, replay_every
 
     if episode is not None and scenario is not None:
         written = {output: replay_episode(log, scenario, episode, output, force=force)}

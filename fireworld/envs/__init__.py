@@ -16,12 +16,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fireworld.envs.seeds import Seeds as Seeds
     from fireworld.envs.worlds import Autoreset as Autoreset
     from fireworld.envs.worlds import Worlds as Worlds
     from fireworld.envs.worlds import worlds as worlds
+    from fireworld.training.seeds import Seeds as Seeds
 
-_ROOMS = {"Autoreset": "worlds", "Seeds": "seeds", "Worlds": "worlds", "worlds": "worlds"}
+_ROOMS = {"Autoreset": "worlds", "Seeds": "worlds", "Worlds": "worlds", "worlds": "worlds"}
 
 __all__ = [*sorted(_ROOMS)]  # noqa: PLE0604 - the names are those of the table
 

@@ -6,18 +6,22 @@ import copy
 import hashlib
 import io
 import json
+import os
+import weakref
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from fireworld.arguments import ArgumentError, last_step_of, seed_of, settings_of, whole_number
+from fireworld.envs.history import check_held
+from fireworld.envs.record import Beginning, EpisodeRecorder
 from fireworld.envs.rewards import Rewards, reward_of
-from fireworld.envs.seeds import EPISODES_MAX, WORKERS_MAX, Seeds
 from fireworld.envs.view import fresh_batch, observation_of, observed
 from fireworld.errors import LogError, expected
 from fireworld.kernels.addresses import address_row
@@ -30,6 +34,8 @@ from fireworld.scenario import Scenario, find_scenario
 from fireworld.simulation.bound import Bound
 from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.simulation.world import World
+from fireworld.training.log.environment import ENVIRONMENT, Environment
+from fireworld.training.seeds import EPISODES_MAX, WORKERS_MAX, Seeds
 
 SCENARIO = str | Path | Scenario | Mapping[str, Any]
 _SNAPSHOT: Final = "fireworld-worlds/1"
@@ -83,6 +89,7 @@ class Worlds:
         threads: int,
         seeds: Seeds,
         first_worker: int,
+        record: str | os.PathLike[str] | None = None,
     ) -> None:
         self.n, self.observation, self.autoreset, self.seeds = n, observation, autoreset, seeds
         self.reward, self.own_targets, self._n_burning_max = reward, own_targets, n_burning_max
@@ -97,6 +104,12 @@ class Worlds:
         self._ended = np.ones(n, dtype=np.bool_)
         self._share: Array = np.ones(n)
         self._begin()
+        self._recorder: EpisodeRecorder | None = None
+        if record is not None:
+            self._recorder = EpisodeRecorder(
+                record, self.scenarios, self._environment(), base=seeds.base, batch=self._batch
+            )
+            weakref.finalize(self, self._recorder.close)
 
     def _begin(self) -> None:
         """Make the arrays that kernels write, and worlds in them."""
@@ -160,6 +173,8 @@ class Worlds:
             raise ArgumentError(expected("step", f"world {begins[0]}", "one under way", "one that is not", "reset it"))
         self._batch.actions[...] = self._checked(actions)
         runs = np.flatnonzero(~self._ended)
+        if self._recorder is not None:
+            self._recorder.note()
         self._in_kernel(lambda rows, batch, some: step_worlds(rows, batch, some, False), runs)
         if len(begins):
             self._next_episode(begins)
@@ -171,6 +186,8 @@ class Worlds:
         self._ended = terminated | truncated
         info = self._info()
         ends = np.flatnonzero(self._ended)
+        if self._recorder is not None:
+            self._recorder.took(reward, ends)
         if len(ends) and self.autoreset is Autoreset.SAME_STEP:
             info |= {"final": observed(self._batch.shown, self.observation), "ended": self._ended.copy()}
             self._next_episode(ends)
@@ -193,6 +210,8 @@ class Worlds:
         if seed is not None:
             self._bound[target].clock[SEED] = seed_of(seed)
         self.episode[target], self._ended[target] = self.episode[source], self._ended[source]
+        if self._recorder is not None:
+            self._recorder.fork(source, target, self._beginning(target), partial(self._state_digest, target))
         self._show(np.array([target]), begun=True)
 
     def world(self, index: int) -> World:
@@ -207,8 +226,11 @@ class Worlds:
         """Return a digest of the states of all worlds: equal where all that is yet to come is equal."""
         found = hashlib.sha256()
         for index in range(self.n):
-            found.update(self.world(index).digest().encode())
+            found.update(self._state_digest(index).encode())
         return found.hexdigest()
+
+    def _state_digest(self, index: int) -> str:
+        return self.world(index).digest()
 
     def snapshot(self) -> bytes:
         """Return the states of all worlds, to be restored here or in other worlds of the same scenarios."""
@@ -227,6 +249,7 @@ class Worlds:
             "ended": self._ended,
         }
         arrays |= {f"world{index}": world.memory for index, world in enumerate(self._worlds)}
+        arrays |= self._recorder.held() if self._recorder is not None else {}
         data = io.BytesIO()
         np.savez(data, **arrays)
         return data.getvalue()
@@ -238,17 +261,27 @@ class Worlds:
             LogError: it is no snapshot, or one of other scenarios, or of another number of worlds.
         """
         wanted = self._snapshot_of(snapshot)
+        if self._recorder is not None:
+            check_held(wanted, wanted["clock"][:, STEP], self.n_brigades)
         self.seeds = Seeds(wanted["head"]["base"], test=wanted["head"]["test"])
         self.episode[:], self._ended[:] = wanted["episode"], wanted["ended"]
         for index, playing in enumerate(wanted["playing"].tolist()):
             self._place(index, playing, self._made(self._built[max(playing, 0)]))
             self._worlds[index].memory[:] = wanted[f"world{index}"]
             self._bound[index].clock[:] = wanted["clock"][index]
+            if self._recorder is not None:
+                self._recorder.restore(index, self._beginning(index), partial(self._state_digest, index), wanted)
         self._show(np.arange(self.n), begun=True)
         return observed(self._batch.shown, self.observation)
 
     def close(self) -> None:
-        """End the threads."""
+        """End the threads, and the log of episodes.
+
+        Raises:
+            OutputError: the log cannot be written.
+        """
+        if self._recorder is not None:
+            self._recorder.close()
         if self._pool is not None:
             self._pool.shutdown()
             self._pool = None
@@ -291,6 +324,26 @@ class Worlds:
         self._bound[index] = world.bound(self._team)
         self._rows[index] = self._bound[index].row
 
+    def _beginning(self, index: int) -> Beginning:
+        """Return the episode that begins in a world, for its record."""
+        clock, playing, episode = self._bound[index].clock, int(self._playing[index]), int(self.episode[index])
+        return Beginning(playing, episode, self.seeds.base, int(clock[SEED]), int(clock[STEP]))
+
+    def _environment(self) -> Environment:
+        """Return what is played in, for the log of episodes."""
+        return ENVIRONMENT.with_settings(
+            {
+                "observation": self.observation,
+                "reward": self.reward.kind if isinstance(self.reward.kind, str) else "function",
+                "own_targets": self.own_targets,
+                "steps": self._steps or 0,
+                "n_worlds": self.n,
+                "first_worker": self._first_worker,
+                "test_seeds": self.seeds.test,
+                "autoreset": self.autoreset.name.lower().replace("_", "-"),
+            }
+        )
+
     def _next_episode(self, which: Array) -> None:
         for index in which.tolist():
             self.episode[index] += 1
@@ -303,6 +356,8 @@ class Worlds:
             world.memory[:] = built.start.packing.memory
             clock = self._bound[index].clock
             clock[SEED], clock[STEP], clock[LAST_STEP] = self.seeds.seed(worker, episode), 0, world.n_steps_max
+            if self._recorder is not None:
+                self._recorder.begin(index, self._beginning(index))
         self._ended[which] = False
         self._show(which, begun=False)
 
@@ -318,8 +373,8 @@ class Worlds:
             for nothing in (view.features, view.alive, view.chooses):
                 nothing[index, world.n_brigades :] = 0
         self._in_kernel(lambda rows, batch, some: show_worlds(rows, batch, some, begun), which)
-        result = self._batch.result
-        self._share = result.score[:, 0] / np.maximum(result.score[:, 1], 1.0)
+        score = self._batch.result.score[which]
+        self._share[which] = score[:, 0] / score[:, 1]
 
     def _in_kernel(self, kernel: Callable[[Array, Array, Array], object], which: Array) -> None:
         """Let a kernel work on worlds, in threads if there are any."""
@@ -416,6 +471,7 @@ def worlds(
     threads: int = 1,
     seeds: Seeds | int = 0,
     first_worker: int = 0,
+    record: str | os.PathLike[str] | None = None,
     set: Mapping[str, Any] | None = None,
 ) -> Worlds:
     """Return n worlds that the caller steps at once.
@@ -435,11 +491,14 @@ def worlds(
         threads: that step the worlds.
         seeds: of the episodes; or the base that they follow from.
         first_worker: number of the first world among those of several processes, so that no two share seeds.
+        record: the log to write, with the seed and the actions of every episode, from which each can be replayed in
+            full; or an existing folder for logs. Copies and pickles do not record.
         set: keys of the scenarios with other values, as in {"brigades.n": 7}.
 
     Raises:
         ScenarioError, CityError: a scenario cannot be had or built.
         ArgumentError: an argument that makes no sense.
+        OutputError: the log cannot be made.
     """
     n = whole_number("n", n, least=1, most=WORKERS_MAX)
     several = scenarios if isinstance(scenarios, Sequence) and not isinstance(scenarios, str) else [scenarios]
@@ -458,6 +517,7 @@ def worlds(
         threads=whole_number("threads", threads, least=1, most=64),
         seeds=seeds if isinstance(seeds, Seeds) else Seeds(seed_of(seeds, name="seeds")),
         first_worker=whole_number("first_worker", first_worker, least=0, most=WORKERS_MAX - n),
+        record=record,
     )
 
 

@@ -18,6 +18,7 @@ from fireworld.simulation.observer import Observer
 from fireworld.simulation.state import copy_into, copy_world, restore_snapshot
 from fireworld.simulation.world import World
 from fireworld.training.log.episode_run import LEARNING_ATTACHMENT
+from fireworld.training.log.played_run import recorded_seeds
 
 
 @dataclass(frozen=True)
@@ -90,12 +91,15 @@ def resume(
         with_memory: the recorded policy, if it has a memory: it then sees every step from the first.
 
     Raises:
-        LogError: the recording does not begin with step 0, or lacks a step.
+        LogError: the recording does not begin with step 0, lacks a step, or went on with another seed in its middle.
         PolicyError: `with_memory` would not have decided as is recorded.
     """
     header, records = recording.header, list(recording)
     if [record.step for record in records] != list(range(len(records))):
         raise LogError(expected(source, "steps", f"every step from 0 to {records[-1].step}", "some are missing"))
+    if len(seeds := recorded_seeds(header)) > 1:
+        got = f"one that went on with another after step {[*seeds][1]}, where it was forked while it was played"
+        raise LogError(expected(source, "seed", "a run of one seed", got))
     world = built.world(seed=header.seed, n_steps_max=header.n_steps_max)
     start = _restore(world, records) if with_memory is None else 0
     decider: Policy = RecordedDecisions(recording)

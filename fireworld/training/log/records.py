@@ -22,6 +22,7 @@ from fireworld.policy.words import N_STATES
 from fireworld.records import ACTIONS, CHOICES, Array, column, value
 from fireworld.rewards import TERMS
 from fireworld.simulation.state import fresh_trace
+from fireworld.training.log.played import Played, check_played
 
 FORMAT: Final = "fireworld-training/1"
 PACKAGE: Final = "fireworld.training.v1"
@@ -232,7 +233,8 @@ def check_places(record: Any, n_scenarios: int) -> None:
     Raises:
         LogError: it is not.
     """
-    fires = {Episode: ("scenario", "seed"), Tried: ("fire", "seed")}.get(type(record))
+    places = {Episode: ("scenario", "seed"), Played: ("scenario", "seed"), Tried: ("fire", "seed")}
+    fires = places.get(type(record))
     if fires is None:
         return
     scenario, seed = (np.atleast_1d(getattr(record, name)) for name in fires)
@@ -240,6 +242,8 @@ def check_places(record: Any, n_scenarios: int) -> None:
         raise LogError(f"{record.topic}: {fires[0]}: a scenario that the plan has not")
     if len(seed) and int(seed.max()) > SEED_MAX:
         raise LogError(f"{record.topic}: {fires[1]}: {int(seed.max())} is above {SEED_MAX}, the largest of a run")
+    if isinstance(record, Played):
+        check_played(record)
 
 
 TRAINING: Final = LogKind(
@@ -248,7 +252,7 @@ TRAINING: Final = LogKind(
     header_type=TrainingHeader,
     commit_type=PartCommit,
     first_type=Plan,
-    topics=(Plan, Episode, Tables, Updates, Tried, PartCommit),
+    topics=(Plan, Episode, Tables, Updates, Tried, Played, PartCommit),
     unchained=frozenset({Tables.topic, Updates.topic}),
     unit="part",
     rescue="--resume to continue, or --force to begin again",
