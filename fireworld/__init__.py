@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from fireworld.policy.teams.team import load_team as load_team
     from fireworld.recording.difference import Difference as Difference
     from fireworld.recording.difference import diff as diff
+    from fireworld.recording.episode import open_episode as open_episode
     from fireworld.recording.explain import Explanation as Explanation
     from fireworld.recording.explain import explain as explain
     from fireworld.recording.export import export as export
@@ -91,6 +92,7 @@ _ROOMS = {
     "import_log": "recording.official_log.importer",
     "import_osm": "maps.osm",
     "load_team": "policy.teams.team",
+    "open_episode": "recording.episode",
     "open_log": "recording.run",
     "open_training": "training.log.reader",
     "policies": "policy.names",

@@ -64,6 +64,8 @@ class EpisodeRecorder:
         self._histories = Histories(batch, names_targets=method.own_targets > 0)
         self._begun: list[Beginning | None] = [None] * n
         """Of the episodes that are under way, or not written yet."""
+        self._elsewhere = [False] * n
+        """Whether they began in forks or snapshots."""
         self._state = [""] * n
         """Digests of the states that they began in, where what was done before is not known."""
         self._total = np.zeros(n)
@@ -89,19 +91,19 @@ class EpisodeRecorder:
 
     def begin(self, index: int, beginning: Beginning) -> None:
         """Begin an episode at the start of its scenario; if one is under way, it was left."""
-        self._begin(index, beginning)
+        self._begin(index, beginning, elsewhere=False)
         self._histories.begin(index, beginning.seed)
         self._state[index] = ""
 
     def fork(self, source: int, index: int, beginning: Beginning, state: Callable[[], str]) -> None:
         """Begin an episode in the state of another world, of which `state` returns the digest."""
-        self._begin(index, beginning)
+        self._begin(index, beginning, elsewhere=True)
         self._histories.copy(source, index, beginning.step, beginning.seed)
         self._state[index] = "" if self._histories.known[index] else state()
 
     def restore(self, index: int, beginning: Beginning, state: Callable[[], str], held: Mapping[str, Array]) -> None:
         """Begin an episode in the state of a snapshot, which may hold what was done before."""
-        self._begin(index, beginning)
+        self._begin(index, beginning, elsewhere=True)
         self._histories.restore(index, beginning.step, beginning.seed, held)
         self._state[index] = "" if self._histories.known[index] else state()
 
@@ -121,8 +123,9 @@ class EpisodeRecorder:
             self._write(index)
         self._writer.close()
 
-    def _begin(self, index: int, beginning: Beginning) -> None:
+    def _begin(self, index: int, beginning: Beginning, *, elsewhere: bool) -> None:
         self._write(index)
+        self._elsewhere[index] = elsewhere
         self._begun[index] = beginning
         self._total[index] = 0.0
 
@@ -139,10 +142,11 @@ class EpisodeRecorder:
         self._commit(
             Played(
                 scenario=begun.scenario,
-                worker=self._first_worker + index,
+                world=self._first_worker + index,
                 episode=begun.episode,
                 base=begun.base,
                 seed=seed,
+                elsewhere=self._elsewhere[index],
                 first_step=begun.step,
                 state=state,
                 n_steps=last - begun.step,

@@ -13,6 +13,7 @@ from fireworld_recorder.codec import encode
 from fireworld.errors import LogError, expected
 from fireworld.shown import SHOWN_MAX, Block, Shown, TextTable
 from fireworld.training.log.first_difference import FirstDifference, Trained, first_difference
+from fireworld.training.log.played_difference import compare_played
 from fireworld.training.log.reader import AnyTraining, Part, TrainingLog, opened
 from fireworld.training.log.records import TRAINING
 from fireworld.training.log.spread import SPREAD_HEADS, SPREAD_NOTE, ScenarioDifference, Spread, spread_cells
@@ -112,6 +113,9 @@ def compare_trainings(
 ) -> TrainingDifference:
     """Compare trainings part by part, each read once; arguments and errors as for `diff_trainings`."""
     _check_comparable(a, b, names)
+    if a.is_played:
+        n, where, scenarios = compare_played(a, b, on_part)
+        return TrainingDifference(names, _header(a, b), n, a.header.unit, where, scenarios)
     first: FirstDifference | None = None
     spread = Spread()
     n_parts = 0

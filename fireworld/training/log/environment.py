@@ -62,7 +62,7 @@ class PlayedReport(Report):
     """How an episode that a learner played ended."""
 
     scenario: str
-    worker: int
+    world: int
     episode: int
     seed: int
     n_steps: int
@@ -78,7 +78,7 @@ class PlayedReport(Report):
     def text(self) -> str:
         """The episode in one line."""
         score = f"score {self.score:.2f} of {self.score_max:.0f}"
-        return f"{self.scenario}, world {self.worker}, episode {self.episode}: {self.n_steps} steps, {score}"
+        return f"{self.scenario}, world {self.world}, episode {self.episode}: {self.n_steps} steps, {score}"
 
 
 class PlayedTrainer(Trainer[Environment, PlayedReport]):
@@ -95,7 +95,7 @@ class PlayedTrainer(Trainer[Environment, PlayedReport]):
     unit: ClassVar[str] = "episode"
     topics: ClassVar[tuple[type[Any], ...]] = (Played,)
     plots: ClassVar[Mapping[str, str]] = {
-        "return": "Return, as the learner got it",
+        "learner_return": "Return, as the learner got it",
         "score": "Score, as a share of the best",
         "n_steps": "Steps",
         "n_burnt_out": "Burnt out",
@@ -145,7 +145,7 @@ class PlayedTrainer(Trainer[Environment, PlayedReport]):
     def points(self, report: PlayedReport) -> Mapping[str, Mapping[str, float]]:
         """Return what is drawn of the last episode."""
         values = report.as_dict()
-        values |= {"return": report.total_reward, "score": report.score / (report.score_max or 1.0)}
+        values |= {"learner_return": report.total_reward, "score": report.score / (report.score_max or 1.0)}
         return {name: {"": float(values[name])} for name in self.plots}
 
     def run(self, workers: Workers) -> NoReturn:

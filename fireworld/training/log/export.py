@@ -15,9 +15,10 @@ from fireworld.errors import LogError, OutputError, expected, nearest
 from fireworld.files import new_folder
 from fireworld.policy.teams.ranking_words import WEIGHTS
 from fireworld.policy.teams.table_words import first_state
-from fireworld.records import ACTIONS, CHOICES, Array
+from fireworld.records import ACTION_NAMES, ACTIONS, CHOICES, Array
 from fireworld.rewards import TERMS
 from fireworld.training.log.learned import LearnedEpisode
+from fireworld.training.log.played import Played
 from fireworld.training.log.reader import Part, TrainingLog
 from fireworld.training.log.records import Episode, Tables, Tried
 
@@ -33,11 +34,14 @@ TABLES: Final[Mapping[str, str]] = {
     "generations": "a generation of a search: how its rankings fared",
     "candidates": "a ranking that was tried in a generation: its weights and its score",
     "fights": "a ranking on a fire of its generation",
+    "played": "an episode that a learner played: how it went",
+    "actions": "a brigade in a step of an episode that a learner played: what it did, as far as it is known",
 }
 """What a row of each table is."""
 OF_KIND: Final[Mapping[type[Any], tuple[str, ...]]] = {
     Episode: ("episodes", "steps", "tables"),
     Tried: ("generations", "candidates", "fights"),
+    Played: ("played", "actions"),
 }
 
 
@@ -65,6 +69,8 @@ def rows_of(log: TrainingLog, names: Collection[str]) -> Iterator[tuple[str, Row
     for number, part in enumerate(log.parts()):
         if Episode in part:
             yield from _episode_rows(log, trainer, number, part, scenarios, names)
+        elif Played in part:
+            yield from _played_rows(log, number, part[Played], names)
         elif Tried in part:
             yield from _generation_rows(part[Tried], scenarios, names)
 
@@ -161,6 +167,24 @@ def _generation_rows(tried: Tried, scenarios: list[str], names: Collection[str])
                 "score": scores.ravel(),
             },
         )
+
+
+def _played_rows(log: TrainingLog, number: int, played: Played, names: Collection[str]) -> Iterator[tuple[str, Rows]]:
+    scenario = log.scenarios[played.scenario]
+    place = {"part": number, "scenario": scenario.name, "world": played.world, "episode": played.episode}
+    if "played" in names:
+        values = {item.name: getattr(played, item.name) for item in fields(played) if "per" not in item.metadata}
+        values |= {"state": played.state.hex(), "left": played.left, "replayable": played.replayable}
+        yield "played", {key: np.array([value]) for key, value in {**values, **place}.items()}
+    if "actions" in names:
+        action, target = (one.T.ravel() for one in played.decided(scenario.brigades.n))
+        n_rows = len(action) // scenario.brigades.n
+        columns: Rows = {key: np.full(len(action), value) for key, value in place.items()}
+        first = 0 if played.replayable else played.first_step
+        columns["step"] = np.tile(np.arange(first + 1, first + n_rows + 1, dtype=np.int32), scenario.brigades.n)
+        columns["brigade"] = np.repeat(np.arange(scenario.brigades.n, dtype=np.int32), n_rows)
+        columns["action"] = np.array([*ACTION_NAMES, ""], dtype=object)[action]
+        yield "actions", {**columns, "target": target}
 
 
 def export_training(

@@ -10,19 +10,19 @@ if TYPE_CHECKING:
     from fireworld.training.log.reader import TrainingLog
 
 
-def position_of(log: TrainingLog, scenario: str | int | None, episode: int, worker: int | None) -> int:
+def position_of(log: TrainingLog, scenario: str | int | None, episode: int, world: int | None) -> int:
     """Return the number of the part that an episode is; arguments and errors as for `TrainingLog.position`."""
     if not log.is_played:
         log.learner()  # or else there are no episodes
-        if scenario is None or worker is not None:
-            got = "none" if scenario is None else f"world {worker}"
+        if scenario is None or world is not None:
+            got = "none" if scenario is None else f"world {world}"
             raise LogError(expected(str(log.path), "scenario", "the scenario of the episode, and no world", got))
     found = _of_scenario(log, scenario)
-    if worker is not None:
-        found = [k for k in found if log.lines[k].worker == worker]
+    if world is not None:
+        found = [k for k in found if log.lines[k].world == world]
         if not found:
-            raise LogError(expected(str(log.path), "worker", f"a world that has episodes{_in(log, scenario)}", worker))
-    by_count = log.is_played and worker is None
+            raise LogError(expected(str(log.path), "world", f"a world that has episodes{_in(log, scenario)}", world))
+    by_count = log.is_played and world is None
     numbers = [*range(len(found))] if by_count else [log.lines[k].episode for k in found]
     number = numbers[-1] if episode == -1 else episode
     if number not in numbers:

@@ -41,34 +41,35 @@ class Played:
 
     topic: ClassVar[str] = "/played"
     scenario: int = value(1, "sfixed32", "its scenario, a position in /plan")
-    worker: int = value(2, "sfixed32", "the world that it was played in, counted through all processes that learn")
+    world: int = value(2, "sfixed32", "the world that it was played in, counted through all processes that learn")
     episode: int = value(3, "sfixed32", "its number among those of the world, from 0")
     base: int = value(4, "fixed64", "what the seeds of the world's episodes follow from")
     seed: int = value(5, "fixed64", "of its random draws, from the first step on")
-    first_step: int = value(6, "sfixed32", "the step after which the learner began; 0: at the start")
+    elsewhere: bool = value(6, "bool", "it began in a fork or a snapshot of another one")
+    first_step: int = value(7, "sfixed32", "the step after which the learner began; 0: at the start")
     state: bytes = value(
-        7, "bytes", "SHA-256 of the state that the learner began in, where what was done before is not known; or empty"
+        8, "bytes", "SHA-256 of the state that the learner began in, where what was done before is not known; or empty"
     )
-    n_steps: int = value(8, "sfixed32", "steps that the learner played")
-    terminated: bool = value(9, "bool", "nothing burned any more")
+    n_steps: int = value(9, "sfixed32", "steps that the learner played")
+    terminated: bool = value(10, "bool", "nothing burned any more")
     truncated: bool = value(
-        10, "bool", "the last step was done, and something burned; an episode that is neither was left by the learner"
+        11, "bool", "the last step was done, and something burned; an episode that is neither was left by the learner"
     )
-    total_reward: float = value(11, "double", "sum of the rewards of the team that the learner got")
-    score: float = value(12, "double", "official score of the paper's time, at the end")
-    score_max: float = value(13, "double", "number of civilians + 1")
-    n_burnt_out: int = value(14, "sfixed32", "buildings with code 8 at the end")
-    n_civilians_alive: int = value(15, "sfixed32", "civilians with HP > 0 at the end")
+    total_reward: float = value(12, "double", "sum of the rewards of the team that the learner got")
+    score: float = value(13, "double", "official score of the paper's time, at the end")
+    score_max: float = value(14, "double", "number of civilians + 1")
+    n_burnt_out: int = value(15, "sfixed32", "buildings with code 8 at the end")
+    n_civilians_alive: int = value(16, "sfixed32", "civilians with HP > 0 at the end")
     action: Array = column(
-        16,
+        17,
         "uint8",
         "what it did; 4 it named a target, 5 it had nothing to choose",
         per="choice",
         names=(*ACTION_NAMES, "none"),
     )
-    target: Array = column(17, "sfixed32", "the buildings that were named, in the order of the actions 4", per="choice")
-    later_step: Array = column(18, "sfixed32", "steps after which a fork went on with another seed, rising", per="seed")
-    later_seed: Array = column(19, "fixed64", "these seeds", per="seed")
+    target: Array = column(18, "sfixed32", "the buildings that were named, in the order of the actions 4", per="choice")
+    later_step: Array = column(19, "sfixed32", "steps after which a fork went on with another seed, rising", per="seed")
+    later_seed: Array = column(20, "fixed64", "these seeds", per="seed")
 
     @property
     def left(self) -> bool:
@@ -86,36 +87,33 @@ class Played:
         return self.first_step + self.n_steps
 
     @property
+    def n_known(self) -> int:
+        """How many steps are known, from the start on, or only those that the learner played."""
+        return self.last_step if self.replayable else self.n_steps
+
+    @property
     def seeds(self) -> dict[int, int]:
         """The seeds by the step after which each counts."""
         return {0: self.seed} | dict(zip(self.later_step.tolist(), self.later_seed.tolist(), strict=True))
 
     def decided(self, n_brigades: int) -> Decided:
-        """Return what the brigades did, from the first step that is known on.
-
-        Raises:
-            LogError: it is not of that many brigades and of this number of steps.
-        """
-        n, named = self.last_step if self.replayable else self.n_steps, self.action == OWN
-        if len(self.action) != n_brigades * n or len(self.target) != int(named.sum()):
-            raise LogError(f"{self.topic}: its actions are not those of {n_brigades} brigades and {n} steps")
-        if max(self.action) > NOTHING:
-            raise LogError(f"{self.topic}: an action that there is not")
+        """Return what the brigades did, from the first step that is known on; it fits that many brigades."""
+        n, named = self.n_known, self.action == OWN
         action, target = self.action.astype(np.int32), np.full(len(self.action), -1, dtype=np.int32)
         target[named] = self.target
         action[action == NOTHING] = -1
         return Decided(*(np.ascontiguousarray(one.reshape(n_brigades, n).T) for one in (action, target)))
 
 
-def check_played(played: Played) -> None:
-    """Check the numbers of an episode that do not depend on its scenario.
+def check_played(played: Played, n_brigades: int) -> None:
+    """Check that an episode of so many brigades can be what is recorded of it.
 
     Raises:
-        LogError: they make no sense.
+        LogError: it cannot.
     """
     steps, seeds = played.later_step, [played.base, played.seed, *played.later_seed.tolist()]
     fits = (
-        0 <= played.worker < WORKERS_MAX
+        0 <= played.world < WORKERS_MAX
         and 0 <= played.episode < EPISODES_MAX
         and 0 <= played.first_step < STEP_MAX
         and 0 < played.n_steps < STEP_MAX
@@ -124,6 +122,12 @@ def check_played(played: Played) -> None:
         and max(seeds) <= SEED_MAX
         and (np.diff(steps, prepend=0) > 0).all()
         and max(steps, default=0) <= played.first_step
+        and (played.elsewhere or not (played.first_step or played.state or len(steps)))
     )
     if not fits:
         raise LogError(f"{Played.topic}: an episode that cannot have begun or ended so")
+    n = played.n_known
+    if len(played.action) != n_brigades * n or len(played.target) != int((played.action == OWN).sum()):
+        raise LogError(f"{Played.topic}: its actions are not those of {n_brigades} brigades and {n} steps")
+    if played.action.max() > NOTHING or played.target.min(initial=0) < 0:
+        raise LogError(f"{Played.topic}: an action or a target that there is not")

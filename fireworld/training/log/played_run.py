@@ -33,7 +33,7 @@ class EpisodePlace(msgspec.Struct, frozen=True, kw_only=True):
 
     log: str
     """Digest of the training log."""
-    worker: int
+    world: int
     episode: int
     base: int
     first_step: int
@@ -66,22 +66,18 @@ class PlayedEpisode:
         """Make it of its record.
 
         Raises:
-            LogError: what is recorded is not of such a scenario.
+            LogError: what is recorded is not of that scenario.
         """
-        try:
-            decided = record.decided(built.n_brigades)
-        except LogError as error:
-            raise LogError(f"{source}: {error}") from None
-        if max(record.target, default=0) >= built.city.n_buildings or min(record.target, default=0) < 0:
+        if record.target.max(initial=0) >= built.city.n_buildings:
             raise LogError(f"{source}: {record.topic}: a target that is no building")
         if record.last_step > method.last_step(built.scenario):
             raise LogError(f"{source}: {record.topic}: a step after the last one")
-        return cls(record, built, method, decided, log, source)
+        return cls(record, built, method, record.decided(built.n_brigades), log, source)
 
     @property
     def place(self) -> EpisodePlace:
         """Where it comes from."""
-        named = {name: getattr(self.record, name) for name in ("worker", "episode", "base", "first_step", "seeds")}
+        named = {name: getattr(self.record, name) for name in ("world", "episode", "base", "first_step", "seeds")}
         return EpisodePlace(log=self.log, **named)
 
 

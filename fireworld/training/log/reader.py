@@ -95,6 +95,7 @@ class TrainingLog(Shown):
         except LogError as error:
             raise LogError(f"{path}: {error}") from None
         self._topics = self.trainer().topics
+        self._n_brigades = [one.brigades.n for one in self.scenarios]
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -126,7 +127,7 @@ class TrainingLog(Shown):
             try:
                 part = {one: decode(one, payloads[one.topic]) for one in self._topics if one.topic in payloads}
                 for record in part.values():
-                    check_places(record, len(self.scenarios))
+                    check_places(record, self._n_brigades)
                 yield part
             except LogError as error:
                 raise LogError(f"{self.path}: part {number}: {error}") from error
@@ -214,7 +215,7 @@ class TrainingLog(Shown):
             record = next(iter(part.values()), None)
             if record is None:
                 raise LogError(f"{self.path}: part {number}: it holds nothing of the method {self.method.name}")
-            lines.append(_without_columns(record))
+            lines.append(without_columns(record))
             if whole in part:
                 wholes.append(number)
         return lines, wholes
@@ -273,21 +274,21 @@ class TrainingLog(Shown):
         """Whether somebody else's learner played it in environments."""
         return isinstance(self.method, Environment)
 
-    def position(self, scenario: str | int | None, episode: int, *, worker: int | None = None) -> int:
+    def position(self, scenario: str | int | None, episode: int, *, world: int | None = None) -> int:
         """Return the number of the part that an episode is.
 
         Args:
             scenario: its name, or its position in the plan; None: of what a learner played, any.
             episode: its number in the scenario, from 0; -1 is the last. Of what a learner played, it counts those that
-                are recorded, in the order in which they ended; with a worker, it is its number in that world.
-            worker: the world that a learner played it in; of several forks of an episode the first that ended.
+                are recorded, in the order in which they ended; with a world, it is its number in that world.
+            world: the world that a learner played it in; of several forks of an episode the first that ended.
 
         Raises:
             LogError: there is no such episode, or the method has none.
         """
         from fireworld.training.log.places import position_of
 
-        return position_of(self, scenario, episode, worker)
+        return position_of(self, scenario, episode, world)
 
     def episode(self, scenario: str | int, episode: int) -> LearnedEpisode:
         """Return an episode with all that was learned in it; arguments and errors as for `position`."""
@@ -379,7 +380,7 @@ def _setting(header: TrainingHeader) -> tuple[Method, Curriculum, CityCache]:
     return made, curriculum, CityCache(cities)
 
 
-def _without_columns(record: Any) -> Any:
+def without_columns(record: Any) -> Any:
     """Return a record with its columns left empty."""
     empty = np.zeros(0)
     return replace(record, **{item.name: empty for item in fields(record) if "per" in item.metadata})

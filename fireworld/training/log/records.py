@@ -6,7 +6,7 @@ Schemas, docs and exported tables are derived from the field metadata here. A fi
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Final, Self
 
@@ -227,8 +227,12 @@ class PartCommit:
     hash: bytes = value(3, "bytes", "32 bytes, chained to the commit before: the digest of the training up to here")
 
 
-def check_places(record: Any, n_scenarios: int) -> None:
+def check_places(record: Any, n_brigades: Sequence[int]) -> None:
     """Check that a record is of scenarios that the plan has, and of seeds that a run can have.
+
+    Args:
+        record: of whatever type.
+        n_brigades: of each scenario.
 
     Raises:
         LogError: it is not.
@@ -238,12 +242,12 @@ def check_places(record: Any, n_scenarios: int) -> None:
     if fires is None:
         return
     scenario, seed = (np.atleast_1d(getattr(record, name)) for name in fires)
-    if len(scenario) and not 0 <= int(scenario.min()) <= int(scenario.max()) < n_scenarios:
+    if len(scenario) and not 0 <= int(scenario.min()) <= int(scenario.max()) < len(n_brigades):
         raise LogError(f"{record.topic}: {fires[0]}: a scenario that the plan has not")
     if len(seed) and int(seed.max()) > SEED_MAX:
         raise LogError(f"{record.topic}: {fires[1]}: {int(seed.max())} is above {SEED_MAX}, the largest of a run")
     if isinstance(record, Played):
-        check_played(record)
+        check_played(record, n_brigades[record.scenario])
 
 
 TRAINING: Final = LogKind(

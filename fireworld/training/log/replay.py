@@ -23,7 +23,7 @@ def replay_episode(
     episode: int,
     output: str | os.PathLike[str],
     *,
-    worker: int | None = None,
+    world: int | None = None,
     force: bool = False,
 ) -> str:
     """Write an episode of a training as the log of a run, worked out by replay and compared with the training log.
@@ -34,7 +34,7 @@ def replay_episode(
         episode: its number in the scenario, from 0; -1 is the last. Of what a learner played, it counts the episodes
             that are recorded.
         output: the log to write.
-        worker: the world that a learner played it in; then the number is that in the world.
+        world: the world that a learner played it in; then the number is that in the world.
         force: replace an existing one.
 
     Returns:
@@ -45,7 +45,7 @@ def replay_episode(
         OutputError: the output cannot be written.
     """
     training = opened(log, partial=True)
-    number = training.position(scenario, episode, worker=worker)
+    number = training.position(scenario, episode, world=world)
     return write_run(run_of(training, number), path_of("output", output), force=force)
 
 
