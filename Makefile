@@ -74,6 +74,7 @@ docs: install  ## Renew what is made from the code in docs/, and the transcripts
 	$(BIN)/python -m tests.docs.log_format
 	$(BIN)/python -m tests.docs.foxglove_schema
 	$(BIN)/python -m tests.docs.scenario_reference
+	$(BIN)/python -m tests.docs.contested_table
 	$(BIN)/python -m tests.docs.cli_reference
 	$(BIN)/python -m tests.docs.transcripts
 

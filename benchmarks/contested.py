@@ -2,9 +2,8 @@
 
     python -m benchmarks.contested [--check]
 
-A fire starts at a random place, and grows building by building until six rules that do not learn score less than 60 %
-of the maximum on the mean; it is contested if that leaves them more than 12 %: some of them hold it, some of them lose
-it. No team that learns is asked.
+A fire starts at a random place, and grows building by building until it is contested, as in `fw.new_scenarios`; but
+the places lie anywhere in the inner part of the city, and each rule runs twice.
 """
 
 from __future__ import annotations
@@ -12,22 +11,20 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+import msgspec
+
 from fireworld.draws import PLACEMENT, below, uniform
-from fireworld.evaluation.runs import evaluate
-from fireworld.policy.names import BUILT_IN
-from fireworld.records import ACTIONS
-from fireworld.scenario import load_scenario
-from fireworld.simulation.built import CityCache
+from fireworld.evaluation.growth import FirePlace, grow
+from fireworld.evaluation.judge import Judge
+from fireworld.executors import threads
+from fireworld.scenario import Scenario, load_scenario
 
 FOLDER: Final = Path(__file__).parents[1] / "scenarios" / "curricula"
-RULES: Final = (*ACTIONS, "each-another", "random")
 SEEDS: Final = (11, 12)
-LOST_BELOW, HELD_ABOVE = 0.12, 0.6
-SIZES: Final = range(4, 17)
+COUNTS: Final = range(4, 17)
 N_FIRES_OF_CITY: Final = 8
 LARGER: Final = 1.25
 CURRICULA: Final = {
@@ -37,66 +34,44 @@ CURRICULA: Final = {
 """Seeds of the cities and description, by name."""
 
 
-@dataclass(frozen=True)
-class Fire:
-    """A fire in a generated city."""
-
-    city: int
-    at: tuple[float, float]
-    n_buildings: int
-    n_civilians: int
-
-    def settings(self) -> dict[str, str]:
-        """Return the keys of a scenario that make it."""
-        return {
-            "city.generated.seed": f"{self.city}",
-            "fires.0.at": f"[{self.at[0]:.3f}, {self.at[1]:.3f}]",
-            "fires.0.n_buildings": f"{self.n_buildings}",
-            "civilians.n": f"{self.n_civilians}",
-            "civilians.seed": f"{self.city + 7}",
-        }
-
-    def enlarged(self) -> Fire:
-        """Return the fire a quarter larger."""
-        return Fire(self.city, self.at, round(LARGER * self.n_buildings), self.n_civilians)
-
-
-def contested_fires(city: int) -> Iterator[Fire]:
+def contested_fires(city: int) -> Iterator[Scenario]:
     """Yield the contested fires of a city, as many as are wanted, from four times as many places at most."""
-    cities = CityCache()
+    base = load_scenario("test-2").with_values({"city.generated.seed": city, "steps": 400})
+    judge = Judge(SEEDS, workers=threads())
     n_found = 0
-    for place in range(4 * N_FIRES_OF_CITY):
-        x, y = (0.12 + 0.76 * uniform(city, PLACEMENT, place, axis) for axis in (1, 2))
-        n_civilians = 8 + below(city, PLACEMENT, place, 3, bound=4)
-        for n_buildings in SIZES:
-            fire = Fire(city, (x, y), n_buildings, n_civilians)
-            share = mean_share(fire, cities)
-            if share < HELD_ABOVE:
-                break
-        if LOST_BELOW < share < HELD_ABOVE:
-            yield fire
+    for number in range(4 * N_FIRES_OF_CITY):
+        x, y = (round(0.12 + 0.76 * uniform(city, PLACEMENT, number, axis), 3) for axis in (1, 2))
+        n_civilians = 8 + below(city, PLACEMENT, number, 3, bound=4)
+        people = msgspec.structs.replace(base.civilians, n=n_civilians, seed=city + 7)
+        grown = grow(base, FirePlace(number + 1, ((x, y),), people), COUNTS, judge)
+        if grown.verdict == "contested" and grown.built is not None:
+            yield grown.built.scenario
             n_found += 1
         if n_found == N_FIRES_OF_CITY:
             return
 
 
-def mean_share(fire: Fire, cities: CityCache) -> float:
-    """Return the mean score of the rules, as a share of the maximum."""
-    scenario = load_scenario("test-2").with_settings({**fire.settings(), "steps": "400"})
-    built = cities.build(scenario)
-    shares = [evaluate(built, BUILT_IN[rule](), SEEDS).score_share.mean() for rule in RULES]
-    return float(sum(shares)) / len(shares)
+def settings(fire: Scenario, *, times: float = 1) -> str:
+    """Write the keys of a fire, with so many times as many burning buildings."""
+    generated, (x, y), n_burning = fire.city.generated, fire.fires[0].at or (0, 0), fire.fires[0].n_buildings or 0
+    keys = {
+        "city.generated.seed": generated.seed if generated else 0,
+        "fires.0.at": f"[{x:.3f}, {y:.3f}]",
+        "fires.0.n_buildings": round(times * n_burning),
+        "civilians.n": fire.civilians.n,
+        "civilians.seed": fire.civilians.seed,
+    }
+    return "{" + ", ".join(f"{key}: {value}" for key, value in keys.items()) + "}"
 
 
 def curriculum_text(name: str) -> str:
     """Write a curriculum."""
     cities, description = CURRICULA[name]
     fires = [fire for city in cities for fire in contested_fires(city)]
-    stages = {"contested": fires, "larger": [fire.enlarged() for fire in fires]}
     lines = [f"# Made by `python -m benchmarks.contested`, which says how.\ndescription: {description}\nstages:"]
-    for stage, members in stages.items():
+    for stage, times in (("contested", 1.0), ("larger", LARGER)):
         lines.append(f"  - name: {stage}\n    cooperation: true\n    base: test-2\n    set: {{steps: 400}}\n    each:")
-        lines += ["      - {" + ", ".join(f"{k}: {v}" for k, v in fire.settings().items()) + "}" for fire in members]
+        lines += [f"      - {settings(fire, times=times)}" for fire in fires]
     return "\n".join(lines) + "\n"
 
 

@@ -19,8 +19,13 @@ from fireworld.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from fireworld.errors import FireworldError as FireworldError
+    from fireworld.evaluation.check_scenarios import check_scenarios as check_scenarios
     from fireworld.evaluation.compare import compare as compare
     from fireworld.evaluation.comparison import Comparison as Comparison
+    from fireworld.evaluation.found_fires import NewScenarios as NewScenarios
+    from fireworld.evaluation.new_scenarios import new_scenarios as new_scenarios
+    from fireworld.evaluation.scenario_check import ScenarioCheck as ScenarioCheck
+    from fireworld.evaluation.scenario_check import ScenarioChecks as ScenarioChecks
     from fireworld.maps.exporting import export_city as export_city
     from fireworld.maps.importing import ImportedCity as ImportedCity
     from fireworld.maps.importing import import_city as import_city
@@ -72,16 +77,20 @@ _ROOMS = {
     "ImportedCity": "maps.importing",
     "ImportedOsm": "maps.osm",
     "NetworkTeam": "policy.teams.network_team",
+    "NewScenarios": "evaluation.found_fires",
     "Observation": "policy.protocol",
     "Outcome": "outcome",
     "Policy": "policy.protocol",
     "Reproduction": "reproduction.reproduce",
     "Run": "recording.run",
     "Scenario": "scenario",
+    "ScenarioCheck": "evaluation.scenario_check",
+    "ScenarioChecks": "evaluation.scenario_check",
     "Session": "simulation.session",
     "Team": "policy.teams.team",
     "TrainingLog": "training.log.reader",
     "Verification": "recording.verify",
+    "check_scenarios": "evaluation.check_scenarios",
     "compare": "evaluation.compare",
     "diff": "recording.difference",
     "explain": "recording.explain",
@@ -92,6 +101,7 @@ _ROOMS = {
     "import_log": "recording.official_log.importer",
     "import_osm": "maps.osm",
     "load_team": "policy.teams.team",
+    "new_scenarios": "evaluation.new_scenarios",
     "open_episode": "recording.episode",
     "open_log": "recording.run",
     "open_training": "training.log.reader",

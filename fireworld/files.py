@@ -300,6 +300,11 @@ def _remove(scratch: Path) -> None:
         raise
 
 
+def name_from(path: Path, folder: Path) -> str:
+    """Name a file as a text in a folder does: relative to the folder, with slashes."""
+    return Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
+
+
 def write_file(path: Path, data: bytes | str) -> None:
     """Write a file, beside and renamed; a text as UTF-8, with any bytes of names in it as Python writes them.
 

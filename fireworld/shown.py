@@ -70,6 +70,13 @@ def text_table(heads: Sequence[str], rows: Iterable[Sequence[str]], align: str) 
     return "\n".join([head, "-" * (sum(widths) + 2 * (len(widths) - 1)), *body])
 
 
+def block_text(block: Block) -> str:
+    """Return a line or a table as text."""
+    if isinstance(block, str):
+        return block
+    return text_table(block.heads, block.rows, "<" * block.n_left + ">" * (len(block.heads) - block.n_left))
+
+
 def _html(block: Block) -> str:
     if isinstance(block, str):
         return f"<div>{escape(block)}</div>"

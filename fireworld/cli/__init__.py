@@ -17,7 +17,7 @@ COMMANDS: Final = {
     "train": "Train a team, or several.",
     "policy": "List policies; show what a team does, or how two differ.",
     "reproduce": "Repeat the paper: its tables beside ours.",
-    "scenarios": "List the scenarios, or draw one.",
+    "scenarios": "List and draw scenarios; is a fire contested? Find one.",
     "city": "Import, export and draw cities of real maps.",
     "info": "Show what a recording holds and how far it is good.",
     "compare": "Compare two policies run by run, with a verdict.",

@@ -8,6 +8,7 @@ from typing import Any, Final, TypeVar
 
 import click
 
+from fireworld.evaluation.contested import HELD_ABOVE, LOST_BELOW
 from fireworld.policy.teams import team_names
 
 POLICY_HELP: Final = (
@@ -27,6 +28,34 @@ steps_option = click.option(
 settings_option = click.option(
     "--set", "settings", metavar="KEY=VALUE", multiple=True, help="Set a key of the scenario; repeatable."
 )
+
+
+def _numbers(context: click.Context, option: click.Parameter, text: str | None) -> list[int] | None:
+    """Turn "8-12", or "8,10,16", into whole numbers."""
+    if text is None:
+        return None
+    found: list[int] = []
+    for part in text.split(","):
+        first, dash, last = part.partition("-")
+        ends = [end.strip() for end in (first, last if dash else first)]
+        if not all(end.isascii() and end.isdecimal() and len(end) <= 6 for end in ends) or int(ends[0]) > int(ends[1]):
+            raise click.BadParameter(f"expected numbers as 8-12 or 4,8,16, got {text!r}.", context, option)
+        found += range(int(ends[0]), int(ends[1]) + 1)
+    return found
+
+
+counts_option = click.option(
+    "--counts", metavar="A-B", callback=_numbers,
+    help="Numbers of burning buildings to try, as 8-12 or 4,8,16.",
+)  # fmt: skip
+lost_option = click.option(
+    "--lost-below", metavar="X", default=LOST_BELOW, show_default=True, type=click.FloatRange(0, 1),
+    help="A mean score of the rules below it is lost.",
+)  # fmt: skip
+held_option = click.option(
+    "--held-above", metavar="X", default=HELD_ABOVE, show_default=True, type=click.FloatRange(0, 1),
+    help="A mean score of the rules above it is held.",
+)  # fmt: skip
 
 
 def record_options(command: Command) -> Command:

@@ -1,4 +1,4 @@
-"""`fireworld scenarios`: list the scenarios that come with fireworld, or draw one."""
+"""`fireworld scenarios`: list the scenarios that come with fireworld, draw, check and find some."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from fireworld.cli.scenarios_check import check
+from fireworld.cli.scenarios_new import new
 
 if TYPE_CHECKING:
     from fireworld.scenario import Scenario
@@ -19,7 +22,8 @@ if TYPE_CHECKING:
 def command(context: click.Context, *, as_json: bool) -> None:
     """List the scenarios that come with fireworld.
 
-    `fireworld scenarios show NAME` draws one.
+    `fireworld scenarios show NAME` draws one, `check` says whether its fire is contested, and `new` finds contested
+    fires in a city.
     """
     if context.invoked_subcommand is not None:
         if as_json:
@@ -32,6 +36,10 @@ def command(context: click.Context, *, as_json: bool) -> None:
         click.echo(json.dumps([_summary(scenario) for scenario in scenarios], indent=2))
     else:
         _print_table(scenarios)
+
+
+command.add_command(check)
+command.add_command(new)
 
 
 @command.command()

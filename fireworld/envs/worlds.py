@@ -144,7 +144,7 @@ class Worlds:
         """Begin the next episode of worlds, and return what is seen of all.
 
         Args:
-            seed: begin from episode 0 again with the seeds that follow from this base; None: go on.
+            seed: begin from episode 0 again with the seeds that follow from this base; None: the next ones.
             indices: of the worlds; None: all.
 
         Raises:

@@ -8,22 +8,22 @@ from pathlib import Path
 from threading import Event
 from typing import Any, Final
 
-from fireworld.arguments import SEED_MAX, ArgumentError, path_of, seed_of, settings_of, whole_number
-from fireworld.errors import ScenarioError, expected
+from fireworld.arguments import ArgumentError, path_of, settings_of
+from fireworld.errors import expected
 from fireworld.evaluation.comparison import ComparedPolicy, Comparison, find_metric
 from fireworld.evaluation.comparison_runs import ComparisonRuns, RunnablePolicy, runnable
+from fireworld.evaluation.inputs import scenarios_of, seeds_of
 from fireworld.evaluation.paired import compare_outcomes
 from fireworld.evaluation.results import open_results
 from fireworld.executors import AnyExecutor, in_processes, workers_for
 from fireworld.interrupt import gentle_interrupt
 from fireworld.policy.names import note_on_team
-from fireworld.scenario import Scenario, load_scenario
+from fireworld.scenario import Scenario
 from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.version import simulator_version
 
 TESTS: Final = ("test-1", "test-2", "test-3")
 N_SEEDS: Final = 100
-N_SEEDS_MAX: Final = 10_000
 
 
 def compare(
@@ -75,7 +75,7 @@ def compare(
     if not isinstance(margin, int | float) or not (math.isfinite(margin) and margin >= 0):
         raise ArgumentError(expected("margin", "", "a number from 0 on", margin))
     workers_for(executor)
-    run_seeds = _seeds(seeds, first_seed)
+    run_seeds = seeds_of(seeds, first_seed)
     known = open_results(None if results is None else path_of("results", results))
     if not isinstance(policies, Sequence) or isinstance(policies, str) or len(policies) < 2:
         raise ArgumentError(expected("policies", "", 'two or more, as in ["chief", "best"]', policies))
@@ -85,7 +85,8 @@ def compare(
             policy.named.require_identity("results")
         if in_processes(executor):
             policy.named.require_found_again("executor")
-    built = _built(scenarios, settings_of(set))
+    cities = CityCache()
+    built = {name: cities.build(one) for name, one in scenarios_of(scenarios, settings_of(set)).items()}
     runs = ComparisonRuns(found, built, run_seeds, known)
     with gentle_interrupt(stop) as interrupted:
         runs.make(executor, interrupted, on_run)
@@ -104,37 +105,6 @@ def compare(
         margin=float(margin),
         warnings=tuple(_warnings(found, built.values())),
     )
-
-
-def _seeds(seeds: object, first_seed: object) -> Sequence[int]:
-    """Return the seeds of the runs."""
-    if isinstance(seeds, Iterable) and not isinstance(seeds, str | bytes):
-        listed = [seed_of(seed, name="seeds") for seed in seeds]
-        if not listed or len({*listed}) < len(listed):
-            raise ArgumentError(expected("seeds", "", "one seed or more, each of them once", listed))
-        return listed
-    first = seed_of(first_seed, name="first_seed")
-    n = whole_number("seeds", seeds, least=1, most=N_SEEDS_MAX)
-    if first + n - 1 > SEED_MAX:
-        raise ArgumentError(expected("first_seed", "", f"{n} seeds up to {SEED_MAX}", first))
-    return range(first, first + n)
-
-
-def _built(scenarios: object, values: Mapping[str, Any]) -> dict[str, BuiltScenario]:
-    """Build the scenarios, by the names they were asked for."""
-    listed = [scenarios] if isinstance(scenarios, str | Path | Scenario) else scenarios
-    if not isinstance(listed, Sequence) or not listed:
-        raise ArgumentError(expected("scenarios", "", "one or more names, files or scenarios", scenarios))
-    cities, built, seen = CityCache(), dict[str, BuiltScenario](), dict[str, str]()
-    for place, given in enumerate(listed):
-        scenario = (given if isinstance(given, Scenario) else load_scenario(given)).with_values(values)
-        name = (scenario.name or f"scenario {place}") if isinstance(given, Scenario) else str(given)
-        if scenario.digest in seen or name in built:
-            got = f"{name} a second time" if name in built else f"{name}, which is the same as {seen[scenario.digest]}"
-            raise ScenarioError(expected("scenarios", "", "each scenario once", got))
-        seen[scenario.digest] = name
-        built[name] = cities.build(scenario)
-    return built
 
 
 def _warnings(policies: Iterable[RunnablePolicy], built: Iterable[BuiltScenario]) -> list[str]:

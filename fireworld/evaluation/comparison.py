@@ -12,6 +12,7 @@ from xml.etree import ElementTree as Xml
 
 from fireworld.arguments import ArgumentError
 from fireworld.errors import OutputError, expected, one_line
+from fireworld.evaluation.inputs import in_a_row, seeds_text
 from fireworld.evaluation.paired import N_SEEDS_ENOUGH, Judgement, Pairing, Verdict, judge, over_all
 from fireworld.html_page import html_mark, html_table, text_cell
 from fireworld.junit import report
@@ -156,7 +157,7 @@ class Comparison:
             "scenarios": [{"name": name, "digest": digest} for name, digest in self.scenarios],
             "first_seed": self.seeds[0],
             "n_seeds": len(self.seeds),
-            **({} if _in_a_row(self.seeds) else {"seeds": list(self.seeds)}),
+            **({} if in_a_row(self.seeds) else {"seeds": list(self.seeds)}),
             "comparisons": [pairing.to_dict() for pairing in self.pairings],
             "gate": judged if gate else None,
             "sentence": self.sentence,
@@ -266,13 +267,13 @@ def _html_rows(one: Comparison) -> list[list[str]]:
 
 def _title(one: Comparison) -> str:
     a, b = (policy.name for policy in one.policies)
-    return f"A: {a}, B: {b}, {_seeds(one.seeds)}"
+    return f"A: {a}, B: {b}, {seeds_text(one.seeds)}"
 
 
 def _sentence(one: Comparison) -> str:
     a, b = (policy.name for policy in one.policies)
     names = ", ".join(name for name, _ in one.scenarios)
-    where = f"{names}; {_seeds(one.seeds)}; fireworld {one.version}"
+    where = f"{names}; {seeds_text(one.seeds)}; fireworld {one.version}"
     if one.same_policy:
         return f"{b} against {a}: the same policy ({where})"
     verdicts = (over_all(one.pairings, metric.name).sentence for metric in METRICS)
@@ -312,13 +313,3 @@ def _case(one: Comparison, pairing: Pairing, *, several: bool) -> Xml.Element:
         text = f"{text}; {_gate(one)}"
     Xml.SubElement(case, "system-out").text = text
     return case
-
-
-def _seeds(seeds: Sequence[int]) -> str:
-    if len(seeds) == 1:
-        return f"seed {seeds[0]}"
-    return f"seeds {seeds[0]} to {seeds[-1]}" if _in_a_row(seeds) else f"{len(seeds)} seeds from {seeds[0]}"
-
-
-def _in_a_row(seeds: Sequence[int]) -> bool:
-    return all(seed == seeds[0] + k for k, seed in enumerate(seeds))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from types import SimpleNamespace
@@ -56,11 +56,26 @@ def evaluate(
 
     Without workers it is this thread that runs them; Interrupted if workers were asked to stop.
     """
-    tasks = [partial(run_compiled, built, policy, seed=seed) for seed in seeds]
-    found = [task() for task in tasks] if workers is None else workers.run(tasks)
+    return evaluate_each([(built, policy)], seeds, workers=workers)[0]
+
+
+def evaluate_each(
+    measured: Sequence[tuple[BuiltScenario, KernelPolicy]],
+    seeds: Sequence[int],
+    *,
+    workers: Workers | None = None,
+    on_run: Callable[[], object] = lambda: None,
+) -> list[Outcomes]:
+    """Run several policies, each in its scenario, as `evaluate` does.
+
+    Workers share all of the runs, and call `on_run` after each.
+    """
+    tasks = [partial(run_compiled, built, policy, seed=seed) for built, policy in measured for seed in seeds]
+    found = [task() for task in tasks] if workers is None else workers.run(tasks, lambda *_: on_run())
     if found is None:
         raise Interrupted("interrupted")
-    return Outcomes(seeds, [row_of(outcome) for outcome in found])
+    rows = [row_of(outcome) for outcome in found]
+    return [Outcomes(seeds, rows[first : first + len(seeds)]) for first in range(0, len(rows), len(seeds))]
 
 
 def run_compiled(built: BuiltScenario, policy: KernelPolicy, *, seed: int) -> Outcome:

@@ -29,20 +29,28 @@ def scenario_text(
         ScenarioError: no fires, or fires where nothing can burn; no refuge, and no brigades elsewhere.
         CityError: parameters out of bounds.
     """
+    document = scenario_document(files, imported, plan, fires=fires, city={"file": city})
+    return checked_scenario(document, plan, city_text)
+
+
+def scenario_document(
+    files: MapFiles, imported: Imported, plan: Plan, *, fires: Sequence[int] | None, city: dict[str, Any]
+) -> dict[str, Any]:
+    """Return the keys and values of a scenario for a map, in a city of these keys; else as `scenario_text`."""
     scenario = imported.scenario or ScenarioXml(str(files.map_file))
     document: dict[str, Any] = {
         "name": plan.name,
         "description": f"The map {plan.name}" + (f", {files.scenario_file.name}." if files.scenario_file else "."),
         "preset": PRESET,
         "parameters": overrides(imported.config, PRESETS[PRESET]),
-        "city": {"file": city},
+        "city": city,
         "fires": [{"buildings": _fires(scenario, imported, plan, fires)}],
         "civilians": {"at": scenario.at["civilian"]} if scenario.at["civilian"] else {"n": 0},
         "brigades": _brigades(scenario, imported),
         "steps": steps(imported.config),
     }
     _note_left_out(scenario, imported)
-    return checked_scenario(document, plan, city_text)
+    return document
 
 
 def _fires(scenario: ScenarioXml, imported: Imported, plan: Plan, fires: Sequence[int] | None) -> list[int]:

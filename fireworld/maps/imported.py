@@ -12,7 +12,7 @@ from typing import Any, Final
 from fireworld.arguments import path_of
 from fireworld.city.city import Plan
 from fireworld.city.formats.official.report import Report
-from fireworld.files import write_file
+from fireworld.files import name_from, write_file
 from fireworld.scenario.scenario import scenario_of
 from fireworld.scenario.yaml_text import write_yaml
 from fireworld.simulation.placement import place
@@ -51,7 +51,7 @@ def city_name(output: str | os.PathLike[str] | None, scenario: str | os.PathLike
     """Name the city file as the scenario file does: relative to the scenario's folder."""
     if output is None:
         return f"{name}.json"
-    return Path(os.path.relpath(Path(output).absolute(), Path(scenario).absolute().parent)).as_posix()
+    return name_from(Path(output), Path(scenario).parent)
 
 
 def checked_scenario(document: dict[str, Any], plan: Plan, city_text: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
 from fireworld.city.city import Plan
 from fireworld.city.formats import read_plan
@@ -19,6 +19,7 @@ from fireworld.simulation.placement import scenario_plan
 
 MAP_ENDINGS: Final = (".gml", ".gz")
 SCENARIO_ENDINGS: Final = (".yaml", ".yml")
+Kind = Literal["map", "scenario", "city file"]
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,13 @@ class CitySource:
         return OFFICIAL_2013 if self.scenario is None else self.scenario.resolved_parameters
 
 
+def kind_of(path: Path) -> Kind:
+    """Return what a path that names a city is: an official map, a scenario (by name or file), or a city file."""
+    if path.is_dir() or path.suffix.lower() in MAP_ENDINGS:
+        return "map"
+    return "scenario" if path.suffix.lower() in SCENARIO_ENDINGS or not path.suffix else "city file"
+
+
 def city_of(given: str | os.PathLike[str] | Scenario) -> CitySource:
     """Return the city of a city file, of a scenario by name or file, or of an official map.
 
@@ -43,9 +51,10 @@ def city_of(given: str | os.PathLike[str] | Scenario) -> CitySource:
     if isinstance(given, Scenario):
         return CitySource(scenario_plan(given), given)
     path = Path(given)
-    if path.is_dir() or path.suffix.lower() in MAP_ENDINGS:
+    kind = kind_of(path)
+    if kind == "map":
         return CitySource(read_plan(city_file(path), file=Path(f"{path.stem}.json"), where=str(path)), None)
-    if path.suffix.lower() in SCENARIO_ENDINGS or not path.suffix:
+    if kind == "scenario":
         scenario = load_scenario(os.fspath(given))
         return CitySource(scenario_plan(scenario), scenario)
     what = "a city file, a scenario or a map"

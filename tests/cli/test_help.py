@@ -44,7 +44,7 @@ def test_the_list_of_commands():
     assert not any(name.startswith("fireworld.cli.") for name in modules), "it imports no command"
 
 
-@pytest.mark.parametrize("name", [*COMMANDS, "scenarios show"])
+@pytest.mark.parametrize("name", [*COMMANDS, "scenarios show", "scenarios check", "scenarios new"])
 def test_the_help_of_a_command(name):
     code, out, modules = ask(*name.split(), "--help")
     assert code == 0

@@ -146,7 +146,9 @@ def test_no_pickle_is_read_anywhere():
                 seen.add(name)
                 assert function == "np.savez" or "allow_pickle" in keywords, f"{name}: {function}"
             assert not (function.split(".")[0] in {"pickle", "marshal", "shelve", "dill"} and last in UNSAFE), name
-            assert function not in {"yaml.unsafe_load", "yaml.full_load", "eval", "exec"}, f"{name}: {function}"
+            assert function not in {"yaml.unsafe_load", "yaml.full_load"}, f"{name}: {function}"
+            if function in {"eval", "exec"}:  # nothing that comes from a file
+                assert all(isinstance(argument, ast.Constant) for argument in call.args), f"{name}: {function}"
     assert "fireworld/policy/teams/npz.py" in seen
 
 

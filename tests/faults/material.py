@@ -52,6 +52,7 @@ def warm() -> None:
         "rerun",
         "fireworld.conformance.check",
         "fireworld.evaluation.compare",
+        "fireworld.evaluation.new_scenarios",
         "fireworld.recording.explanation",
         "fireworld.recording.fork",
         "fireworld.recording.golden.update",

@@ -52,6 +52,10 @@ TWO: Final = {**RUN, "other.mcap": "other.mcap"}
 TRAINING: Final = {"training.mcap": "training.mcap"}
 STALE: Final = {"mine.py": "mine_changed.py", "stale": "stale"}
 COMPARE: Final = ("compare", "chief", "easiest", "--scenarios", "quick", "--seeds", 3, "--jobs", 1, "--set", "steps=12")
+NEW: Final = (
+    *("scenarios", "new", "--city", "quick", "--set", "steps=40", "--seeds", 1, "--jobs", 1),
+    *("--held-above", 0.9, "--lost-below", 0.05),
+)
 STEPS: Final = ("--steps", N_STEPS)
 
 WRITERS: Final[dict[str, Writer]] = {
@@ -196,6 +200,10 @@ WRITERS: Final[dict[str, Writer]] = {
     ),
     "view": Writer(("view", "run.mcap", "--save", "v.rrd"), ("v.rrd",), RUN, ("--force",), whole=whole.rrd),
     "scenarios show": Writer(("scenarios", "show", "quick", "-o", "s.png"), ("s.png",), {}, ("--force",)),
+    "scenarios new": Writer((*NEW, "-o", "n.yaml"), ("n.yaml",), {}, ("--force",)),
+    "scenarios new, several": Writer(
+        (*NEW, "--n", 2, "-o", "n.yaml"), ("n.yaml", "n-1.yaml", "n-2.yaml"), {}, ("--force",)
+    ),
     "reproduce": Writer(
         ("reproduce", "--repetitions", 1, "--seeds", 2, "--jobs", 1, "--out", "found"),
         ("found",),

@@ -3,5 +3,6 @@
 FRONT_DOOR = {
     *("run", "world", "Session", "open_log", "Run", "verify", "diff", "fork", "explain", "recover", "export"),
     *("compare", "reproduce", "train", "Team", "NetworkTeam", "load_team", "Scenario", "scenarios"),
+    *("check_scenarios", "new_scenarios", "ScenarioCheck", "ScenarioChecks", "NewScenarios"),
     *("Policy", "policies", "Action", "Decision", "Observation"),
 }

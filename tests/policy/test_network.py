@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from fireworld_recorder.reader import open_log
+from fireworld_viewer.story.narration import decision_lines
+from fireworld_viewer.story.series import choices_of
 
 import fireworld as fw
 from fireworld.kernels.ranking import N_WEIGHTS
@@ -164,6 +166,15 @@ def test_every_command_follows_it(here, fireworld):
     assert (done.code, "moved.npz" in done.out) == (0, True)
     done = fireworld("explain", "a.mcap", "b.mcap", "--budget", 4)
     assert done.code == 0, done.err
+
+
+def test_a_view_names_the_values(here):
+    fw.run("quick", policy=make_network(), steps=2, record="a.mcap")
+    log = open_log("a.mcap")
+    choices = choices_of(log)
+    lines = [line.text for line in decision_lines(log, choices, np.ones_like(choices.ranked)) if line.step == 1]
+    for line, value in zip(lines, log.step(1).decisions.target_value, strict=True):
+        assert f"value {value:.4g}" in line
 
 
 def test_it_is_a_policy_by_its_path(tmp_path):

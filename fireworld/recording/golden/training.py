@@ -15,7 +15,7 @@ from fireworld.errors import LogError, expected
 from fireworld.executors import threads
 from fireworld.recording.golden.spec import SPEC_ATTACHMENT, hash_line, path_from, path_to, setting_texts
 from fireworld.scenario import scenario_names
-from fireworld.shown import text_table
+from fireworld.shown import block_text, text_table
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import curriculum_names, find_curriculum
 from fireworld.training.log.difference import TrainingDifference
@@ -182,8 +182,4 @@ def training_changes(difference: TrainingDifference) -> Iterator[str]:
     """Yield what else is different: in what was asked for, in the tables, and scenario by scenario."""
     _, *blocks = difference.describe()
     for block in blocks:
-        if isinstance(block, str):
-            yield from block.split("\n")
-        else:
-            align = "<" * block.n_left + ">" * (len(block.heads) - block.n_left)
-            yield from text_table(block.heads, block.rows, align).splitlines()
+        yield from block_text(block).split("\n")

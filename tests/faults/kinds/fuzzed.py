@@ -30,6 +30,8 @@ READERS: Final[dict[str, tuple[tuple[object, ...], ...]]] = {
         ("scenarios", "show", "in.yaml", "--yaml"),
         ("scenarios", "show", "in.yaml", "-o", "out.png"),
         ("compare", "chief", "easiest", "--scenarios", "in.yaml", "--seeds", 1, "--jobs", 1, *SHORT),
+        ("scenarios", "check", "in.yaml", "--seeds", 1, "--jobs", 1, *SHORT),
+        ("scenarios", "new", "--city", "in.yaml", "-o", "out.yaml", "--seeds", 1, "--jobs", 1, "--places", 2, *SHORT),
         ("golden", "add", "in.yaml", "--policy", "chief", "--steps", 2),
         TRAIN,
     ),
@@ -98,7 +100,7 @@ def run(generator: random.Random, bench: Bench) -> Outcome:
     bench.bring({"team.npz": "team.npz", "mini.npz": "traces/mini.npz", "mini.json": "traces/mini.json"})
     bench.processes = as_process(generator, 0.06)
     codes = {*VERDICT_OR_REFUSED, 3} if "--gate" in words else VERDICT_OR_REFUSED
-    if words[0] not in {"conformance", "policy", "compare"}:
+    if words[0] not in {"conformance", "policy", "compare"} and "new" not in words:
         codes = codes - {1}
     done = bench.call(words, codes=codes)
     left = [file for file in bench.files() if ".fireworld-" in file or (done.code == 2 and file.startswith("out"))]

@@ -74,4 +74,11 @@ def studies(folder: Path) -> None:
     verdict: str = comparison.verdict("score", policy="best")
     assert verdict != "worse"
     assert_type(fw.scenarios(), list[fw.Scenario])
+    checks = fw.check_scenarios(["quick", folder / "town.yaml"], counts=range(2, 9), seeds=4)
+    assert_type(checks, fw.ScenarioChecks)
+    assert_type(checks.checks[0], fw.ScenarioCheck)
+    assert checks.checks[0].verdict != "lost"
+    found = fw.new_scenarios(folder / "town.json", n=2, brigades=3, output=folder / "fires.yaml")
+    assert_type(found, fw.NewScenarios)
+    assert_type(found.scenarios, list[fw.Scenario])
     assert "best" in [policy.name for policy in fw.policies()]
