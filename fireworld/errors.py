@@ -55,6 +55,10 @@ class OutputError(FireworldError):
     """An output that cannot be written: it exists, its folder does not, the disk is full."""
 
 
+class LibraryError(FireworldError, ImportError):
+    """A library that only a part of fireworld needs, and that is not installed."""
+
+
 def expected(where: str, key: str, wanted: str, got: object, hint: str = "") -> str:
     """Return an error message in the form that all of fireworld's have.
 

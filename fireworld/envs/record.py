@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+import weakref
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from fireworld.envs.history import Histories
+from fireworld.envs.autoreset import Autoreset
+from fireworld.envs.bound_worlds import BoundWorlds
+from fireworld.envs.history import Histories, recorded
+from fireworld.envs.setup import Setup
 from fireworld.errors import OutputError, expected
-from fireworld.kernels.arrays import COUNTS, Array
-from fireworld.kernels.batch import Batch
+from fireworld.kernels.arrays import COUNTS, STEP, Array
 from fireworld.scenario import Scenario
-from fireworld.training.log.environment import Environment, PlayedTrainer, curriculum_played
-from fireworld.training.log.played import OWN, Played
+from fireworld.training.log.environment import ENVIRONMENT, Environment, PlayedTrainer, curriculum_played
+from fireworld.training.log.played import Played
 from fireworld.training.log.writer import open_writer
+from fireworld.training.seeds import Seeds
 
 _BURNT_OUT, _ALIVE = COUNTS.index("n_burnt_out"), COUNTS.index("n_civilians_alive")
 
@@ -29,21 +33,70 @@ class Beginning(NamedTuple):
     episode: int
     """Its number among those of the world."""
     base: int
-    """What its seed follows from."""
-    seed: int
+    """What the seeds of the world's episodes follow from."""
     step: int
     """The step after which it begins."""
+    seed_given: bool
+    """Its seed does not follow from the base."""
 
 
-class EpisodeRecorder:
+class Unrecorded:
+    """Records nothing: what worlds tell of their episodes, and all that they may ask."""
+
+    def took(self, runs: Array, reward: Array) -> None:
+        """Take what the worlds, (m,), that have just run a step did in it, and the rewards of all, (n,).
+
+        Raises:
+            OutputError: an episode has ended, and cannot be written.
+        """
+
+    def begin(self, index: int, episode: int, base: int, *, seed_given: bool) -> None:
+        """Begin an episode at the start of its scenario; if one is under way in that world, it was left.
+
+        Args:
+            index: of the world, which has begun already, but is not shown yet.
+            episode: number of the episode.
+            base: what the seeds follow from.
+            seed_given: that of the world does not.
+        """
+
+    def fork(self, source: int, index: int, episode: int, base: int) -> None:
+        """Begin an episode in the state of another world, as `begin` does."""
+
+    def leave_for(self, held: Mapping[str, Array]) -> None:
+        """Write the episodes under way as left, before all worlds take the state of a snapshot.
+
+        Raises:
+            LogError: what that holds of what was done is not of such worlds; nothing is written then.
+        """
+
+    def restore(self, held: Mapping[str, Array], episodes: Array, base: int) -> None:
+        """Begin episodes of these numbers, (n,), in the state of a snapshot, which all worlds are in now."""
+
+    def held(self) -> dict[str, Array]:
+        """Return what a snapshot holds of what was done before."""
+        return {}
+
+    def close(self) -> None:
+        """Write the episodes under way as left, and give the log its name; called again, it does nothing.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+
+
+UNRECORDED: Final = Unrecorded()
+
+
+class EpisodeRecorder(Unrecorded):
     """Records the episodes of n worlds, each when it ends; those under way when it is closed are marked as left.
 
     Args:
         record: the log to make, or an existing folder for it.
-        scenarios: what is played.
+        scenarios: what is played, as it is built.
         method: in which environment.
         base: what the seeds follow from.
-        batch: what the worlds take and give; they write it, and this reads it.
+        bound: the worlds.
 
     Raises:
         OutputError: the log cannot be made.
@@ -54,18 +107,17 @@ class EpisodeRecorder:
         record: str | os.PathLike[str],
         scenarios: Sequence[Scenario],
         method: Environment,
+        *,
         base: int,
-        batch: Batch,
+        bound: BoundWorlds,
     ) -> None:
-        n = len(batch.actions)
+        n = len(bound.playing)
         self._trainer = PlayedTrainer(curriculum_played([*scenarios]), method, seed=base)
         self._n_brigades = [scenario.brigades.n for scenario in scenarios]
-        self._first_worker, self._batch = method.first_worker, batch
-        self._histories = Histories(batch, names_targets=method.own_targets > 0)
+        self._first_worker, self._bound = method.first_worker, bound
+        self._histories = Histories(bound.result)
         self._begun: list[Beginning | None] = [None] * n
         """Of the episodes that are under way, or not written yet."""
-        self._elsewhere = [False] * n
-        """Whether they began in forks or snapshots."""
         self._state = [""] * n
         """Digests of the states that they began in, where what was done before is not known."""
         self._total = np.zeros(n)
@@ -78,66 +130,79 @@ class EpisodeRecorder:
         """The log."""
         return self._writer.path
 
-    def note(self) -> None:
-        """Note what the brigades are about to do in a step."""
-        self._histories.note()
-
-    def took(self, reward: Array, ended: Array) -> None:
-        """Take the rewards of a step, (n,), and write the episodes of the worlds, (m,), that ended with it."""
-        self._histories.noted()
+    def took(self, runs: Array, reward: Array) -> None:
+        """Take what was done in a step; see `Unrecorded`, here and below."""
         self._total += reward
-        for index in ended.tolist():
+        result = self._bound.result
+        for index in self._histories.note(runs).tolist():
+            self._begin_unknown(index)
+        for index in runs[(result.terminated[runs] | result.truncated[runs]) != 0].tolist():
             self._write(index)
 
-    def begin(self, index: int, beginning: Beginning) -> None:
-        """Begin an episode at the start of its scenario; if one is under way, it was left."""
-        self._begin(index, beginning, elsewhere=False)
-        self._histories.begin(index, beginning.seed)
-        self._state[index] = ""
+    def begin(self, index: int, episode: int, base: int, *, seed_given: bool) -> None:
+        """Begin an episode at the start of its scenario."""
+        self._begin(index, self._beginning(index, episode, base, seed_given=seed_given))
+        self._histories.begin(index, self._bound.world(index).seed)
 
-    def fork(self, source: int, index: int, beginning: Beginning, state: Callable[[], str]) -> None:
-        """Begin an episode in the state of another world, of which `state` returns the digest."""
-        self._begin(index, beginning, elsewhere=True)
-        self._histories.copy(source, index, beginning.step, beginning.seed)
-        self._state[index] = "" if self._histories.known[index] else state()
+    def fork(self, source: int, index: int, episode: int, base: int) -> None:
+        """Begin an episode in the state of another world."""
+        self._begin(index, self._beginning(index, episode, base, seed_given=True))
+        self._histories.copy(source, index, self._bound.world(index).seed)
+        self._find_state(index)
 
-    def restore(self, index: int, beginning: Beginning, state: Callable[[], str], held: Mapping[str, Array]) -> None:
-        """Begin an episode in the state of a snapshot, which may hold what was done before."""
-        self._begin(index, beginning, elsewhere=True)
-        self._histories.restore(index, beginning.step, beginning.seed, held)
-        self._state[index] = "" if self._histories.known[index] else state()
+    def leave_for(self, held: Mapping[str, Array]) -> None:
+        """Write the episodes under way as left."""
+        self._histories.check(held, held["clock"][:, STEP])
+        self._leave()
+
+    def restore(self, held: Mapping[str, Array], episodes: Array, base: int) -> None:
+        """Begin episodes in the state of a snapshot."""
+        for index, episode in enumerate(episodes.tolist()):
+            begun = self._beginning(index, episode, base, seed_given=True)
+            self._begin(index, begun)
+            self._histories.restore(index, begun.step, self._bound.world(index).seed, held)
+            self._find_state(index)
 
     def held(self) -> dict[str, Array]:
         """Return what a snapshot holds of what was done before."""
         return self._histories.held()
 
     def close(self) -> None:
-        """Write the episodes under way as left, and give the log its name.
+        """Write the episodes under way as left, and give the log its name."""
+        if os.getpid() == self._process and self._failed is None:
+            self._leave()
+            self._writer.close()
 
-        Raises:
-            OutputError: it cannot be written.
-        """
-        if os.getpid() != self._process or self._failed is not None:
-            return
+    def _leave(self) -> None:
         for index in range(len(self._begun)):
             self._write(index)
-        self._writer.close()
 
-    def _begin(self, index: int, beginning: Beginning, *, elsewhere: bool) -> None:
+    def _beginning(self, index: int, episode: int, base: int, *, seed_given: bool) -> Beginning:
+        step, playing = self._bound.world(index).step_number, int(self._bound.playing[index])
+        return Beginning(playing, episode, base, step, seed_given)
+
+    def _begin(self, index: int, beginning: Beginning) -> None:
         self._write(index)
-        self._elsewhere[index] = elsewhere
-        self._begun[index] = beginning
-        self._total[index] = 0.0
+        self._begun[index], self._state[index], self._total[index] = beginning, "", 0.0
+
+    def _begin_unknown(self, index: int) -> None:
+        """Go on with an episode of which a step was missed, as if it began after that."""
+        begun = self._begun[index]
+        if begun is not None:
+            step = int(self._bound.result.step[index])
+            self._begun[index], self._total[index] = begun._replace(step=step, seed_given=True), 0.0
+        self._find_state(index)
+
+    def _find_state(self, index: int) -> None:
+        self._state[index] = "" if self._histories.known[index] else self._bound.world(index).digest()
 
     def _write(self, index: int) -> None:
         """Write the episode of a world, if it is not written yet and a step of it was played."""
-        begun, result = self._begun[index], self._batch.result
+        begun, result = self._begun[index], self._bound.result
         last = int(result.step[index])
         if begun is None or last <= begun.step:
             return
         self._begun[index] = None
-        state = bytes.fromhex(self._state[index])
-        action, target = (one[:, : self._n_brigades[begun.scenario]].T.ravel() for one in self._histories.done(index))
         (_, seed), *later = self._histories.seeds[index].items()
         self._commit(
             Played(
@@ -146,9 +211,9 @@ class EpisodeRecorder:
                 episode=begun.episode,
                 base=begun.base,
                 seed=seed,
-                elsewhere=self._elsewhere[index],
+                seed_given=begun.seed_given,
                 first_step=begun.step,
-                state=state,
+                state=bytes.fromhex(self._state[index]),
                 n_steps=last - begun.step,
                 terminated=bool(result.terminated[index]),
                 truncated=bool(result.truncated[index]),
@@ -159,8 +224,7 @@ class EpisodeRecorder:
                 n_civilians_alive=int(result.counts[index, _ALIVE]),
                 later_step=np.array([step for step, _ in later], dtype=np.int32),
                 later_seed=np.array([one for _, one in later], dtype=np.uint64),
-                action=action,
-                target=target[action == OWN],
+                **recorded(self._histories.done(index), self._n_brigades[begun.scenario]),
             )
         )
 
@@ -177,3 +241,46 @@ class EpisodeRecorder:
         except OutputError as error:
             self._failed = error
             raise
+
+
+def recorder_of(
+    owner: object,
+    setup: Setup,
+    bound: BoundWorlds,
+    scenarios: Sequence[Scenario],
+    *,
+    first_worker: int,
+    seeds: Seeds,
+    autoreset: Autoreset,
+) -> Unrecorded:
+    """Return what records the episodes of worlds, if their setup asks for it; it is closed when these are forgotten.
+
+    Args:
+        owner: the worlds, as the caller has them.
+        setup: what the worlds are made of.
+        bound: the same, as kernels have them.
+        scenarios: what is played, as it is built.
+        first_worker: number of the first world.
+        seeds: of the episodes.
+        autoreset: when a world begins anew.
+
+    Raises:
+        OutputError: the log cannot be made.
+    """
+    if setup.record is None:
+        return UNRECORDED
+    method = ENVIRONMENT.with_settings(
+        {
+            "observation": setup.observation,
+            "reward": setup.reward.kind if isinstance(setup.reward.kind, str) else "function",
+            "own_targets": setup.own_targets,
+            "steps": setup.steps or 0,
+            "n_worlds": len(bound.playing),
+            "first_worker": first_worker,
+            "test_seeds": seeds.test,
+            "autoreset": autoreset.name.lower().replace("_", "-"),
+        }
+    )
+    recorder = EpisodeRecorder(setup.record, scenarios, method, base=seeds.base, bound=bound)
+    weakref.finalize(owner, recorder.close)
+    return recorder

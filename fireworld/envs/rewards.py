@@ -23,8 +23,10 @@ SCORE: Final = "score"
 class Rewards:
     """A reward: "score", "stock", "change", or a function.
 
-    A function is called with `result` and `before` and returns (n,) numbers: `result.score` (n, 3), `result.counts`
-    (n, 4) and `result.reward` (n, 6) of the step just done, and before (n,), the score / maximal score before it.
+    A function is called with `result` and `before`, copies that it may keep, and returns (n,) numbers:
+    `result.score` (n, 3), `result.counts` (n, 4) and `result.reward` (n, 6) of the step just done, as
+    `fireworld.kernels.arrays` has them, and `before` (n,), score / maximal score before it. What it returns for worlds
+    that ran no step is not used.
     """
 
     kind: str | Callable[..., Any]
@@ -40,13 +42,21 @@ class Rewards:
             ArgumentError: a function that returns anything else.
         """
         if callable(self.kind):
-            found = np.asarray(self.kind(result, before), dtype=np.float64)
-            if found.shape != before.shape:
-                raise ArgumentError(expected("reward", "", f"{before.shape} numbers", f"{found.shape}"))
-            return found
+            given = Result(*(array.copy() for array in result))
+            found = np.asarray(self.kind(given, before.copy()))
+            if found.shape != before.shape or found.dtype.kind not in "fiu":
+                got = f"{found.dtype} {found.shape}"
+                raise ArgumentError(expected("reward", "", f"{before.shape} numbers", got))
+            return found.astype(np.float64)
         if self.kind == SCORE:
             return share_gained(result.score[:, 0], result.score[:, 1], before)
         return result.reward[:, TOTAL].copy()
+
+
+def score_share(result: Result) -> Array:
+    """Return score / maximal score, (n,)."""
+    share: Array = result.score[:, 0] / result.score[:, 1]
+    return share
 
 
 def reward_of(value: object) -> Rewards:
@@ -56,7 +66,7 @@ def reward_of(value: object) -> Rewards:
         ArgumentError: there is none of that name.
     """
     names = (SCORE, *KINDS)
-    if callable(value) or value in names:
+    if callable(value) or (isinstance(value, str) and value in names):
         return Rewards(value)
     hint = nearest(value, names) if isinstance(value, str) else ""
     raise ArgumentError(expected("reward", "", f"one of {', '.join(names)}, or a function", value, hint))

@@ -15,6 +15,7 @@ from fireworld.kernels.arrays import (
     SEED,
     STEP,
     Array,
+    BrigadeState,
     Episode,
     Float32x2,
     Float32x3,
@@ -69,6 +70,8 @@ class Result(NamedTuple):
     truncated: UInt8  # (n,)
     seed: Int64  # (n,)
     step: Int64  # (n,), last step done
+    action: Int32x2  # (n, b), what the brigades did: 0..3, 4 of a target of their own, -1 nothing
+    target: Int32x2  # (n, b), the building that they went for, -1 none
 
 
 class Batch(NamedTuple):
@@ -97,6 +100,7 @@ def show_worlds(rows: Array, batch_row: Array, indices: Array, begun: bool) -> N
         i = indices[k]
         episode = opened_episode(rows[i])
         if not begun:
+            note_decisions(i, episode.world.brigades, batch.result)
             begin_step(episode.city, episode.world, episode.clock[STEP] + 1)
         show(i, episode, batch)
 
@@ -117,6 +121,7 @@ def step_worlds(rows: Array, batch_row: Array, indices: Array, decided: bool) ->
         clock = episode.clock
         clock[STEP] += 1
         finish_step(episode.city, episode.world, episode.constants, clock[SEED], clock[STEP])
+        note_decisions(i, episode.world.brigades, batch.result)
         begin_step(episode.city, episode.world, clock[STEP] + 1)
         show(i, episode, batch)
 
@@ -128,6 +133,19 @@ def take_turn(row: Array, batch_row: Array, i: int, brigade: int) -> None:
     follow(brigade, batch.actions[i, brigade], i, episode, batch)
     if brigade + 1 < len(episode.world.brigades.action):
         show_brigade(brigade + 1, i, episode, batch)
+
+
+@kernel
+def look_again(row: Array, batch_row: Array, i: int, brigade: int) -> None:
+    """Let one brigade see what the others have decided by now; arguments as for `take_turn`."""
+    show_brigade(brigade, i, opened_episode(row), opened_batch(batch_row))
+
+
+@inlined
+def note_decisions(i: int, brigades: BrigadeState, result: Result) -> None:
+    """Write down what the brigades of world i did in the step just done."""
+    for brigade in range(len(brigades.action)):
+        result.action[i, brigade], result.target[i, brigade] = brigades.action[brigade], brigades.target[brigade]
 
 
 @inlined

@@ -12,10 +12,11 @@ from typing import Any, Final
 import numpy as np
 
 from fireworld.arguments import ArgumentError, last_step_of, seed_of, settings_of
-from fireworld.errors import LogError, PolicyError, expected
+from fireworld.errors import LogError, expected
 from fireworld.npz import read_npz
 from fireworld.outcome import Outcome
 from fireworld.policy.asking import begin, plain_actions
+from fireworld.policy.given import Given
 from fireworld.policy.names import find_policy
 from fireworld.policy.protocol import Observation, Policy
 from fireworld.scenario import Scenario, find_scenario
@@ -165,26 +166,11 @@ class Session:
             return self._policy
         if len(actions) != self.n_brigades:
             raise ArgumentError(expected("step", "", f"an action for each of {self.n_brigades} brigades", len(actions)))
-        return _Given(list(actions))
+        return Given(list(actions))
 
     def __repr__(self) -> str:
         state = "done" if self.done else f"step {self.step_number}"
         return f"<Session {self.scenario.name}, seed {self.seed}: {state}, {self.outcome.n_burning} buildings burn>"
-
-
-class _Given(Policy):
-    """Decides as given, brigade by brigade."""
-
-    def __init__(self, actions: Sequence[Any]) -> None:
-        self._actions = actions
-
-    def decide(self, observation: Observation) -> Any:
-        """Return what is given for this brigade."""
-        action = self._actions[observation.brigade]
-        if action is None:
-            where = f"step {observation.step}, brigade {observation.brigade}"
-            raise PolicyError(expected("step", where, "an action: this brigade decides", None))
-        return action
 
 
 def _head(text: str) -> Mapping[str, Any]:

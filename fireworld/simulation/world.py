@@ -267,23 +267,43 @@ class World:
     def _decide(self, policy: Policy, before: Array, target_before: Array) -> Choices:
         """Ask for all decisions; what the brigades did in the last step is (b,) `before` and `target_before`."""
         features = np.zeros((self.n_brigades, 8), dtype=np.int64)
-        states = np.full(self.n_brigades, -1, dtype=np.int64)
-        decisions = [NO_DECISION] * self.n_brigades
+        made = [
+            self.ask(brigade, policy, before, target_before, features[brigade]) for brigade in range(self.n_brigades)
+        ]
+        states, decisions = (
+            np.array([state for state, _ in made], dtype=np.int64),
+            tuple(decision for _, decision in made),
+        )
+        return Choices(features=features, state_index=states, decide=lambda: decisions)
+
+    def ask(
+        self, brigade: int, policy: Policy, before: Array, target_before: Array, features: Array
+    ) -> tuple[int, Decision]:
+        """Let a brigade look and decide, and note what it does; in a step that has begun, `step_number`.
+
+        Args:
+            brigade: its number.
+            policy: whom it asks.
+            before: (b,) what the brigades did in the last step.
+            target_before: (b,) what they went for.
+            features: (8,) int64, written: what it sees.
+
+        Returns:
+            The state that it sees, -1 none, and what it decides.
+        """
         brigades, sites, thresholds = self.state.brigades, self.state.sites, self.constants.observation
         shown, known = (brigades.action, brigades.target) if thresholds.in_turn else (before, target_before)
-        for brigade in range(self.n_brigades):
-            states[brigade] = observe(brigade, shown, brigades.site, sites, thresholds, features[brigade])
-            target = -1
-            if can_choose(brigade, brigades.hp, brigades.refilling, sites.counts):
-                last = Decision(int(before[brigade]), target=int(target_before[brigade]))
-                if self._can_keep(brigade, last) and keeps(policy, brigade, last.action, self.step_number):
-                    decisions[brigade] = last
-                else:
-                    seen = self._observation(brigade, features[brigade], int(states[brigade]), known)
-                    decisions[brigade] = ask(policy, seen)
-                target = self._target(brigade, decisions[brigade])
-            brigades.action[brigade], brigades.target[brigade] = decisions[brigade].action, target
-        return Choices(features=features, state_index=states, decide=lambda: tuple(decisions))
+        state = int(observe(brigade, shown, brigades.site, sites, thresholds, features))
+        decision, target = NO_DECISION, -1
+        if can_choose(brigade, brigades.hp, brigades.refilling, sites.counts):
+            last = Decision(int(before[brigade]), target=int(target_before[brigade]))
+            if self._can_keep(brigade, last) and keeps(policy, brigade, last.action, self.step_number):
+                decision = last
+            else:
+                decision = ask(policy, self._observation(brigade, features, state, known))
+            target = self._target(brigade, decision)
+        brigades.action[brigade], brigades.target[brigade] = decision.action, target
+        return state, decision
 
     def _can_keep(self, brigade: int, last: Decision) -> bool:
         """Return whether a choice can be repeated: a target of its own only while it burns in the brigade's site."""

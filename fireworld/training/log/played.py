@@ -45,7 +45,9 @@ class Played:
     episode: int = value(3, "sfixed32", "its number among those of the world, from 0")
     base: int = value(4, "fixed64", "what the seeds of the world's episodes follow from")
     seed: int = value(5, "fixed64", "of its random draws, from the first step on")
-    elsewhere: bool = value(6, "bool", "it began in a fork or a snapshot of another one")
+    seed_given: bool = value(
+        6, "bool", "it does not follow from the base: in forks and snapshots, and where one was given"
+    )
     first_step: int = value(7, "sfixed32", "the step after which the learner began; 0: at the start")
     state: bytes = value(
         8, "bytes", "SHA-256 of the state that the learner began in, where what was done before is not known; or empty"
@@ -122,7 +124,7 @@ def check_played(played: Played, n_brigades: int) -> None:
         and max(seeds) <= SEED_MAX
         and (np.diff(steps, prepend=0) > 0).all()
         and max(steps, default=0) <= played.first_step
-        and (played.elsewhere or not (played.first_step or played.state or len(steps)))
+        and (played.seed_given or not (played.first_step or played.state or len(steps)))
     )
     if not fits:
         raise LogError(f"{Played.topic}: an episode that cannot have begun or ended so")

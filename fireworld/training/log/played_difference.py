@@ -25,7 +25,7 @@ from fireworld.training.log.records import TrainingHeader
 from fireworld.training.log.spread import ScenarioDifference, Spread
 from fireworld.training.seeds import Seeds
 
-DRAWN: Final = ("scenario", "base", "seed", "elsewhere", "first_step", "state", "later_step", "later_seed")
+DRAWN: Final = ("scenario", "base", "seed", "seed_given", "first_step", "state", "later_step", "later_seed")
 """What an episode begins with."""
 AT_ONCE: Final = 64
 """Episodes that are read before they are played again, side by side."""
@@ -64,7 +64,7 @@ class PlayedAgain:
         episode = self._log.played_at(number)
         record = episode.record
         again = play_again(episode) if record.replayable else record
-        if record.elsewhere:
+        if record.seed_given:
             return again
         seed = Seeds(record.base, test=self.method.test_seeds).seed(record.world, record.episode)
         return again if seed == record.seed else replace(again, seed=seed)

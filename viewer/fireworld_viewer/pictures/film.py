@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,8 @@ from fireworld.files import written_beside
 from fireworld.records import Recording
 from fireworld_viewer import colors
 from fireworld_viewer.pictures.city_map import GROUND, STREET
-from fireworld_viewer.pictures.figure_files import INK, PAPER, drawing, import_library
+from fireworld_viewer.pictures.figure_files import INK, PAPER, import_library
+from fireworld_viewer.pictures.frames import DPI, MAP_INCHES, Frame, GridFrames
 from fireworld_viewer.pictures.map_grid import MapGrid, labels_on
 from fireworld_viewer.pictures.maps import cells_of
 from fireworld_viewer.story.steps import ShownStep
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 FPS: Final = 10.0
-_DPI: Final = 100
-_MAP_INCHES: Final = 6.0
 _PAIR_INCHES: Final = 4.6
 _HOLD_SECONDS: Final = 2.0  # how long the last frame stays
 _TRANSPARENT: Final = 255
@@ -33,7 +32,6 @@ _NEAR: Final = 6
 _NO_AV: Final = (
     "film: PyAV, which writes .mp4, is not installed; try pip install 'fireworld[film]', or a film that ends in .gif"
 )
-Frame = NDArray[np.uint8]  # (height, width, 3) sRGB; both even
 
 
 def save_film(
@@ -70,19 +68,10 @@ class FilmFrames:
 
     def __init__(self, recordings: Sequence[Recording], steps: Sequence[ShownStep]) -> None:
         self._recordings, self._steps = recordings, steps
-        inches = _MAP_INCHES if len(recordings) == 1 else _PAIR_INCHES
+        inches = MAP_INCHES if len(recordings) == 1 else _PAIR_INCHES
         labels = labels_on(cell for step in steps for cell in cells_of(recordings, step))
         first = cells_of(recordings, steps[0])
-        self._grid = MapGrid(first, columns=len(recordings), map_inches=inches, labels=labels, dpi=_DPI)
-        self._canvas = cast("Any", self._grid.figure.canvas)  # matplotlib has no type for it
-        for _, item in self._grid.changing:
-            item.set_animated(True)
-        for row in self._grid.legend_rows:  # not drawn, but given their places
-            row.set_alpha(0.0)
-        with drawing():
-            self._canvas.draw()
-        self._ground = self._canvas.copy_from_bbox(self._grid.figure.bbox)
-        self._rows: dict[tuple[int, str], Any] = {}
+        self._frames = GridFrames(MapGrid(first, columns=len(recordings), map_inches=inches, labels=labels, dpi=DPI))
 
     def __len__(self) -> int:
         return len(self._steps)
@@ -90,28 +79,11 @@ class FilmFrames:
     @property
     def size(self) -> tuple[int, int]:
         """Width and height in pixels, both even."""
-        width, height = self._canvas.get_width_height(physical=True)
-        return int(width), int(height)
+        return self._frames.size
 
     def frame(self, index: int) -> Frame:
         """Draw a frame."""
-        self._canvas.restore_region(self._ground)
-        self._grid.show(cells_of(self._recordings, self._steps[index]))
-        for axes, item in self._grid.changing:
-            axes.draw_artist(item)
-        self._draw_legend()
-        return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
-
-    def _draw_legend(self) -> None:
-        """Draw the rows of the legend; copy those that were drawn before: letters take most of the time."""
-        for index, row in enumerate(self._grid.legend_rows):
-            key = index, row.get_text()
-            if key in self._rows:
-                self._canvas.restore_region(self._rows[key])
-                continue
-            row.set_alpha(None)
-            row.draw(self._canvas.get_renderer())
-            self._rows[key] = self._canvas.copy_from_bbox(row.get_window_extent().padded(2.0))
+        return self._frames.draw(cells_of(self._recordings, self._steps[index]))
 
 
 def _write_gif(frames: FilmFrames, path: Path, fps: float, on_frame: Callable[[], object]) -> None:

@@ -50,6 +50,8 @@ _MARKS: Final[Mapping[str, tuple[colors.Rgb, Any, float]]] = {
 }
 """Color, shape and size."""
 LABELS: Final = (*_MARKS, _JET, _WAY)  # everything that can be on a map, in the order of the legend
+OF_RUNS: Final = tuple(label for label in LABELS if label != _BRIGADE)
+"""What can be on the maps of a run that was not imported: there it is known what every brigade does."""
 LEGEND_STYLE: Final[Mapping[str, Any]] = {
     "loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "frameon": False, "labelcolor": INK, "borderaxespad": 0,
 }  # fmt: skip

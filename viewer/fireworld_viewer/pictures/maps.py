@@ -86,7 +86,7 @@ def draw_steps(recordings: Sequence[Recording], steps: Sequence[int]) -> Figure:
         inches = WIDTH_INCHES if len(recordings) == 1 else PAIR_INCHES
         return MapGrid(cells_of(recordings, shown[0]), columns=len(recordings), map_inches=inches).figure
     cells = [
-        MapCell(one.city, state_of(one.city, record), letter + _when(record, step.step), ", ".join(_facts(record)))
+        MapCell(one.city, state_of(one.city, record), letter + _when(record, step.step), ", ".join(facts_of(record)))
         for row, (one, letter) in enumerate(zip(recordings, _letters(recordings), strict=True))
         for step in shown
         for record in [step.records[row]]
@@ -102,7 +102,7 @@ def draw_steps(recordings: Sequence[Recording], steps: Sequence[int]) -> Figure:
 def cells_of(recordings: Sequence[Recording], shown: ShownStep) -> list[MapCell]:
     """Return the maps of a step, one for each recording, headed by what it is a recording of."""
     return [
-        MapCell(one.city, state_of(one.city, record), name, "   ".join([_when(record, shown.step), *_facts(record)]))
+        MapCell(one.city, state_of(one.city, record), name, "   ".join([_when(record, shown.step), *facts_of(record)]))
         for one, record, name in zip(recordings, shown.records, _names(recordings), strict=True)
     ]
 
@@ -121,7 +121,7 @@ def _when(record: StepRecord, step: int) -> str:
     return f"step {step}" if record.step == step else f"step {step} (ended at {record.step})"
 
 
-def _facts(record: StepRecord) -> tuple[str, str]:
+def facts_of(record: StepRecord) -> tuple[str, str]:
     """Return the score and the fire after a step in words."""
     score = record.score
     fire = f"{score.n_burning} burning, {score.n_burnt_out} burnt out"

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import groupby
 from threading import Condition, Thread
 from typing import Any, Final, Generic, TypeVar
 from urllib.parse import urlsplit
@@ -170,18 +171,28 @@ Screen = Callable[[], ViewerProcess]
 """Where a live view goes, a window of its own or a viewer that runs already: starts the process that shows it."""
 
 
-def own_window() -> Screen:
-    """Return a window of Rerun's viewer, which stays when the run has ended; ViewError without display or viewer."""
+def own_window(
+    option: str = "--view", others: str = "--view-url of a viewer that runs, or --record and `fireworld view`"
+) -> Screen:
+    """Return a window of Rerun's viewer, which stays when the run has ended.
+
+    Args:
+        option: what asked for it, for errors.
+        others: what to try where there is no display.
+
+    Raises:
+        ViewError: there is no display, or no viewer.
+    """
     program = str(app.viewer_executable())
-    app.check_display("--view", "--view-url of a viewer that runs, or --record and `fireworld view`")
+    app.check_display(option, others)
     options = ("--bind", app.LOCALHOST, "--port", str(app.free_port()), "--hide-welcome-screen", "--expect-data-soon")
     return partial(ViewerProcess, (program, "-", *options), stays=True)
 
 
-def running_viewer(url: str) -> Screen:
+def running_viewer(url: str, option: str = "--view-url") -> Screen:
     """Return a viewer, or a server of one, that runs on this machine, by its rerun+http://127.0.0.1:9876/proxy.
 
-    ViewError for another kind of address, or if nothing listens there, or Rerun is missing.
+    ViewError, which names the option, for another kind of address, or if nothing listens there, or Rerun is missing.
     """
     try:
         parts = urlsplit(url)
@@ -190,12 +201,12 @@ def running_viewer(url: str) -> Screen:
         parts, port = urlsplit(""), None
     if parts.scheme != "rerun+http" or parts.hostname not in {app.LOCALHOST, "localhost"} or port is None:
         wanted = f"an address of this machine like rerun+http://{app.LOCALHOST}:9876/proxy"
-        raise ViewError(expected("--view-url", "", wanted, url, "tunnel to another machine with ssh -L"))
+        raise ViewError(expected(option, "", wanted, url, "tunnel to another machine with ssh -L"))
     program = str(app.viewer_executable())
     try:
         socket.create_connection((app.LOCALHOST, port), timeout=2.0).close()
     except OSError:
-        raise ViewError(expected("--view-url", "", "a viewer that listens", url, f"try rerun --port {port}")) from None
+        raise ViewError(expected(option, "", "a viewer that listens", url, f"try rerun --port {port}")) from None
     return partial(ViewerProcess, (program, "-", "--bind", app.LOCALHOST, "--port", str(port)), stays=False)
 
 
@@ -233,14 +244,50 @@ class RunView(BackgroundSender[StepRecord]):
     """
 
     def __init__(self, screen: Screen, header: RunHeader, city: CityRecord, *, warn: Callable[[str], None]) -> None:
-        n_fit = _WAITING_BYTES_MAX // (_BYTES_PER_BUILDING * max(1, len(city.building_id)))
-        n_most = min(_WAITING_MAX, max(16, n_fit))
-        super().__init__(RunEncoder(header, city).encode, screen(), n_waiting_max=n_most, warn=warn)
+        encode = RunEncoder(header, city).encode
+        super().__init__(encode, screen(), n_waiting_max=_n_waiting_max(len(city.building_id)), warn=warn)
 
     def add(self, record: StepRecord) -> None:
         """Hand over a step."""
-        air = record.snapshot and Snapshot({AIR: record.snapshot.arrays[AIR]})  # the rest would only take memory
-        self.put(replace(record, snapshot=air))
+        self.put(_light(record))
+
+
+EpisodeStep = tuple[RunHeader, CityRecord, StepRecord]
+
+
+class EpisodesView(BackgroundSender[EpisodeStep]):
+    """A live view of runs one after another, listed in one viewer: add every record; as `RunView` in all else.
+
+    `n_buildings`: of the largest city.
+    """
+
+    def __init__(self, screen: Screen, n_buildings: int, *, warn: Callable[[str], None]) -> None:
+        self._header: RunHeader | None = None
+        super().__init__(self._encode_steps, screen(), n_waiting_max=_n_waiting_max(n_buildings), warn=warn)
+
+    def add(self, header: RunHeader, city: CityRecord, record: StepRecord) -> None:
+        """Hand over a step of a run; another header object is another run."""
+        self.put((header, city, _light(record)))
+
+    def _encode_steps(self, steps: Sequence[EpisodeStep]) -> bytes:
+        content = b""
+        for _, run in groupby(steps, key=lambda step: id(step[0])):
+            of_run = list(run)
+            header, city, _ = of_run[0]
+            if header is not self._header:
+                self._header, self._encoder = header, RunEncoder(header, city, title=header.title)
+            content += self._encoder.encode([record for _, _, record in of_run])
+        return content
+
+
+def _n_waiting_max(n_buildings: int) -> int:
+    """Return how many steps may wait."""
+    return min(_WAITING_MAX, max(16, _WAITING_BYTES_MAX // (_BYTES_PER_BUILDING * max(1, n_buildings))))
+
+
+def _light(record: StepRecord) -> StepRecord:
+    """Return a step without what the view does not show: it would only take memory."""
+    return replace(record, snapshot=record.snapshot and Snapshot({AIR: record.snapshot.arrays[AIR]}))
 
 
 PlayRun = Callable[[], tuple[str, RunHeader, CityRecord, Sequence[StepRecord]]]

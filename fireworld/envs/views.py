@@ -61,8 +61,20 @@ def fresh_batch(
         truncated=np.zeros(n, dtype=np.uint8),
         seed=np.zeros(n, dtype=np.int64),
         step=np.zeros(n, dtype=np.int64),
+        action=np.full((n, b), -1, dtype=np.int32),
+        target=np.full((n, b), -1, dtype=np.int32),
     )
+    result.score[:, SCORES.index("score_max")] = 1.0
     return Batch(np.zeros((n, b), dtype=np.int32), view, result)
+
+
+def hide_absent(view: View, index: int, n_brigades: int) -> None:
+    """Let nothing be seen of brigades that a world's team does not have, beyond the first `n_brigades`."""
+    for zero in (view.features, view.alive, view.chooses, view.mask, view.targets, view.brigades):
+        if len(zero):
+            zero[index, n_brigades:] = 0
+    view.mask[index, n_brigades:, 0] = 1
+    view.state[index, n_brigades:] = view.own[index, n_brigades:] = -1
 
 
 def observed(view: View, observation: str) -> dict[str, Array]:
@@ -72,6 +84,8 @@ def observed(view: View, observation: str) -> dict[str, Array]:
         "alive": view.alive.astype(np.bool_),
         "team": view.team.copy(),
     }
+    if view.own.shape[2]:
+        shown["own"] = view.own.copy()
     if observation == "targets":
         return {"targets": view.targets.copy(), **shown}
     if observation == "graph":

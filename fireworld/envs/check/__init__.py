@@ -1,0 +1,1 @@
+"""`python -m fireworld.envs.check`: do all forms keep what their libraries, and fireworld, promise?"""

@@ -1,0 +1,141 @@
+"""One world whose brigades decide one after another, or one of them among others that follow a policy."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any, Final, Self
+
+import numpy as np
+
+from fireworld.envs.actions import checked_action
+from fireworld.envs.autoreset import Autoreset
+from fireworld.envs.many_worlds import Stepped, Worlds, again
+from fireworld.envs.setup import Setup
+from fireworld.kernels.arrays import Array
+from fireworld.kernels.batch import look_again, take_turn
+from fireworld.kernels.observation import N_FEATURES
+from fireworld.kernels.others import begin_among_others, step_among_others
+from fireworld.policy.asking import begin
+from fireworld.policy.kernel import KernelPolicy
+from fireworld.policy.protocol import Policy
+from fireworld.training.seeds import Seeds
+
+_WORLD: Final = 0
+
+
+class OneWorld(Worlds):
+    """One world, which begins anew when the caller says so.
+
+    Args:
+        setup: what it is made of.
+        seeds: of its episodes.
+        worker: who plays it, among those that share the seeds.
+        others: the policy of brigades that the caller does not decide for.
+    """
+
+    def __init__(self, setup: Setup, *, seeds: Seeds, worker: int, others: Policy | None = None) -> None:
+        known = others if isinstance(others, KernelPolicy) else None
+        super().__init__(
+            setup, 1, autoreset=Autoreset.DISABLED, threads=1, seeds=seeds, first_worker=worker, others=known
+        )
+        self._asked = None if known is not None else others
+
+    @property
+    def over(self) -> bool:
+        """Whether it has ended, or never begun."""
+        return bool(self._ended[_WORLD])
+
+    def take_turn(self, brigade: int, action: object) -> None:
+        """Let a brigade decide; the next one, and whoever looks from here on, sees what it does.
+
+        Raises:
+            ArgumentError: there is no such action, or the mask forbids it; nothing has changed then.
+        """
+        number = checked_action(action, self._bound.shown, brigade)
+        self._bound.batch.actions[_WORLD, brigade] = number
+        take_turn(self._bound.rows[_WORLD], self._bound.batch_row, _WORLD, brigade)
+
+    def look(self, brigade: int) -> None:
+        """Let a brigade see what the others have decided by now."""
+        look_again(self._bound.rows[_WORLD], self._bound.batch_row, _WORLD, brigade)
+
+    def finish_turns(self) -> Stepped:
+        """Run the step in which all brigades have taken their turns."""
+        return self._run(lambda which: self._bound.step(which, decided=True))
+
+    def begin_among_others(self, brigade: int) -> None:
+        """Let those decide that do so before a brigade, in the first step of an episode.
+
+        Raises:
+            PolicyError: the policy fails.
+        """
+        self.begin_policy()
+        self._decide_before(brigade)
+
+    def begin_policy(self) -> None:
+        """Let a policy that kernels do not know prepare for an episode; PolicyError if it fails."""
+        if self._asked is not None:
+            world = self._bound.world(_WORLD)
+            begin(self._asked, world.city_arrays, n_brigades=world.n_brigades, seed=world.seed)
+
+    def step_among_others(self, brigade: int, action: object) -> Stepped:
+        """Run a step in which a brigade does what is given, and the others what their policy says.
+
+        Raises:
+            ArgumentError: there is no such action, or the mask forbids it.
+            PolicyError: the policy fails; the step can be tried again, or the world must be reset if it was run.
+        """
+        if self._asked is None:
+            self._bound.batch.actions[_WORLD, brigade] = checked_action(action, self._bound.shown, brigade)
+            row, batch_row = self._bound.rows[_WORLD], self._bound.batch_row
+            return self._run(lambda _: step_among_others(row, batch_row, _WORLD, brigade))
+        before = self._choices()
+        self.take_turn(brigade, action)
+        in_turn = self._bound.world(_WORLD).constants.observation.in_turn
+        later = range(brigade + 1 if in_turn else 0, len(before[0]))
+        self._ask((other for other in later if other != brigade), before)
+        stepped = self.finish_turns()
+        if self.over:
+            return stepped
+        try:
+            self._decide_before(brigade)
+        except BaseException:  # the step is done: it cannot be tried again
+            self._ended[_WORLD] = True
+            raise
+        return stepped
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        others = self._others if self._asked is None else self._asked
+        options = {"seeds": self.seeds, "worker": self._first_worker, "others": others}
+        return again, (type(self), (replace(self.setup, record=None),), options, self.snapshot())
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        copied = super().__deepcopy__(memo)
+        vars(copied)["_asked"] = copy.deepcopy(self._asked, memo)  # it may remember earlier steps
+        return copied
+
+    def _decide_before(self, brigade: int) -> None:
+        world = self._bound.world(_WORLD)
+        if self._asked is None:
+            begin_among_others(self._bound.rows[_WORLD], self._bound.batch_row, _WORLD, brigade)
+        elif world.constants.observation.in_turn:
+            self._ask(range(brigade), self._choices())
+            self.look(brigade)
+
+    def _choices(self) -> tuple[Array, Array]:
+        brigades = self._bound.world(_WORLD).state.brigades
+        return brigades.action.copy(), brigades.target.copy()
+
+    def _ask(self, brigades: Iterable[int], before: tuple[Array, Array]) -> None:
+        """Ask the policy for some brigades; if it fails, all have decided what they had `before`."""
+        assert self._asked is not None  # noqa: S101 - who calls this has looked
+        world, features = self._bound.world(_WORLD), np.zeros(N_FEATURES, dtype=np.int64)
+        world.step_number += 1
+        try:
+            for brigade in brigades:
+                world.ask(brigade, self._asked, *before, features)
+        except BaseException:
+            world.state.brigades.action[:], world.state.brigades.target[:] = before
+            raise

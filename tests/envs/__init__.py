@@ -1,0 +1,1 @@
+"""Environments for learners: worlds in batches, and the forms that libraries take."""
