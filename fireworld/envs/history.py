@@ -42,7 +42,8 @@ class Histories:
     def __init__(self, result: Result) -> None:
         n, b = result.action.shape
         self._result = result
-        self._action, self._target = np.zeros((2, ROOM, n, b), dtype=np.int32)
+        self._action = np.zeros((ROOM, n, b), dtype=np.uint8)
+        self._target = np.zeros((ROOM, n, b), dtype=np.int32)
         self._n_noted = 0
         self._nothing = Done(np.zeros((0, b), dtype=np.uint8), np.zeros((0, b), dtype=np.int32))
         self._before = [self._nothing] * n
@@ -61,7 +62,8 @@ class Histories:
         if self._n_noted == ROOM:
             self._before = [self.done(index) for index in range(len(self.known))]
             self._n_noted, self._since[:], self._first[:] = 0, 0, self._last
-        self._action[self._n_noted], self._target[self._n_noted] = self._result.action, self._result.target
+        np.minimum(self._result.action.view(np.uint32), NOTHING, out=self._action[self._n_noted], casting="unsafe")
+        self._target[self._n_noted] = self._result.target
         self._n_noted += 1
         steps = self._result.step[runs]
         missed: Array = runs[steps != self._last[runs] + 1]
@@ -94,8 +96,9 @@ class Histories:
         before, since = self._before[index], self._since[index]
         rows = slice(since, since + self._last[index] - self._first[index])
         action = self._action[rows, index]
-        codes = np.where(action < 0, NOTHING, action).astype(np.uint8)
-        return Done(np.concatenate((before.action, codes)), np.concatenate((before.target, self._target[rows, index])))
+        names_targets = (action == OWN).any()  # as few learners do
+        target = self._target[rows, index] if names_targets else np.zeros(action.shape, dtype=np.int32)
+        return Done(np.concatenate((before.action, action)), np.concatenate((before.target, target)))
 
     def held(self) -> dict[str, Array]:
         """Return what a snapshot holds of it."""
