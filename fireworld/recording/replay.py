@@ -22,7 +22,7 @@ from fireworld.records import (
     Steps,
 )
 from fireworld.scenario import Scenario, parse_scenario
-from fireworld.simulation.built import BuiltScenario, build_scenario
+from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.placement import CITY_ATTACHMENT, SCENARIO_ATTACHMENT
 from fireworld.training.log.episode_run import LEARNING_ATTACHMENT, recorded_learning
@@ -88,9 +88,15 @@ def recorded_scenario(header: RunHeader) -> Scenario:
     return parse_scenario(text, source=f"recording: {SCENARIO_ATTACHMENT}")
 
 
-def build_recorded(header: RunHeader) -> BuiltScenario:
-    """Build the scenario of a recorded run from the files attached to its recording; errors as `recorded_scenario`."""
-    return build_scenario(recorded_scenario(header), city_json=header.attachments.get(CITY_ATTACHMENT))
+def build_recorded(header: RunHeader, *, cities: CityCache | None = None) -> BuiltScenario:
+    """Build the scenario of a recorded run from the files attached to its recording; errors as `recorded_scenario`.
+
+    Args:
+        header: of the run.
+        cities: cities built before, used and added to.
+    """
+    content = header.attachments.get(CITY_ATTACHMENT)
+    return (cities or CityCache()).build(recorded_scenario(header), city_json=content)
 
 
 class Replay:

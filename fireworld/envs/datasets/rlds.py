@@ -1,0 +1,208 @@
+"""A dataset as Parquet files: a row for each brigade and step, as the data sets of RLDS have it for one agent."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from fireworld.envs.datasets.recorded import RecordedEpisode, recorded
+from fireworld.envs.datasets.trajectory import Shape, Trajectory, shape_of, trajectory_of
+from fireworld.files import new_folder
+from fireworld.kernels.batch import TEAM
+from fireworld.policy.words import FEATURES
+from fireworld.recording.inputs import AnyRun
+from fireworld.training.log.reader import AnyTraining
+from fireworld.training.log.rows_file import SUFFIX, Rows, RowsFile, check_pyarrow
+from fireworld.version import __version__, simulator_digest
+
+FORMAT: Final = "fireworld-rlds/1"
+FILES: Final[Mapping[str, str]] = {
+    "steps": "a brigade before a step, and after the last one: what it saw, could do, did and got",
+    "episodes": "an episode: where it comes from, and how it went",
+    "scenarios": "a scenario, with the file of its city if it has one: all that a replay needs",
+}
+"""What a row of each file is."""
+
+
+def export_rlds(
+    logs: AnyRun | AnyTraining | Sequence[AnyRun | AnyTraining],
+    folder: Path | str,
+    *,
+    observation: str | None = None,
+    reward: str | None = None,
+    own_targets: int | None = None,
+    force: bool = False,
+    on_episode: Callable[[], object] = lambda: None,
+) -> dict[str, int]:
+    """Write episodes as a folder of Parquet files: steps, episodes, scenarios. It is there only once it is complete.
+
+    Args:
+        logs: paths of logs of runs, and of what learners played in environments; or such logs.
+        folder: the folder to make.
+        observation: "features" or "targets"; None: as learners were shown, else features.
+        reward: "score", or "scenario", the scenario's own; None: as learners got it, of runs the scenario's.
+        own_targets: how many targets a brigade may name itself; None: as learners could, of runs as many as needed.
+        force: replace an earlier dataset.
+        on_episode: called after each episode.
+
+    Returns:
+        Rows by file.
+
+    Raises:
+        LogError: a log cannot be read or replayed, or this fireworld computes something else.
+        OutputError: pyarrow is not installed, or the folder exists or cannot be written.
+        ArgumentError: there is no such observation or reward.
+    """
+    check_pyarrow("export --rlds")
+    episodes = recorded(logs)
+    shape = shape_of(episodes, observation=observation, reward=reward, own_targets=own_targets)
+    own = {f"{name}{SUFFIX}" for name in FILES}
+    with new_folder(Path(folder), own=own, force=force) as scratch, ExitStack() as stack:
+        files = {
+            name: stack.enter_context(RowsFile(scratch / f"{name}{SUFFIX}", _facts(name, shape, episodes.origin)))
+            for name in FILES
+        }
+        scenarios = Scenarios()
+        for number, episode in enumerate(episodes):
+            trajectory = trajectory_of(episode, shape)
+            scenario, is_new = scenarios.number(episode)
+            if is_new:
+                files["scenarios"].add(scenario_row(scenario, episode))
+            files["episodes"].add(episode_row(number, scenario, trajectory))
+            files["steps"].add(step_rows(number, trajectory))
+            on_episode()
+        return {name: file.finish() for name, file in files.items()}
+
+
+class Scenarios:
+    """The scenarios that a dataset holds, each once."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, int] = {}
+
+    def number(self, episode: RecordedEpisode) -> tuple[int, bool]:
+        """Return the number of an episode's scenario, and whether it is a new one."""
+        key = f"{episode.scenario.digest} {episode.scenario.name}"
+        is_new = key not in self._known
+        return self._known.setdefault(key, len(self._known)), is_new
+
+
+def scenario_row(number: int, episode: RecordedEpisode) -> Rows:
+    """Return the row of a scenario."""
+    scenario = episode.scenario
+    values: dict[str, Any] = {
+        "scenario": number,
+        "name": scenario.name,
+        "digest": scenario.digest,
+        "yaml": scenario.to_yaml(),
+        "city": episode.city or b"",
+    }
+    return one_row(values)
+
+
+def episode_row(number: int, scenario: int, trajectory: Trajectory) -> Rows:
+    """Return the row of an episode."""
+    return one_row({"episode": number, "scenario": scenario, **episode_facts(trajectory)})
+
+
+def episode_facts(trajectory: Trajectory) -> dict[str, Any]:
+    """Return what is known of an episode besides its steps, as plain values."""
+    episode = trajectory.episode
+    return {
+        "episode_id": episode.name,
+        "scenario_name": episode.scenario.name,
+        "scenario_digest": episode.scenario.digest,
+        "world": episode.world,
+        "number": episode.number,
+        "seed": episode.seeds[0],
+        "seeds": json.dumps({str(step): seed for step, seed in episode.seeds.items()}),
+        "first_step": episode.first_step,
+        "n_steps": trajectory.n_steps,
+        "n_steps_max": episode.n_steps_max,
+        "n_brigades": episode.built.n_brigades,
+        "terminated": episode.terminated,
+        "truncated": episode.truncated,
+        "total_reward": float(sum(trajectory.reward.tolist())),
+        "score": episode.score,
+        "score_max": trajectory.score_max,
+        "n_burnt_out": trajectory.counts["n_burnt_out"],
+        "n_civilians_alive": trajectory.counts["n_civilians_alive"],
+        "digest": trajectory.state_digest,
+        "run_digest": episode.run_digest,
+    }
+
+
+def step_rows(number: int, trajectory: Trajectory) -> Rows:
+    """Return the rows of the steps of an episode: brigade by brigade, to the state after the last."""
+    n, b = trajectory.action.shape
+    episode, seen = trajectory.episode, trajectory.seen
+
+    def of_brigades(values: Any) -> Any:
+        """Bring (n + 1, b, ...) into the order of the rows."""
+        array = np.swapaxes(values, 0, 1)
+        return array.reshape((b * (n + 1), -1) if array.ndim > 2 else b * (n + 1))
+
+    def of_steps(values: Any, last: Any) -> Any:
+        """Bring (n, b) or (n,) into the order of the rows, with a value of the state after the last step."""
+        each = values if values.ndim == 2 else np.repeat(values[:, None], b, axis=1)
+        return of_brigades(np.concatenate((each, np.full((1, b), last, dtype=each.dtype))))
+
+    last = np.zeros((n + 1, b), dtype=np.bool_)
+    first = last.copy()
+    first[0], last[n] = True, True
+    rows: Rows = {
+        "episode": np.full(b * (n + 1), number, dtype=np.int32),
+        "episode_id": np.full(b * (n + 1), episode.name),
+        "digest": np.full(b * (n + 1), trajectory.state_digest),
+        "seed": np.full(b * (n + 1), episode.seeds[0], dtype=np.int64),
+        "step": np.tile(np.arange(n + 1, dtype=np.int32), b),
+        "brigade": np.repeat(np.arange(b, dtype=np.int32), n + 1),
+    }
+    if "features" in seen:
+        features = of_brigades(seen["features"])
+        rows |= {feature.name: features[:, k] for k, feature in enumerate(FEATURES)}
+    else:
+        rows["targets"] = of_brigades(seen["targets"])
+    team = np.tile(seen["team"], (b, 1))
+    rows |= {f"team_{name}": team[:, k] for k, name in enumerate(TEAM)}
+    rows |= {"alive": of_brigades(seen["alive"]), "action_mask": of_brigades(seen["action_mask"])}
+    if "own" in seen:
+        rows["own"] = of_brigades(seen["own"])
+    return rows | {
+        "decides": of_steps(trajectory.decides, last=False),
+        "action": of_steps(trajectory.action, last=0),
+        "target": of_steps(trajectory.target, last=-1),
+        "reward": of_steps(trajectory.reward, last=0.0),
+        "discount": of_brigades(np.where(last & episode.terminated, 0.0, 1.0)),
+        "is_first": of_brigades(first),
+        "is_last": of_brigades(last),
+        "is_terminal": of_brigades(last & episode.terminated),
+    }
+
+
+def one_row(values: Mapping[str, Any]) -> Rows:
+    """Return a table of one row."""
+    return {
+        name: np.array([value], dtype=object if isinstance(value, str | bytes) else None)
+        for name, value in values.items()
+    }
+
+
+def _facts(name: str, shape: Shape, origin: Mapping[str, Any]) -> dict[str, str]:
+    """Return the metadata of a file."""
+    facts = {
+        "format": FORMAT,
+        "table": FILES[name],
+        "observation": shape.observation,
+        "reward": shape.reward,
+        "own_targets": str(shape.own_targets),
+        "version": __version__,
+        "simulator": simulator_digest(),
+        "origin": json.dumps(origin),
+    }
+    return {f"fireworld.{key}": text for key, text in facts.items()}
