@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Final
 
@@ -14,7 +14,7 @@ from fireworld.envs.snapshots import fitting, within
 from fireworld.envs.views import fresh_batch, hide_absent
 from fireworld.kernels.addresses import address_row
 from fireworld.kernels.arrays import LAST_STEP, SEED, STEP, Array
-from fireworld.kernels.batch import Result, View, show_worlds, step_worlds
+from fireworld.kernels.batch import BEGIN, SHOW, STEP_DECIDED, STEP_GIVEN, Result, View, work_on_worlds
 from fireworld.policy.kernel import KernelPolicy, given
 from fireworld.simulation.built import BuiltScenario
 from fireworld.simulation.world import World
@@ -101,11 +101,11 @@ class BoundWorlds:
             world = self._worlds[index]
             hide_absent(self.shown, index, world.n_brigades)
             self.shown.frame[index] = world.start.frame
-        self._in_threads(show_worlds, which, begun)
+        self._work(which, SHOW if begun else BEGIN)
 
     def step(self, which: Array, *, decided: bool = False) -> None:
         """Run a step of worlds and show them; `which` (m,) are their indices; `decided`: brigades have taken turns."""
-        self._in_threads(step_worlds, which, decided)
+        self._work(which, STEP_DECIDED if decided else STEP_GIVEN)
 
     def world(self, index: int) -> World:
         """Return a world itself, with its clock as it stands; its coming step has begun."""
@@ -173,11 +173,12 @@ class BoundWorlds:
         self._bound[index] = world.bound(self._team)
         self.rows[index] = self._bound[index].row
 
-    def _in_threads(self, kernel: Callable[[Array, Array, Array, bool], object], which: Array, flag: bool) -> None:
-        """Let a kernel work on worlds, in threads if there are any."""
+    def _work(self, which: Array, what: int) -> None:
+        """Let the kernel work on worlds, in threads if there are any."""
         if self._pool is None or len(which) < 2 * self._threads:
-            kernel(self.rows, self.batch_row, which, flag)
+            work_on_worlds(self.rows, self.batch_row, which, what)
             return
         parts = np.array_split(which, self._threads)
-        for done in [self._pool.submit(kernel, self.rows, self.batch_row, part, flag) for part in parts]:
+        submit, rows, batch_row = self._pool.submit, self.rows, self.batch_row
+        for done in [submit(work_on_worlds, rows, batch_row, part, what) for part in parts]:
             done.result()

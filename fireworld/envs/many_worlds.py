@@ -95,7 +95,7 @@ class Worlds:
 
     @property
     def scenarios(self) -> tuple[Scenario, ...]:
-        """What is played: world i plays number (i + episode) modulo their number."""
+        """What is played: worker w plays number (w + episode) modulo their number."""
         return tuple(built.scenario for built in self._built)
 
     @property
@@ -326,7 +326,7 @@ class Worlds:
         return Stepped(*now, final_observation, final_info)
 
     def _scenario_of(self, index: int, episode: int) -> int:
-        return (index + episode) % len(self._built)
+        return (self._first_worker + index + episode) % len(self._built)
 
     def _next_episode(self, which: Array, world_seeds: Sequence[int] | None = None) -> None:
         for place, index in enumerate(which.tolist()):
@@ -360,8 +360,8 @@ def worlds(
 
     Args:
         scenarios: a shipped name, a YAML file, a Scenario, or the keys and values of one; or several: world i plays
-            number (i + episode) modulo their number. All choices are simultaneous, whatever a scenario says: learners
-            see what the others did in the last step.
+            number (first_worker + i + episode) modulo their number. All choices are simultaneous, whatever a scenario
+            says: learners see what the others did in the last step.
         n: how many, from 1 to 2048.
         autoreset: when a world that has ended begins anew; or Gymnasium's AutoresetMode.
         threads: that step the worlds.

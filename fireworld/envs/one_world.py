@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Final, Self
 
@@ -16,7 +16,7 @@ from fireworld.envs.setup import Setup
 from fireworld.kernels.arrays import Array
 from fireworld.kernels.batch import look_again, take_turn
 from fireworld.kernels.observation import N_FEATURES
-from fireworld.kernels.others import begin_among_others, step_among_others
+from fireworld.kernels.others import decide_by_policy
 from fireworld.policy.asking import begin
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.protocol import Policy
@@ -87,24 +87,45 @@ class OneWorld(Worlds):
             ArgumentError: there is no such action, or the mask forbids it.
             PolicyError: the policy fails; the step can be tried again, or the world must be reset if it was run.
         """
-        if self._asked is None:
-            self._bound.batch.actions[_WORLD, brigade] = checked_action(action, self._bound.shown, brigade)
-            row, batch_row = self._bound.rows[_WORLD], self._bound.batch_row
-            return self._run(lambda _: step_among_others(row, batch_row, _WORLD, brigade))
         before = self._choices()
         self.take_turn(brigade, action)
-        in_turn = self._bound.world(_WORLD).constants.observation.in_turn
-        later = range(brigade + 1 if in_turn else 0, len(before[0]))
-        self._ask((other for other in later if other != brigade), before)
+        others = range(brigade + 1 if self._in_turn else 0, len(before[0]))
+        self._decide([other for other in others if other != brigade], before)
         stepped = self.finish_turns()
-        if self.over:
-            return stepped
         try:
             self._decide_before(brigade)
         except BaseException:  # the step is done: it cannot be tried again
             self._ended[_WORLD] = True
             raise
         return stepped
+
+    @property
+    def _in_turn(self) -> bool:
+        return bool(self._bound.world(_WORLD).constants.observation.in_turn)
+
+    def _decide_before(self, brigade: int) -> None:
+        """Let the brigades before one decide, and this one see it; not if nobody sees what others decide."""
+        if self._in_turn and not self.over:
+            self._decide(range(brigade), self._choices())
+            self.look(brigade)
+
+    def _choices(self) -> tuple[Array, Array]:
+        brigades = self._bound.world(_WORLD).state.brigades
+        return brigades.action.copy(), brigades.target.copy()
+
+    def _decide(self, brigades: Sequence[int], before: tuple[Array, Array]) -> None:
+        """Let brigades decide by the policy; if it fails, all have decided what they had `before`."""
+        if self._asked is None:
+            decide_by_policy(self._bound.rows[_WORLD], np.array(brigades, dtype=np.int64), *before)
+            return
+        world, features = self._bound.world(_WORLD), np.zeros(N_FEATURES, dtype=np.int64)
+        world.step_number += 1
+        try:
+            for brigade in brigades:
+                world.ask(brigade, self._asked, *before, features)
+        except BaseException:
+            world.state.brigades.action[:], world.state.brigades.target[:] = before
+            raise
 
     def __reduce__(self) -> tuple[Any, ...]:
         others = self._others if self._asked is None else self._asked
@@ -115,27 +136,3 @@ class OneWorld(Worlds):
         copied = super().__deepcopy__(memo)
         vars(copied)["_asked"] = copy.deepcopy(self._asked, memo)  # it may remember earlier steps
         return copied
-
-    def _decide_before(self, brigade: int) -> None:
-        world = self._bound.world(_WORLD)
-        if self._asked is None:
-            begin_among_others(self._bound.rows[_WORLD], self._bound.batch_row, _WORLD, brigade)
-        elif world.constants.observation.in_turn:
-            self._ask(range(brigade), self._choices())
-            self.look(brigade)
-
-    def _choices(self) -> tuple[Array, Array]:
-        brigades = self._bound.world(_WORLD).state.brigades
-        return brigades.action.copy(), brigades.target.copy()
-
-    def _ask(self, brigades: Iterable[int], before: tuple[Array, Array]) -> None:
-        """Ask the policy for some brigades; if it fails, all have decided what they had `before`."""
-        assert self._asked is not None  # noqa: S101 - who calls this has looked
-        world, features = self._bound.world(_WORLD), np.zeros(N_FEATURES, dtype=np.int64)
-        world.step_number += 1
-        try:
-            for brigade in brigades:
-                world.ask(brigade, self._asked, *before, features)
-        except BaseException:
-            world.state.brigades.action[:], world.state.brigades.target[:] = before
-            raise

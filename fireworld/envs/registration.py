@@ -39,22 +39,29 @@ def register_with_gymnasium() -> None:
 
 
 class _AfterGymnasium(MetaPathFinder):
-    """Finds nothing itself: lets Gymnasium be found as ever, and names be registered when it has been run."""
+    """Finds nothing itself: lets Gymnasium be found as ever, and names be registered once it has been run."""
+
+    def __init__(self) -> None:
+        self._looking = False
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Return where Gymnasium is found, None of all else."""
+        """Return where Gymnasium is found, None of all else; many only ask, and import nothing."""
         del path, target
-        if fullname != GYMNASIUM:
+        if fullname != GYMNASIUM or self._looking:
             return None
-        sys.meta_path.remove(self)
-        spec = importlib.util.find_spec(GYMNASIUM)
+        self._looking = True
+        try:
+            spec = importlib.util.find_spec(GYMNASIUM)
+        finally:
+            self._looking = False
         if spec is not None and spec.loader is not None:
             run = spec.loader.exec_module
 
             def run_and_register(module: ModuleType) -> None:
                 run(module)
+                sys.meta_path.remove(self)
                 register()
 
             spec.loader.exec_module = run_and_register  # type: ignore[method-assign]  # of this one import

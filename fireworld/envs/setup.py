@@ -19,7 +19,7 @@ from fireworld.simulation.built import BuiltScenario, CityCache
 AnyScenario = str | Path | Scenario | Mapping[str, Any]
 """A shipped name, a YAML file, a scenario, or the keys and values of one."""
 Scenarios = AnyScenario | Sequence[AnyScenario]
-"""One, or several that are played in turn: world i plays number (i + episode) modulo their number."""
+"""One, or several that are played in turn: worker w plays number (w + episode) modulo their number."""
 
 
 class SetupOptions(TypedDict, total=False):

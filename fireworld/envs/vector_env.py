@@ -45,7 +45,7 @@ class TeamVectorEnv(Form, VectorEnv[Seen, Array, Array]):
 
         Args:
             num_envs: how many, up to 2048.
-            scenario: one or several; world i plays number (i + episode) modulo their number.
+            scenario: one or several; world i plays number (worker + i + episode) modulo their number.
             autoreset_mode: Gymnasium's, ours, or its name.
             threads: that step the worlds.
             seed: as of `FormOptions`, here and below.
@@ -123,7 +123,8 @@ class TeamVectorEnv(Form, VectorEnv[Seen, Array, Array]):
     def close(self, **kwargs: Any) -> None:
         """End threads and view; called again, it does nothing."""
         del kwargs
-        Form.close(self)
+        if "worlds" in vars(self):  # Gymnasium closes what is thrown away, even if it could not be made
+            Form.close(self)
         self.closed = True
 
     def _beginning(self) -> tuple[Seen, dict[str, Any]]:

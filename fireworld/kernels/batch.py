@@ -85,44 +85,35 @@ class Batch(NamedTuple):
 opened_batch = opener(Batch)
 
 
+SHOW, BEGIN, STEP_DECIDED, STEP_GIVEN = 0, 1, 2, 3
+"""What is done with worlds: nothing, for their coming step has begun; their coming step begins; a step is run whose
+brigades have taken their turns; a step is run in which they do what `Batch.actions` says."""
+
+
 @kernel
-def show_worlds(rows: Array, batch_row: Array, indices: Array, begun: bool) -> None:
-    """Let learners see worlds that have just begun, or come from elsewhere.
+def work_on_worlds(rows: Array, batch_row: Array, indices: Array, what: int) -> None:
+    """Do something with worlds, and let learners see them.
 
     Args:
         rows: (n, r) int64, address rows of an `Episode` each.
         batch_row: (k,) int64, address row of the `Batch`.
-        indices: (m,) int64, of the worlds.
-        begun: their coming step has begun.
+        indices: (m,) int64, of the worlds; where a step is run, of such as have not ended.
+        what: one of the above: one kernel for all, because what they show takes long to compile.
     """
     batch = opened_batch(batch_row)
     for k in range(len(indices)):
         i = indices[k]
         episode = opened_episode(rows[i])
-        if not begun:
-            note_decisions(i, episode.world.brigades, batch.result)
-            begin_step(episode.city, episode.world, episode.clock[STEP] + 1)
-        show(i, episode, batch)
-
-
-@kernel
-def step_worlds(rows: Array, batch_row: Array, indices: Array, decided: bool) -> None:
-    """Run a step of worlds, none of which has ended; arguments as for `show_worlds`.
-
-    `decided`: their brigades have taken their turns, and `Batch.actions` is nothing more.
-    """
-    batch = opened_batch(batch_row)
-    for k in range(len(indices)):
-        i = indices[k]
-        episode = opened_episode(rows[i])
-        if not decided:
-            for brigade in range(len(episode.world.brigades.action)):
+        clock, brigades = episode.clock, episode.world.brigades
+        if what == STEP_GIVEN:
+            for brigade in range(len(brigades.action)):
                 follow(brigade, batch.actions[i, brigade], i, episode, batch)
-        clock = episode.clock
-        clock[STEP] += 1
-        finish_step(episode.city, episode.world, episode.constants, clock[SEED], clock[STEP])
-        note_decisions(i, episode.world.brigades, batch.result)
-        begin_step(episode.city, episode.world, clock[STEP] + 1)
+        if what >= STEP_DECIDED:
+            clock[STEP] += 1
+            finish_step(episode.city, episode.world, episode.constants, clock[SEED], clock[STEP])
+        if what >= BEGIN:
+            note_decisions(i, brigades, batch.result)
+            begin_step(episode.city, episode.world, clock[STEP] + 1)
         show(i, episode, batch)
 
 

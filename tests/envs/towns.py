@@ -59,7 +59,7 @@ def deadly(folder: Path) -> dict[str, Any]:
         "fires": [{"buildings": [refuge]}, {"at": [0.5, 0.5], "n_buildings": 6}],
         "parameters": {
             "brigades": {"tank_litres": 1000},
-            "health": {"brigade_share": 1.0, "slight_damage": 4000.0, "slight_probability": 0.7},
+            "health": {"brigade_share": 1.0, "slight_damage": 700.0, "slight_probability": 0.3},
         },
     }
 

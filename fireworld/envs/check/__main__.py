@@ -7,6 +7,7 @@ import sys
 
 import click
 
+from fireworld import envs
 from fireworld.errors import FireworldError
 
 FAILURE, ERROR = 1, 2
@@ -22,6 +23,8 @@ def main(*, scenario: str, no_benchmark: bool, as_json: bool) -> None:
     Exit code: 0 yes, 1 no, 2 could not be checked.
     """
     try:
+        for name in ("team", "brigade"):
+            getattr(envs, name)  # its error names the extra, where that is missing
         from fireworld.envs.check.checks import run_check, table_of
         from fireworld.envs.check.everything import checks_of
 

@@ -33,6 +33,6 @@ def checks_of(scenario: str, *, benchmark: bool = True) -> Iterator[Check]:
         for kind in OBSERVATIONS:
             options = {"observation": kind, "own_targets": 6 if kind == "graph" else 0}
             yield Check(f"snapshots, {kind}", form, partial(check_snapshots, form, found, **options))
-            yield Check(f"copies and pickles, {kind}", form, partial(check_copies, form, found, **options))
+            yield Check(f"copies, {kind}", form, partial(check_copies, form, found, **options))
         yield Check("forks", form, partial(check_forks, form, found))
         yield Check("seeds", form, partial(check_seeds, form, found))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import numpy as np
@@ -16,9 +18,10 @@ from fireworld.outcome import outcome_of
 from fireworld.policy.names import find_policy
 from fireworld.policy.protocol import Action
 from fireworld.recording.replay import recorded_scenario
-from fireworld.records import Decisions, MemoryRecording, Recording, StepRecord
+from fireworld.records import Decisions, MemoryRecording, Recording, RunHeader, StepRecord
 from fireworld.scenario import Scenario
 from fireworld.simulation.built import build_scenario
+from fireworld.simulation.placement import CITY_ATTACHMENT
 from fireworld.simulation.prepared_run import prepare_run
 
 OWN_TARGETS: Final = 64
@@ -59,7 +62,8 @@ def follow(form: str, run: Recording) -> int:
         LogError: the run was recorded without its scenario.
     """
     start, *records = run
-    follower = FOLLOWERS[form](recorded_scenario(run.header), run)
+    with TemporaryDirectory() as folder:
+        follower = FOLLOWERS[form](_with_city(run.header, Path(folder)), run)
     _compare(start, follower.worlds)
     for record in records:
         reward, ending = follower.act(record)
@@ -193,6 +197,15 @@ FOLLOWERS: Final[Mapping[str, type[Follower]]] = {
     "vector": _OfVector,
 }
 """By form."""
+
+
+def _with_city(header: RunHeader, folder: Path) -> Scenario:
+    """Return a recorded scenario; the city file that is attached to the recording is put into a folder for it."""
+    scenario, content = recorded_scenario(header), header.attachments.get(CITY_ATTACHMENT)
+    if content is None:
+        return scenario
+    (folder / CITY_ATTACHMENT).write_bytes(content)
+    return scenario.with_values({"city.file": str(folder / CITY_ATTACHMENT)})
 
 
 def _action(decisions: Decisions, brigade: int, own: Array) -> int:
