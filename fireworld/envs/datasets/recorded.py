@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -16,8 +16,9 @@ from fireworld.records import StoredRun
 from fireworld.scenario import Scenario
 from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.simulation.placement import CITY_ATTACHMENT
-from fireworld.training.log.played import OWN, Decided
-from fireworld.training.log.played_run import recorded_seeds
+from fireworld.training.log.environment import ENVIRONMENT
+from fireworld.training.log.played import OWN, RUN_SEED_MAX, Decided, Played, check_played, columns_of
+from fireworld.training.log.played_run import PlayedEpisode, PlayedRun, digest_of, recorded_seeds
 from fireworld.training.log.reader import AnyTraining, TrainingLog, opened
 from fireworld.training.log.writer import CITY_FOLDER
 
@@ -38,10 +39,12 @@ class RecordedEpisode:
         n_steps_max: its last step, if it goes on so long.
         terminated, truncated: how it ended; neither: it was left.
         score: at its end.
+        own_targets: how many a brigade of the learner could name; 0: none, or they are those of a policy.
         first_step: the step after which a learner played it, 0 from the start.
         name: where it is recorded, as in "episodes-1.mcap:17".
         world, number: of what a learner played, in which world, and its number there; else 0.
-        run_digest: of the log of its run, "" where there is none.
+        run_digest: of the run, computed again from its decisions; "" of what learners played, of which it is not known.
+        log_digest: of the log that it is in.
         source: what errors call it.
     """
 
@@ -53,11 +56,13 @@ class RecordedEpisode:
     terminated: bool
     truncated: bool
     score: float
+    own_targets: int
     first_step: int
     name: str
     world: int
     number: int
     run_digest: str
+    log_digest: str
     source: str
 
     @property
@@ -96,7 +101,7 @@ class Recorded:
 
     @property
     def own_targets(self) -> int:
-        """How many targets of its own a brigade could name where learners played; 0: none, or they are runs."""
+        """How many targets of its own a brigade could name where learners played; 0: none."""
         return max((log.player.method.own_targets for log in self.logs if isinstance(log, TrainingLog)), default=0)
 
     @property
@@ -173,11 +178,13 @@ def _played(log: TrainingLog) -> Iterator[RecordedEpisode]:
             terminated=record.terminated,
             truncated=record.truncated,
             score=record.score,
+            own_targets=episode.method.own_targets,
             first_step=record.first_step,
             name=f"{log.path.name}:{number}",
             world=record.world,
             number=record.episode,
             run_digest="",
+            log_digest=log.digest,
             source=episode.source,
         )
 
@@ -188,7 +195,7 @@ def _of_run(run: StoredRun, cities: CityCache) -> RecordedEpisode:
     actions = np.stack([*run.ragged("decisions", "action")][1:])
     targets = np.stack([*run.ragged("decisions", "target")][1:])
     last = run.step(int(run.steps[-1]))
-    return RecordedEpisode(
+    episode = RecordedEpisode(
         built=built,
         city=header.attachments.get(CITY_ATTACHMENT),
         decided=_fitting(run, built.n_brigades, actions.astype(np.int32), targets.astype(np.int32)),
@@ -197,13 +204,89 @@ def _of_run(run: StoredRun, cities: CityCache) -> RecordedEpisode:
         terminated=last.terminated,
         truncated=last.truncated,
         score=last.score.score,
+        own_targets=0,
         first_step=0,
         name=_name(run),
         world=0,
         number=0,
         run_digest=run.digest,
+        log_digest=run.digest,
         source=run_name(run),
     )
+    return replace(episode, run_digest=_digest_again(episode)) if _has_values(run) else episode
+
+
+def _has_values(run: StoredRun) -> bool:
+    """Return whether decisions are recorded with what they were chosen by, which a dataset does not hold."""
+    names = ("explored", "q_values", "td_error", "target_value")
+    return any(values.any() for name in names for values in run.ragged("decisions", name))
+
+
+def _digest_again(episode: RecordedEpisode) -> str:
+    """Return the digest of a run of the same decisions."""
+    same = {name: getattr(episode, name) for name in SAME}
+    played = as_played(episode.built, episode.decided, seeds=episode.seeds, source=episode.source, **same)
+    return digest_of(PlayedRun(replace(played, run_digest="")))
+
+
+SAME: Final = (
+    "world", "number", "first_step", "n_steps_max", "terminated", "truncated", "score", "run_digest",
+)  # fmt: skip
+"""What `as_played` takes of an episode as it is."""
+
+
+def as_played(
+    built: BuiltScenario,
+    decided: Decided,
+    *,
+    seeds: Mapping[int, int],
+    world: int,
+    number: int,
+    first_step: int,
+    n_steps_max: int,
+    terminated: bool,
+    truncated: bool,
+    score: float,
+    run_digest: str,
+    source: str,
+    digest: str = "",
+) -> PlayedEpisode:
+    """Return an episode as one that a learner played, to be played again; arguments as of `RecordedEpisode`.
+
+    Raises:
+        LogError: what is known of it makes no sense.
+    """
+    if 0 not in seeds:
+        raise LogError(expected(source, "seeds", "one from the start on", "none"))
+    (_, seed), *later = sorted(seeds.items())
+    steps, others = zip(*later, strict=True) if later else ((), ())
+    if not all(0 <= one <= RUN_SEED_MAX for one in (seed, *others)):
+        raise LogError(expected(source, "seeds", f"numbers from 0 to {RUN_SEED_MAX}", "others"))
+    record = Played(
+        scenario=0,
+        world=world,
+        episode=number,
+        base=0,
+        seed=seed,
+        seed_given=True,
+        first_step=first_step,
+        state=b"",
+        n_steps=len(decided.action) - first_step,
+        terminated=terminated,
+        truncated=truncated,
+        total_reward=0.0,
+        score=score,
+        score_max=0.0,
+        n_burnt_out=0,
+        n_civilians_alive=0,
+        later_step=np.array(steps, dtype=np.int64),
+        later_seed=np.array(others, dtype=np.uint64),
+        **columns_of(decided),
+    )
+    check_played(record, built.n_brigades)
+    method = ENVIRONMENT.with_settings({"steps": n_steps_max})
+    digests = {"digest": digest, "run_digest": run_digest}
+    return PlayedEpisode.of(record, built, method, log="", source=source, **digests)
 
 
 def _fitting(run: StoredRun, n_brigades: int, action: Array, target: Array) -> Decided:

@@ -10,8 +10,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from fireworld.envs.datasets.loading import EpisodeFacts, StoredSteps, faults_of
 from fireworld.envs.datasets.recorded import RecordedEpisode, recorded
 from fireworld.envs.datasets.trajectory import Shape, Trajectory, shape_of, trajectory_of
+from fireworld.errors import LogError, expected
 from fireworld.files import new_folder
 from fireworld.kernels.batch import TEAM
 from fireworld.policy.words import FEATURES
@@ -21,6 +23,9 @@ from fireworld.training.log.rows_file import SUFFIX, Rows, RowsFile, check_pyarr
 from fireworld.version import __version__, simulator_digest
 
 FORMAT: Final = "fireworld-rlds/1"
+ROWS_FREE: Final = 100_000
+ROW_BYTES_MIN: Final = 4
+"""A file of n bytes may hold that many rows more than n / 4."""
 FILES: Final[Mapping[str, str]] = {
     "steps": "a brigade before a step, and after the last one: what it saw, could do, did and got",
     "episodes": "an episode: where it comes from, and how it went",
@@ -134,6 +139,7 @@ def episode_facts(trajectory: Trajectory) -> dict[str, Any]:
         "n_civilians_alive": trajectory.counts["n_civilians_alive"],
         "digest": trajectory.state_digest,
         "run_digest": episode.run_digest,
+        "log_digest": episode.log_digest,
     }
 
 
@@ -183,6 +189,64 @@ def step_rows(number: int, trajectory: Trajectory) -> Rows:
         "is_last": of_brigades(last),
         "is_terminal": of_brigades(last & episode.terminated),
     }
+
+
+class StoredParquet:
+    """A dataset as a folder of Parquet files, a `fireworld.envs.datasets.loading.Stored`."""
+
+    def __init__(self, folder: Path) -> None:
+        check_pyarrow("load_dataset")
+        self.name, self._folder = str(folder), folder
+
+    @property
+    def shape(self) -> Mapping[str, Any]:
+        """What it holds of every episode."""
+        import pyarrow.parquet as pq
+
+        with faults_of(self.name):
+            facts = {key.decode(): text.decode() for key, text in pq.read_schema(self._path("steps")).metadata.items()}
+            if facts.get("fireworld.format") != FORMAT:
+                raise LogError(expected("steps", "format", FORMAT, facts.get("fireworld.format", "none")))
+            named = {name: facts[f"fireworld.{name}"] for name in ("observation", "reward", "own_targets")}
+            return named | {"own_targets": int(named["own_targets"])}
+
+    def scenarios(self) -> list[dict[str, Any]]:
+        """Return what `StoredScenario` has, scenario by scenario."""
+        return self._rows("scenarios", ("name", "digest", "yaml", "city"))
+
+    def episodes(self) -> list[dict[str, Any]]:
+        """Return what `EpisodeFacts` has, episode by episode."""
+        return self._rows("episodes", EpisodeFacts.__struct_fields__)
+
+    def steps(self, number: int, facts: EpisodeFacts) -> StoredSteps:
+        """Return the steps of an episode."""
+        import pyarrow.parquet as pq
+
+        columns = ["brigade", "step", *StoredSteps._fields]
+        table = pq.read_table(self._path("steps"), columns=columns, filters=[("episode", "==", number)])
+        b, n = facts.n_brigades, facts.n_steps
+        if table.num_rows != b * (n + 1):
+            raise LogError(expected("steps", "rows", str(b * (n + 1)), table.num_rows))
+        values = {name: table.column(name).to_numpy() for name in columns}
+        order = np.lexsort((values["step"], values["brigade"]))
+        decides, action, target, reward = (
+            values[name][order].reshape(b, n + 1)[:, :n].T for name in StoredSteps._fields
+        )
+        return StoredSteps(decides, action, target, reward[:, 0])
+
+    def _path(self, name: str) -> Path:
+        return self._folder / f"{name}{SUFFIX}"
+
+    def _rows(self, name: str, columns: Sequence[str]) -> list[dict[str, Any]]:
+        import pyarrow.parquet as pq
+
+        path = self._path(name)
+        with path.open("rb") as file:
+            metadata = pq.ParquetFile(file).metadata
+            if metadata.num_rows > ROWS_FREE + path.stat().st_size // ROW_BYTES_MIN:
+                raise LogError(expected(name, "rows", "as many as fit its bytes", metadata.num_rows))
+        found: list[dict[str, Any]] = pq.read_table(path, columns=list(columns)).to_pylist()
+        return found
 
 
 def one_row(values: Mapping[str, Any]) -> Rows:

@@ -17,7 +17,6 @@ from fireworld.errors import LogError, expected
 from fireworld.kernels.arrays import COUNTS, TOTAL, Array
 from fireworld.kernels.batch import look_again, take_turn
 from fireworld.kernels.observation import N_ACTIONS
-from fireworld.simulation.world import World
 from fireworld.training.log.environment import OWN_TARGETS_MAX
 from fireworld.training.log.played import OWN
 
@@ -96,7 +95,8 @@ def shape_of(
         ArgumentError: there is no such observation or reward, or no number.
     """
     if own_targets is None:
-        own_targets = episodes.own_targets or (OWN_TARGETS if any(one.names_targets for one in episodes) else 0)
+        more = any(one.names_targets and not one.own_targets for one in episodes)
+        own_targets = max(episodes.own_targets, OWN_TARGETS if more else 0)
     return Shape(
         episodes.observation if observation is None else observation,
         episodes.reward if reward is None else reward,
@@ -216,10 +216,3 @@ class _Player:
     def _differs(self, where: str, wanted: str, got: str) -> str:
         hint = "this fireworld computes something else; see `fireworld verify`"
         return expected(self._episode.source, where, wanted, got, hint)
-
-
-def state_digest(world: World) -> str:
-    """Return the digest of the state that a world is in when its brigades look; the world stays as it is."""
-    ahead = world.copy()
-    ahead.look()
-    return ahead.digest()

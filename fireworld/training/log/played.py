@@ -20,6 +20,7 @@ OWN: Final = len(ACTIONS)
 NOTHING: Final = OWN + 1
 """Recorded of a brigade that had nothing to choose."""
 STEP_MAX: Final = 1_000_000
+RUN_SEED_MAX: Final = 2**63 - 1
 DIGEST_BYTES: Final = 32
 
 
@@ -107,13 +108,19 @@ class Played:
         return Decided(*(np.ascontiguousarray(one.reshape(n_brigades, n).T) for one in (action, target)))
 
 
+def columns_of(decided: Decided) -> dict[str, Array]:
+    """Return what the brigades did as the columns of an episode."""
+    action, target = (one.T.ravel() for one in decided)
+    return {"action": np.where(action < 0, NOTHING, action).astype(np.uint8), "target": target[action == OWN]}
+
+
 def check_played(played: Played, n_brigades: int) -> None:
     """Check that an episode of so many brigades can be what is recorded of it.
 
     Raises:
         LogError: it cannot.
     """
-    steps, seeds = played.later_step, [played.base, played.seed, *played.later_seed.tolist()]
+    steps, seeds = played.later_step, [played.seed, *played.later_seed.tolist()]
     fits = (
         0 <= played.world < WORKERS_MAX
         and 0 <= played.episode < EPISODES_MAX
@@ -121,7 +128,8 @@ def check_played(played: Played, n_brigades: int) -> None:
         and 0 < played.n_steps < STEP_MAX
         and len(played.state) in {0, DIGEST_BYTES}
         and len(steps) == len(played.later_seed)
-        and max(seeds) <= SEED_MAX
+        and played.base <= SEED_MAX
+        and max(seeds) <= RUN_SEED_MAX
         and (np.diff(steps, prepend=0) > 0).all()
         and max(steps, default=0) <= played.first_step
         and (played.seed_given or not (played.first_step or played.state or len(steps)))

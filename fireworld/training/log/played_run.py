@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import msgspec
 import numpy as np
+from fireworld_recorder.chain import Digest
 
 from fireworld.errors import LogError, expected
 from fireworld.kernels.arrays import TOTAL
@@ -16,13 +17,13 @@ from fireworld.kernels.choice import GIVEN
 from fireworld.policy.kernel import NO_TABLES, KernelPolicy
 from fireworld.policy.names import RECORDED
 from fireworld.policy.protocol import Action
-from fireworld.records import ACTION_NAMES, CityRecord, RunHeader, StepRecord
+from fireworld.records import ACTION_NAMES, CityRecord, RunHeader, StepRecord, Steps
 from fireworld.rewards import share_gained
 from fireworld.simulation.built import BuiltScenario
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.world import World
 from fireworld.training.log.environment import Environment
-from fireworld.training.log.played import NOTHING, OWN, Decided, Played
+from fireworld.training.log.played import OWN, Decided, Played, columns_of
 
 EPISODE_ATTACHMENT: Final = "episode.json"
 Number = Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
@@ -52,6 +53,8 @@ class PlayedEpisode:
         decided: (t, b) what the brigades did from the start on, or from the first step that is known.
         log: digest of the log that it is in.
         source: what errors call it.
+        digest: of the state after its last step, "" where it is not known.
+        run_digest: of the log of its run, likewise.
     """
 
     record: Played
@@ -60,9 +63,21 @@ class PlayedEpisode:
     decided: Decided
     log: str
     source: str
+    digest: str = ""
+    run_digest: str = ""
 
     @classmethod
-    def of(cls, record: Played, built: BuiltScenario, method: Environment, *, log: str, source: str) -> PlayedEpisode:
+    def of(
+        cls,
+        record: Played,
+        built: BuiltScenario,
+        method: Environment,
+        *,
+        log: str,
+        source: str,
+        digest: str = "",
+        run_digest: str = "",
+    ) -> PlayedEpisode:
         """Make it of its record.
 
         Raises:
@@ -72,7 +87,7 @@ class PlayedEpisode:
             raise LogError(f"{source}: {record.topic}: a target that is no building")
         if record.last_step > method.last_step(built.scenario):
             raise LogError(f"{source}: {record.topic}: a step after the last one")
-        return cls(record, built, method, record.decided(built.n_brigades), log, source)
+        return cls(record, built, method, record.decided(built.n_brigades), log, source, digest, run_digest)
 
     @property
     def place(self) -> EpisodePlace:
@@ -148,7 +163,7 @@ def play_again(episode: PlayedEpisode) -> Played:
             gained = float(share_gained(outcome.score[0], outcome.score[1], before))
             total += gained if episode.method.reward == "score" else float(outcome.reward[TOTAL])
     n, came = world.step_number, world.outcome
-    action, target = actions[:n].T.ravel(), targets[:n].T.ravel()
+    columns: dict[str, Any] = columns_of(Decided(actions[:n], targets[:n]))
     return replace(
         record,
         n_steps=n - record.first_step,
@@ -159,8 +174,7 @@ def play_again(episode: PlayedEpisode) -> Played:
         score_max=came.score_max,
         n_burnt_out=came.n_burnt_out,
         n_civilians_alive=came.n_civilians_alive,
-        action=np.where(action < 0, NOTHING, action).astype(np.uint8),
-        target=target[action == OWN],
+        **columns,
     )
 
 
@@ -185,19 +199,38 @@ class PlayedRun:
         self.city: CityRecord = built.city_record()
 
     def __iter__(self) -> Iterator[StepRecord]:
-        again, played = Again(self._episode), self._episode.record
-        observer = Observer(again.world)
+        again = Again(self._episode)
+        observer, digest = Observer(again.world), Digest(self.city)
+        for record in self._steps(again, observer):
+            if self._episode.run_digest:
+                digest.write(record)
+            yield record
+        self._check_end(again.world, digest.digest)
+
+    def _steps(self, again: Again, observer: Observer) -> Iterator[StepRecord]:
+        """Yield the steps."""
         yield observer.record()
         while not again.over:
             again.decide()
             record = observer.record(again.world.step(again.team))
             self._check(record)
             yield record
-        came = (again.world.step_number, again.world.terminated, again.world.outcome.score)
-        if came != (played.last_step, played.terminated, played.score):
-            raise LogError(
-                self._differs("", f"{played.last_step} steps, score {played.score}", f"{came[0]}, {came[2]}")
-            )
+
+    def _check_end(self, world: World, run_digest: str) -> None:
+        """Compare how it ended with what is known of it."""
+        episode, played = self._episode, self._episode.record
+        pairs: dict[str, tuple[object, object]] = {
+            "steps": (played.last_step, world.step_number),
+            "terminated": (played.terminated, world.terminated),
+            "score": (played.score, world.outcome.score),
+        }
+        if episode.digest:
+            pairs["digest"] = episode.digest, state_digest(world)
+        if episode.run_digest:
+            pairs["digest of the run"] = episode.run_digest, run_digest
+        for name, (wanted, got) in pairs.items():
+            if wanted != got:
+                raise LogError(self._differs(name, str(wanted), str(got)))
 
     def _check(self, record: StepRecord) -> None:
         """Compare what the brigades did with what is recorded of it."""
@@ -211,6 +244,21 @@ class PlayedRun:
     def _differs(self, where: str, wanted: str, got: str) -> str:
         hint = "this fireworld computes something else; see `fireworld verify`"
         return expected(self._episode.source, where, wanted, got, hint)
+
+
+def digest_of(run: Steps) -> str:
+    """Run a run, and return its digest."""
+    digest = Digest(run.city)
+    for record in run:
+        digest.write(record)
+    return digest.digest
+
+
+def state_digest(world: World) -> str:
+    """Return the digest of the state that a world is in when its brigades look next; the world stays as it is."""
+    ahead = world.copy()
+    ahead.look()
+    return ahead.digest()
 
 
 def recorded_seeds(header: RunHeader) -> Mapping[int, int]:
