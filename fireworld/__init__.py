@@ -18,6 +18,10 @@ from typing import TYPE_CHECKING, Any
 from fireworld.version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from fireworld.envs.datasets.loading import Dataset as Dataset
+    from fireworld.envs.datasets.loading import load_dataset as load_dataset
+    from fireworld.envs.datasets.minari_form import export_minari as export_minari
+    from fireworld.envs.datasets.rlds import export_rlds as export_rlds
     from fireworld.errors import FireworldError as FireworldError
     from fireworld.evaluation.check_scenarios import check_scenarios as check_scenarios
     from fireworld.evaluation.compare import compare as compare
@@ -69,6 +73,7 @@ if TYPE_CHECKING:
 _ROOMS = {
     "Action": "policy.protocol",
     "Comparison": "evaluation.comparison",
+    "Dataset": "envs.datasets.loading",
     "Decision": "policy.protocol",
     "Difference": "recording.difference",
     "Explanation": "recording.explain",
@@ -96,10 +101,13 @@ _ROOMS = {
     "explain": "recording.explain",
     "export": "recording.export",
     "export_city": "maps.exporting",
+    "export_minari": "envs.datasets.minari_form",
+    "export_rlds": "envs.datasets.rlds",
     "fork": "recording.fork",
     "import_city": "maps.importing",
     "import_log": "recording.official_log.importer",
     "import_osm": "maps.osm",
+    "load_dataset": "envs.datasets.loading",
     "load_team": "policy.teams.team",
     "new_scenarios": "evaluation.new_scenarios",
     "open_episode": "recording.episode",

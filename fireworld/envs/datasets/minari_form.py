@@ -7,7 +7,7 @@ import copy
 import json
 import os
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from importlib.util import find_spec
@@ -18,7 +18,7 @@ import numpy as np
 
 from fireworld.arguments import ArgumentError
 from fireworld.envs.datasets.loading import EpisodeFacts, StoredSteps, faults_of
-from fireworld.envs.datasets.recorded import SCORE, Recorded, RecordedEpisode, recorded
+from fireworld.envs.datasets.recorded import SCORE, AnyLogs, Recorded, RecordedEpisode, recorded
 from fireworld.envs.datasets.rlds import Scenarios, episode_facts
 from fireworld.envs.datasets.trajectory import Shape, Trajectory, shape_of, trajectory_of
 from fireworld.envs.rewards import reward_of
@@ -27,9 +27,7 @@ from fireworld.errors import LibraryError, LogError, OutputError, expected
 from fireworld.files import new_folder
 from fireworld.kernels.arrays import Array
 from fireworld.kernels.observation import N_ACTIONS
-from fireworld.recording.inputs import AnyRun
 from fireworld.scenario.scenario import CITY_BYTES_MAX
-from fireworld.training.log.reader import AnyTraining
 from fireworld.version import __version__, simulator_digest
 
 FORMAT: Final = "fireworld-minari/1"
@@ -42,7 +40,7 @@ _STORAGE: Final = "arrow"
 
 
 def export_minari(
-    logs: AnyRun | AnyTraining | Sequence[AnyRun | AnyTraining],
+    logs: AnyLogs,
     dataset_id: str,
     *,
     observation: str | None = None,
@@ -88,6 +86,7 @@ def folder_of(dataset_id: str) -> Path:
     Raises:
         LibraryError: Minari is not installed.
         ArgumentError: it is no name of a dataset.
+        OutputError: the folder of all datasets cannot be made.
     """
     _check_minari()
     from minari.dataset.minari_dataset import parse_dataset_id
@@ -98,7 +97,10 @@ def folder_of(dataset_id: str) -> Path:
     except (TypeError, ValueError):
         wanted = "the name of a dataset, as in fireworld/quick/random-v0"
         raise ArgumentError(expected("--minari", "", wanted, dataset_id)) from None
-    return Path(get_dataset_path(dataset_id))
+    try:
+        return Path(get_dataset_path(dataset_id))
+    except OSError as error:
+        raise OutputError(f"{dataset_id}: the folder of Minari's datasets cannot be made: {error}") from None
 
 
 @dataclass(frozen=True)
@@ -176,7 +178,7 @@ def data_of(name: str | os.PathLike[str]) -> Path | None:
             return folder
     try:
         folder = folder_of(os.fspath(name)) / DATA
-    except (ArgumentError, LibraryError):
+    except (ArgumentError, LibraryError, OutputError):
         return None
     return folder if (folder / _METADATA).is_file() else None
 

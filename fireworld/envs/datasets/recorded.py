@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 
@@ -122,7 +122,11 @@ class Recorded:
         return {"logs": [{"name": _name(log), "digest": log.digest} for log in self.logs]}
 
 
-def recorded(logs: AnyRun | AnyTraining | Sequence[AnyRun | AnyTraining]) -> Recorded:
+AnyLogs: TypeAlias = "AnyRun | AnyTraining | Sequence[AnyRun | AnyTraining] | Recorded"
+"""The path of a log, or a log; or several; or what `recorded` returned."""
+
+
+def recorded(logs: AnyLogs) -> Recorded:
     """Open logs for a dataset, as far as they are good.
 
     Args:
@@ -131,6 +135,8 @@ def recorded(logs: AnyRun | AnyTraining | Sequence[AnyRun | AnyTraining]) -> Rec
     Raises:
         LogError: one cannot be read, has nothing to replay, or is of a training that fireworld did itself.
     """
+    if isinstance(logs, Recorded):
+        return logs
     given = list(logs) if isinstance(logs, list | tuple) else [logs]
     if not given:
         raise LogError(expected("logs", "", "one at least", "none"))

@@ -11,14 +11,12 @@ from typing import Any, Final
 import numpy as np
 
 from fireworld.envs.datasets.loading import EpisodeFacts, StoredSteps, faults_of
-from fireworld.envs.datasets.recorded import RecordedEpisode, recorded
+from fireworld.envs.datasets.recorded import AnyLogs, RecordedEpisode, recorded
 from fireworld.envs.datasets.trajectory import Shape, Trajectory, shape_of, trajectory_of
 from fireworld.errors import LogError, expected
 from fireworld.files import new_folder
 from fireworld.kernels.batch import TEAM
 from fireworld.policy.words import FEATURES
-from fireworld.recording.inputs import AnyRun
-from fireworld.training.log.reader import AnyTraining
 from fireworld.training.log.rows_file import SUFFIX, Rows, RowsFile, check_pyarrow
 from fireworld.version import __version__, simulator_digest
 
@@ -35,7 +33,7 @@ FILES: Final[Mapping[str, str]] = {
 
 
 def export_rlds(
-    logs: AnyRun | AnyTraining | Sequence[AnyRun | AnyTraining],
+    logs: AnyLogs,
     folder: Path | str,
     *,
     observation: str | None = None,
