@@ -126,7 +126,9 @@ class Histories:
         seeds = held.get("played_seeds", np.zeros(0))
         within(held, "played_seeds", np.zeros((len(seeds), 3), dtype=np.int64), least=0, most=max(SEED_MAX, STEPS_MAX))
         first = np.diff(seeds[:, 0], prepend=-1) > 0
-        if not ((seeds[:, 1] == 0) == first).all() or not (np.diff(seeds[:, 1])[~first[1:]] > 0).all():
+        rise = ((seeds[:, 1] == 0) == first).all() and (np.diff(seeds[:, 1])[~first[1:]] > 0).all()
+        there = np.isin(np.flatnonzero(held["played_known"]), seeds[first, 0]).all()
+        if not (rise and there and (seeds[:, 1] <= steps[np.minimum(seeds[:, 0], n - 1)]).all()):
             raise LogError(expected("snapshot", "played_seeds", "steps that rise from 0 in each world", "others"))
 
     def _begin(self, index: int, step: Any, before: Done, *, known: bool, seeds: dict[int, int]) -> None:

@@ -56,7 +56,7 @@ class Setup:
     own_targets: int
     n_burning_max: int
     steps: int | None
-    record: Path | None = None
+    record: str | None = None
 
     def build(self) -> list[BuiltScenario]:
         """Build the scenarios' cities, each city once.
@@ -105,6 +105,8 @@ def setup_of(
     several = scenarios if isinstance(scenarios, Sequence) and not isinstance(scenarios, str) else [scenarios]
     if not several:
         raise ArgumentError(expected("scenarios", "", "one at least", "none"))
+    if record is not None:
+        path_of("record", record)  # or an error; a path would lose the slash at the end of a folder
     values = settings_of(set)
     if choices is not None and values.get("choices", choices) != choices:
         other = "envs.turns" if choices == "simultaneous" else "envs.team"
@@ -117,5 +119,5 @@ def setup_of(
         own_targets=whole_number("own_targets", own_targets, least=0, most=10_000),
         n_burning_max=whole_number("n_burning_max", n_burning_max, least=1, most=1_000_000),
         steps=last_step_of(steps),
-        record=None if record is None else path_of("record", record),
+        record=None if record is None else os.fspath(record),
     )
