@@ -31,13 +31,13 @@ def path(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def other(tmp_path_factory):
-    """Of one brigade that once does something else: world 1, episode 0, step 3, brigade 2."""
+    """Of one brigade that once does something else: world 1, episode 0, step 1, brigade 2."""
     file = tmp_path_factory.mktemp("played") / "b.mcap"
     worlds = envs.worlds([SMALL, LATER], 3, record=file, seeds=4, own_targets=3)
     seen = worlds.reset()
     for step in range(73):
         actions = chosen(seen, step)
-        if step == 2:
+        if step == 0:
             actions[1, 2] = (actions[1, 2] + 1) % 4
         seen = worlds.step(actions).observation
     worlds.close()
@@ -155,9 +155,9 @@ def test_diff_names_the_first_step_that_differs(path, other, fireworld):
     assert fireworld("diff", path, path).code == 0
     done = fireworld("diff", path, other)
     assert done.code == 1
-    assert done.out.startswith("later, world 1, episode 0, step 3, brigade 2: ")
+    assert done.out.startswith("later, world 1, episode 0, step 1, brigade 2: ")
     found = json.loads(fireworld("diff", path, other, "--json").out)
-    assert (found["first"]["world"], found["first"]["step"]) == (1, 3)
+    assert (found["first"]["world"], found["first"]["step"]) == (1, 1)
     assert [one["scenario"] for one in found["scenarios"]] == ["small", "later"]
     difference = fw.diff(path, other)
     assert not difference.same
