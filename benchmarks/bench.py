@@ -23,6 +23,7 @@ SECTIONS: Final = {
     "pictures": "render_rows",
     "training": "training_rows",
     "compare": "compare_rows",
+    "envs": "envs_rows",
     "start-up": "start_rows",
 }
 """Module of each section; each has `rows(*, quick) -> Iterator[Row]`."""

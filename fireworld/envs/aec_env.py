@@ -88,7 +88,7 @@ class TurnsEnv(AgentsForm, AECEnv):  # type: ignore[misc]  # pettingzoo has no t
         self._inform()
 
     def _inform(self) -> None:
-        self.infos: ByAgent = self._views(self.worlds.observe(), self.agents)[1]
+        self.infos: ByAgent = self._infos(self.worlds.observe(), self.agents)
 
     def _has_left(self, name: str) -> bool:
         return bool(self.terminations[name] or self.truncations[name])

@@ -88,9 +88,12 @@ class AgentsForm(OneWorldForm):
     def _living(self, seen: dict[str, Array]) -> list[str]:
         return [name for name, alive in zip(self.possible_agents, seen["alive"][0].tolist(), strict=True) if alive]
 
-    def _views(self, seen: dict[str, Array], agents: list[str]) -> tuple[ByAgent, ByAgent]:
-        """Return what agents see, and what is known besides."""
-        kind, info = self.worlds.setup.observation, self.worlds.info()
-        numbers = {name: self.possible_agents.index(name) for name in agents}
-        views = {name: agent_view(seen, number, kind) for name, number in numbers.items()}
-        return views, {name: agent_info(info, seen, number) for name, number in numbers.items()}
+    def _views(self, seen: dict[str, Array], agents: list[str]) -> ByAgent:
+        """Return what agents see."""
+        kind = self.worlds.setup.observation
+        return {name: agent_view(seen, self.possible_agents.index(name), kind) for name in agents}
+
+    def _infos(self, seen: dict[str, Array], agents: list[str]) -> ByAgent:
+        """Return what is known besides, of each agent."""
+        info = self.worlds.info()
+        return {name: agent_info(info, seen, self.possible_agents.index(name)) for name in agents}

@@ -122,9 +122,7 @@ class Worlds:
         """
         which = self._indices(range(self.n) if indices is None else indices)
         base = None if seed is None else Seeds(seed_of(seed), test=self.seeds.test)
-        given = None if world_seeds is None else [seed_of(one, name="world_seeds") for one in world_seeds]
-        if given is not None and len(given) != len(which):
-            raise ArgumentError(expected("reset", "world_seeds", f"{len(which)}, one of each world", len(given)))
+        given = None if world_seeds is None else _world_seeds_of(world_seeds, len(which))
         if base is not None:
             self.seeds = base
             self.episode_number[which] = -1
@@ -260,11 +258,7 @@ class Worlds:
         return self.observe()
 
     def close(self) -> None:
-        """End the threads, one does the work from here on; and end the log of episodes.
-
-        Raises:
-            OutputError: the log cannot be written.
-        """
+        """End the threads, one does the work from here on; and the log of episodes (or raise OutputError)."""
         self._bound.close()
         self._recorder.close()
 
@@ -287,9 +281,8 @@ class Worlds:
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         copied = memo[id(self)] = type(self).__new__(type(self))
-        own: dict[str, Any] = {name: getattr(self, name).copy() for name in ("episode_number", "_ended", "_share")}
-        own |= {"_bound": self._bound.another(), "_recorder": UNRECORDED}
-        vars(copied).update(vars(self) | own)  # what is built never changes
+        own = {name: getattr(self, name).copy() for name in ("episode_number", "_ended", "_share")}
+        vars(copied).update(vars(self) | own | {"_bound": self._bound.another(), "_recorder": UNRECORDED})
         return copied
 
     def __copy__(self) -> Self:
@@ -308,16 +301,17 @@ class Worlds:
 
     def _run(self, run: Callable[[Array], object]) -> Stepped:
         """Run a step of the worlds that are under way, and begin the episodes that are due."""
-        begins, runs = np.flatnonzero(self._ended), np.flatnonzero(~self._ended)
+        begins, runs, before = np.flatnonzero(self._ended), np.flatnonzero(~self._ended), self._share
         run(runs)
+        self._recorder.ran(runs)
         result, reward = self._bound.result, np.zeros(self.n)
-        reward[runs] = self.setup.reward.of(result, self._share)[runs]
-        self._share = score_share(result)
-        self._recorder.took(runs, reward)
+        self._share, self._ended = score_share(result), (result.terminated | result.truncated) != 0
+        if len(runs):
+            reward[runs] = self.setup.reward.of(result, before)[runs]  # it may fail: the step is done all the same
+        self._recorder.got(reward)
         if len(begins):
             self._next_episode(begins)
         terminated, truncated = result.terminated.astype(np.bool_), result.truncated.astype(np.bool_)
-        self._ended = terminated | truncated
         if self.autoreset is not Autoreset.SAME_STEP or not self._ended.any():
             return Stepped(self.observe(), reward, terminated, truncated, self.info())
         final_observation, final_info = self.observe(), self.info()
@@ -382,6 +376,13 @@ def worlds(
         seeds=seeds if isinstance(seeds, Seeds) else Seeds(seed_of(seeds, name="seeds")),
         first_worker=whole_number("first_worker", first_worker, least=0, most=WORKERS_MAX - n),
     )
+
+
+def _world_seeds_of(given: object, n: int) -> list[int]:
+    """Return n seeds; ArgumentError if they are anything else."""
+    if not isinstance(given, Sequence | np.ndarray) or np.shape(given) != (n,):
+        raise ArgumentError(expected("reset", "world_seeds", f"{n}, one of each world", given))
+    return [seed_of(one, name="world_seeds") for one in given]
 
 
 def seeds_in(head: Mapping[str, Any]) -> Seeds:

@@ -59,13 +59,12 @@ class TeamEnv(AgentsForm, ParallelEnv):  # type: ignore[misc]  # pettingzoo has 
             self._living(done.observation),
         )
         self.agents = [] if terminated or truncated else living
-        views, infos = self._views(done.observation, agents)
         return (
-            views,
+            self._views(done.observation, agents),
             dict.fromkeys(agents, float(done.reward[0])),
             {name: terminated or name not in living for name in agents},
             {name: truncated and name in living for name in agents},
-            infos,
+            self._infos(done.observation, agents),
         )
 
     def _actions(self, actions: Mapping[str, Any]) -> list[Any]:
@@ -82,7 +81,7 @@ class TeamEnv(AgentsForm, ParallelEnv):  # type: ignore[misc]  # pettingzoo has 
     def _beginning(self) -> tuple[ByAgent, ByAgent]:
         seen = self.worlds.observe()
         self.agents = [] if self.worlds.over else self._living(seen)
-        return self._views(seen, self.agents)
+        return self._views(seen, self.agents), self._infos(seen, self.agents)
 
 
 def team(scenario: Scenarios, **options: Unpack[FormOptions]) -> TeamEnv:

@@ -43,11 +43,14 @@ class Beginning(NamedTuple):
 class Unrecorded:
     """Records nothing: what worlds tell of their episodes, and all that they may ask."""
 
-    def took(self, runs: Array, reward: Array) -> None:
-        """Take what the worlds, (m,), that have just run a step did in it, and the rewards of all, (n,).
+    def ran(self, runs: Array) -> None:
+        """Take what was done in a step by the worlds, (m,), that have just run it."""
+
+    def got(self, reward: Array) -> None:
+        """Take the rewards of that step, (n,); episodes that ended with it are written.
 
         Raises:
-            OutputError: an episode has ended, and cannot be written.
+            OutputError: one cannot be written.
         """
 
     def begin(self, index: int, episode: int, base: int, *, seed_given: bool) -> None:
@@ -120,6 +123,7 @@ class EpisodeRecorder(Unrecorded):
         """Of the episodes that are under way, or not written yet."""
         self._state = [""] * n
         """Digests of the states that they began in, where what was done before is not known."""
+        self._runs = np.arange(0)
         self._total = np.zeros(n)
         self._process = os.getpid()
         self._failed: OutputError | None = None
@@ -130,12 +134,16 @@ class EpisodeRecorder(Unrecorded):
         """The log."""
         return self._writer.path
 
-    def took(self, runs: Array, reward: Array) -> None:
+    def ran(self, runs: Array) -> None:
         """Take what was done in a step; see `Unrecorded`, here and below."""
-        self._total += reward
-        result = self._bound.result
+        self._runs = runs
         for index in self._histories.note(runs).tolist():
             self._begin_unknown(index)
+
+    def got(self, reward: Array) -> None:
+        """Take the rewards of that step."""
+        self._total += reward
+        runs, result = self._runs, self._bound.result
         for index in runs[(result.terminated[runs] | result.truncated[runs]) != 0].tolist():
             self._write(index)
 

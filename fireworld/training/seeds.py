@@ -32,7 +32,7 @@ class Seeds:
 
     def __post_init__(self) -> None:
         """Raise ArgumentError for a base out of bounds."""
-        seed_of(self.base, name="base")
+        object.__setattr__(self, "base", seed_of(self.base, name="base"))  # a plain number, as snapshots keep it
 
     def seed(self, worker: int, episode: int) -> int:
         """Return the seed of an episode.

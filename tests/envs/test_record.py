@@ -154,7 +154,7 @@ def test_a_step_that_was_interrupted_is_not_made_up(tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(type(worlds._recorder), "took", interrupted)
+        patch.setattr(type(worlds._recorder), "ran", interrupted)
         with pytest.raises(KeyboardInterrupt):
             worlds.step(chosen(seen, 1))
     for step in range(2, 5):
@@ -162,6 +162,27 @@ def test_a_step_that_was_interrupted_is_not_made_up(tmp_path, monkeypatch):
     worlds.close()
     log = fw.open_training(tmp_path / "a.mcap")
     assert [(line.first_step, line.n_steps, line.replayable) for line in log.lines] == [(3, 2, False)] * 2
+
+
+def test_a_reward_that_fails_loses_no_step(tmp_path):
+    calls = []
+
+    def reward(result, before):
+        calls.append(1)
+        if len(calls) == 3:
+            raise ValueError("x")
+        return result.score[:, 0] - before
+
+    worlds = envs.worlds(HOT, 2, seeds=1, record=tmp_path / "a.mcap", reward=reward)
+    seen = worlds.reset()
+    for step in range(6):
+        try:
+            seen = worlds.step(chosen(seen, step)).observation
+        except ValueError:
+            seen = worlds.observe()
+    worlds.close()
+    assert [line.n_steps for line in fw.open_training(tmp_path / "a.mcap").lines] == [6, 6]
+    assert fw.verify(tmp_path / "a.mcap")
 
 
 def test_copies_do_not_record(tmp_path):

@@ -82,6 +82,16 @@ def test_processes_that_share_a_base_share_no_seed():
     assert len(set(seen)) == len(seen) == 40
 
 
+def test_bases_of_numpy():
+    worlds = envs.worlds(SMALL, seeds=Seeds(np.int64(3)))
+    worlds.reset(seed=np.uint32(4))
+    assert worlds.seeds == Seeds(4)
+    assert worlds.snapshot()
+    other = envs.worlds(SMALL, seeds=Seeds(np.int64(3)))
+    other.restore(worlds.snapshot())
+    assert other.seeds == Seeds(4)
+
+
 def test_worlds_to_test_with():
     worlds = envs.worlds(SMALL, 3, seeds=Seeds(3, test=True))
     worlds.reset()

@@ -177,8 +177,7 @@ def test_several_scenarios_are_played_in_turn(form):
 @pytest.mark.parametrize("form", FORMS)
 def test_own_targets(form):
     env = made(form, HOT, observation="graph", own_targets=9)
-    views = {name: env.observe(name) if form == "turns" else env._views(env.worlds.observe(), [name])[0][name]
-             for name in env.agents}  # fmt: skip
+    views = env._views(env.worlds.observe(), env.agents)
     own = views["brigade_0"]["observation"]["own"]
     assert own.tolist()[8:] == [-1]
     assert views["brigade_0"]["action_mask"].tolist() == [1] * 12 + [0]

@@ -87,8 +87,11 @@ def test_masks_that_make_no_sense(mask):
 
 
 def test_world_seeds_that_make_no_sense():
-    with pytest.raises(ArgumentError, match="reset: world_seeds: expected 3, one of each world, got 2"):
-        made().reset(options={"world_seeds": [1, 2]})
+    for wrong in ([1, 2], 5, [[1, 2, 3]], "abc"):
+        with pytest.raises(ArgumentError, match="reset: world_seeds: expected 3, one of each world, got "):
+            made().reset(options={"world_seeds": wrong})
+    with pytest.raises(ArgumentError, match="world_seeds: expected a whole number"):
+        made().reset(options={"world_seeds": [1, 2, -3]})
 
 
 def test_a_fork():

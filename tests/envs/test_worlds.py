@@ -314,6 +314,23 @@ def test_rewards_that_are_no_numbers(wrong):
         worlds.step(actions([0, 0, 0], [0, 0, 0]))
 
 
+def test_a_reward_that_fails_takes_no_step_twice():
+    """The step is done; worlds that ended in it are reset as ever."""
+
+    def sometimes(result, before):
+        return before if result.step[0] != 2 else "nothing"
+
+    worlds = envs.worlds(SMALL, 2, reward=sometimes, steps=2)
+    worlds.reset()
+    worlds.step(actions([0, 0, 0], [0, 0, 0]))
+    with pytest.raises(ArgumentError, match="reward: expected"):
+        worlds.step(actions([0, 0, 0], [0, 0, 0]))
+    assert worlds.ended().all()
+    assert worlds.info()["step"].tolist() == [2, 2]
+    worlds.step(actions([0, 0, 0], [0, 0, 0]))
+    assert worlds.info()["step"].tolist() == [0, 0]
+
+
 def test_a_scenario_in_which_nothing_burns_is_refused(monkeypatch):
     monkeypatch.setattr("fireworld.simulation.world.World.terminated", property(lambda _: True))
     with pytest.raises(ArgumentError, match="scenario: quick: expected one in which something burns, got 'none'"):
