@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import weakref
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -14,7 +15,7 @@ from fireworld.envs.autoreset import Autoreset
 from fireworld.envs.bound_worlds import BoundWorlds
 from fireworld.envs.history import Histories, recorded
 from fireworld.envs.setup import Setup
-from fireworld.errors import OutputError, expected
+from fireworld.errors import OutputError, expected, one_line
 from fireworld.kernels.arrays import COUNTS, STEP, Array
 from fireworld.scenario import Scenario
 from fireworld.training.log.environment import ENVIRONMENT, Environment, PlayedTrainer, curriculum_played
@@ -290,5 +291,13 @@ def recorder_of(
         }
     )
     recorder = EpisodeRecorder(setup.record, scenarios, method, base=seeds.base, bound=bound)
-    weakref.finalize(owner, recorder.close)
+    weakref.finalize(owner, _close_at_last, recorder)
     return recorder
+
+
+def _close_at_last(recorder: EpisodeRecorder) -> None:
+    """Close a recorder that nobody has closed; there is nobody left to catch an error."""
+    try:
+        recorder.close()
+    except OutputError as error:
+        sys.stderr.write(f"fireworld: {one_line(str(error))}\n")

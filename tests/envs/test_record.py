@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -203,6 +204,15 @@ def test_worlds_that_nobody_closes_are_closed_at_last(tmp_path):
     worlds.step(chosen(worlds.reset(), 0))
     del worlds
     assert len(fw.open_training(tmp_path / "a.mcap")) == 2
+
+
+def test_worlds_whose_folder_is_gone_say_so_at_last(tmp_path, capsys):
+    (tmp_path / "runs").mkdir()
+    worlds = envs.worlds(HOT, 2, record=tmp_path / "runs")
+    worlds.step(chosen(worlds.reset(), 0))
+    shutil.rmtree(tmp_path / "runs")
+    del worlds
+    assert capsys.readouterr().err.startswith(f"fireworld: {tmp_path / 'runs'}")
 
 
 def test_a_folder_holds_many_logs(tmp_path):
