@@ -8,7 +8,7 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
-from fireworld.errors import LogError, expected
+from fireworld.errors import LogError, expected, one_line
 from fireworld.kernels.arrays import Array
 from fireworld.recording.inputs import AnyRun, check_replayable, is_training, open_run, run_name
 from fireworld.recording.replay import build_recorded
@@ -166,7 +166,9 @@ def _opened(given: Any) -> StoredRun | TrainingLog:
 
 
 def _name(log: StoredRun | TrainingLog) -> str:
-    return log.path.name if isinstance(log, TrainingLog) else run_name(log).rpartition("/")[2]
+    """Return the name of a log's file, which may be of any bytes, as a text."""
+    name = log.path.name if isinstance(log, TrainingLog) else run_name(log).rpartition("/")[2]
+    return one_line(name)
 
 
 def _played(log: TrainingLog) -> Iterator[RecordedEpisode]:
@@ -186,7 +188,7 @@ def _played(log: TrainingLog) -> Iterator[RecordedEpisode]:
             score=record.score,
             own_targets=episode.method.own_targets,
             first_step=record.first_step,
-            name=f"{log.path.name}:{number}",
+            name=f"{_name(log)}:{number}",
             world=record.world,
             number=record.episode,
             run_digest="",
