@@ -77,10 +77,10 @@ class Histories:
         self._begin(index, 0, self._nothing, known=True, seeds={0: seed})
 
     def copy(self, source: int, index: int, seed: int) -> None:
-        """Begin where another world stands, and go on with a seed."""
+        """Begin where another world stands, and continue with a seed."""
         step, known = int(self._last[source]), bool(self.known[source])
         before = self.done(source) if known else self._nothing
-        self._begin(index, step, before, known=known, seeds=_go_on(self.seeds[source], step, seed))
+        self._begin(index, step, before, known=known, seeds=_continued(self.seeds[source], step, seed))
 
     def restore(self, index: int, step: int, seed: int, held: Mapping[str, Array]) -> None:
         """Begin after a step that a snapshot holds, with all that was done before, if it has that, too."""
@@ -89,7 +89,7 @@ class Histories:
             return
         before = Done(held["played_action"][index, :step], held["played_target"][index, :step])
         seeds: dict[int, int] = dict(held["played_seeds"][held["played_seeds"][:, 0] == index, 1:].tolist())
-        self._begin(index, step, before, known=True, seeds=_go_on(seeds, step, seed))
+        self._begin(index, step, before, known=True, seeds=_continued(seeds, step, seed))
 
     def done(self, index: int) -> Done:
         """Return what the brigades of a world did, from the first step that is known to the last."""
@@ -142,6 +142,6 @@ def recorded(done: Done, n_brigades: int) -> dict[str, Array]:
     return {"action": action, "target": target[action == OWN]}
 
 
-def _go_on(seeds: Mapping[int, int], step: int, seed: int) -> dict[int, int]:
+def _continued(seeds: Mapping[int, int], step: int, seed: int) -> dict[int, int]:
     """Return seeds of which another one counts from a step on, unless it does already."""
     return dict(seeds) if [*seeds.values()][-1:] == [seed] else {**seeds, step: seed}

@@ -195,7 +195,7 @@ class EpisodeRecorder(Unrecorded):
         self._begun[index], self._state[index], self._total[index] = beginning, "", 0.0
 
     def _begin_unknown(self, index: int) -> None:
-        """Go on with an episode of which a step was missed, as if it began after that."""
+        """Continue an episode of which a step was missed, as if it began after that."""
         begun = self._begun[index]
         if begun is not None:
             step = int(self._bound.result.step[index])

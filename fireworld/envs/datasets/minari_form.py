@@ -110,7 +110,7 @@ class Sizes:
     Attributes:
         n_brigades: of the largest team.
         n_buildings: of the largest city.
-        scenarios: all that was played, each once, by what `Scenarios` tells apart.
+        scenarios: all that was played, each once, each by its number in `Scenarios`.
         setup: what learners are shown.
         shape: the same, as a dataset has it.
     """

@@ -36,7 +36,7 @@ class RecordedEpisode:
         city: content of its city file, None of a city that is generated.
         decided: (t, b) what the brigades did from the start on.
         seeds: by the step after which each counts.
-        n_steps_max: its last step, if it goes on so long.
+        n_steps_max: its last step, if it lasts so long.
         terminated, truncated: how it ended; neither: it was left.
         score: at its end.
         own_targets: how many a brigade of the learner could name; 0: none, or they are those of a policy.
@@ -112,7 +112,7 @@ class Recorded:
 
     @property
     def reward(self) -> str:
-        """What learners were rewarded with, if it can be told; of runs the scenario's own."""
+        """What learners were rewarded with, if that is known; of runs the scenario's own."""
         kinds = {log.player.method.reward for log in self.logs if isinstance(log, TrainingLog)}
         return SCORE if kinds & {"score", "function"} else SCENARIOS_OWN
 

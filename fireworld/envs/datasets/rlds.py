@@ -23,7 +23,9 @@ from fireworld.version import __version__, simulator_digest
 FORMAT: Final = "fireworld-rlds/1"
 ROWS_FREE: Final = 100_000
 ROW_BYTES_MIN: Final = 4
-"""A file of n bytes may hold that many rows more than n / 4."""
+"""A file of n bytes may hold that many rows more than n / 4, but for that of the steps."""
+UNPACKED_BYTES_MAX: Final = 1 << 29
+GROUP_ROWS_MAX: Final = 1 << 23
 FILES: Final[Mapping[str, str]] = {
     "steps": "a brigade before a step, and after the last one: what it saw, could do, did and got",
     "episodes": "an episode: where it comes from, and how it went",
@@ -220,12 +222,24 @@ class StoredParquet:
         """Return the steps of an episode."""
         import pyarrow.parquet as pq
 
-        columns = ["brigade", "step", *StoredSteps._fields]
-        table = pq.read_table(self._path("steps"), columns=columns, filters=[("episode", "==", number)])
+        columns = ["episode", "brigade", "step", *StoredSteps._fields]
+        found: list[dict[str, Any]] = []
+        with pq.ParquetFile(self._path("steps")) as file:
+            place = file.schema_arrow.names.index("episode")
+            for k in range(file.num_row_groups):
+                group = file.metadata.row_group(k)
+                spread = group.column(place).statistics
+                if spread is not None and not spread.min <= number <= spread.max:
+                    continue
+                if group.num_rows > GROUP_ROWS_MAX:
+                    raise LogError(expected("steps", "", f"at most {GROUP_ROWS_MAX} rows in a group", group.num_rows))
+                table = file.read_row_group(k, columns=columns)
+                mine = table.column("episode").to_numpy() == number
+                found.append({name: table.column(name).to_numpy()[mine] for name in columns})
+        values = {name: np.concatenate([one[name] for one in found]) for name in columns}
         b, n = facts.n_brigades, facts.n_steps
-        if table.num_rows != b * (n + 1):
-            raise LogError(expected("steps", "rows", str(b * (n + 1)), table.num_rows))
-        values = {name: table.column(name).to_numpy() for name in columns}
+        if len(values["step"]) != b * (n + 1):
+            raise LogError(expected("steps", "rows", str(b * (n + 1)), len(values["step"])))
         order = np.lexsort((values["step"], values["brigade"]))
         decides, action, target, reward = (
             values[name][order].reshape(b, n + 1)[:, :n].T for name in StoredSteps._fields
@@ -239,11 +253,13 @@ class StoredParquet:
         import pyarrow.parquet as pq
 
         path = self._path(name)
-        with path.open("rb") as file:
-            metadata = pq.ParquetFile(file).metadata
-            if metadata.num_rows > ROWS_FREE + path.stat().st_size // ROW_BYTES_MIN:
-                raise LogError(expected(name, "rows", "as many as fit its bytes", metadata.num_rows))
-        found: list[dict[str, Any]] = pq.read_table(path, columns=list(columns)).to_pylist()
+        with pq.ParquetFile(path) as file:
+            groups = [file.metadata.row_group(k) for k in range(file.num_row_groups)]
+            if file.metadata.num_rows > ROWS_FREE + path.stat().st_size // ROW_BYTES_MIN:
+                raise LogError(expected(name, "rows", "as many as fit its bytes", file.metadata.num_rows))
+            if sum(group.total_byte_size for group in groups) > UNPACKED_BYTES_MAX:
+                raise LogError(expected(name, "", f"at most {UNPACKED_BYTES_MAX} bytes, unpacked", "more"))
+            found: list[dict[str, Any]] = file.read(columns=list(columns)).to_pylist()
         return found
 
 
