@@ -102,9 +102,13 @@ def diff_trainings(
         on_part: called after each part.
 
     Raises:
-        LogError: one cannot be read, or the trainings cannot be compared: other methods, other numbers of brigades.
+        LogError: one cannot be read, or nothing of it; or the trainings cannot be compared: other methods, other
+            numbers of brigades.
     """
     logs = [opened(one, partial=partial) for one in (a, b)]
+    for log in logs:
+        if log.damage is not None and not len(log):
+            raise LogError(f"{log.path}: {log.damage}; there is nothing to compare")
     return compare_trainings(logs[0], logs[1], names=(str(logs[0].path), str(logs[1].path)), on_part=on_part)
 
 
