@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from importlib.util import find_spec
 
@@ -227,6 +228,12 @@ def test_what_makes_no_dataset(tmp_path):
     with pytest.raises(ArgumentError, match="observation: expected one of features, targets, got 'graph'"):
         fw.export_rlds(play(tmp_path / "a.mcap", n_steps=20), tmp_path / "d", observation="graph")
     assert not (tmp_path / "d").exists()
+
+
+def test_a_folder_of_any_name(tmp_path):
+    folder = tmp_path / os.fsdecode(b"\xff\xfe")
+    fw.export_rlds(play(tmp_path / "a.mcap", n=1, n_steps=20), folder)
+    assert fw.verify(fw.load_dataset(folder).run(0))
 
 
 def test_damaged_files_are_a_line(logs, tmp_path):

@@ -207,7 +207,7 @@ class Dataset:
         """Return a scenario, built; each once."""
         if number not in self._built:
             stored = self._scenarios[number]
-            scenario = parse_scenario(stored.yaml, source=f"{self.name}: {stored.name}")
+            scenario = parse_scenario(stored.yaml, source=f"dataset: {stored.name}")
             if scenario.digest != stored.digest:
                 raise LogError(expected(stored.name, "digest", stored.digest, scenario.digest))
             self._built[number] = self._cities.build(scenario, city_json=stored.city or None)

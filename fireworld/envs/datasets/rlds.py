@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -201,10 +201,8 @@ class StoredParquet:
     @property
     def shape(self) -> Mapping[str, Any]:
         """What it holds of every episode."""
-        import pyarrow.parquet as pq
-
-        with faults_of(self.name):
-            facts = {key.decode(): text.decode() for key, text in pq.read_schema(self._path("steps")).metadata.items()}
+        with faults_of(self.name), self._open("steps") as file:
+            facts = {key.decode(): text.decode() for key, text in file.schema_arrow.metadata.items()}
             if facts.get("fireworld.format") != FORMAT:
                 raise LogError(expected("steps", "format", FORMAT, facts.get("fireworld.format", "none")))
             named = {name: facts[f"fireworld.{name}"] for name in ("observation", "reward", "own_targets")}
@@ -220,11 +218,9 @@ class StoredParquet:
 
     def steps(self, number: int, facts: EpisodeFacts) -> StoredSteps:
         """Return the steps of an episode."""
-        import pyarrow.parquet as pq
-
         columns = ["episode", "brigade", "step", *StoredSteps._fields]
         found: list[dict[str, Any]] = []
-        with pq.ParquetFile(self._path("steps")) as file:
+        with self._open("steps") as file:
             place = file.schema_arrow.names.index("episode")
             for k in range(file.num_row_groups):
                 group = file.metadata.row_group(k)
@@ -246,16 +242,18 @@ class StoredParquet:
         )
         return StoredSteps(decides, action, target, reward[:, 0])
 
-    def _path(self, name: str) -> Path:
-        return self._folder / f"{name}{SUFFIX}"
-
-    def _rows(self, name: str, columns: Sequence[str]) -> list[dict[str, Any]]:
+    @contextmanager
+    def _open(self, name: str) -> Iterator[Any]:
         import pyarrow.parquet as pq
 
-        path = self._path(name)
-        with pq.ParquetFile(path) as file:
+        with (self._folder / f"{name}{SUFFIX}").open("rb") as file:  # pyarrow cannot open names of any bytes
+            yield pq.ParquetFile(file)
+
+    def _rows(self, name: str, columns: Sequence[str]) -> list[dict[str, Any]]:
+        n_bytes = (self._folder / f"{name}{SUFFIX}").stat().st_size
+        with self._open(name) as file:
             groups = [file.metadata.row_group(k) for k in range(file.num_row_groups)]
-            if file.metadata.num_rows > ROWS_FREE + path.stat().st_size // ROW_BYTES_MIN:
+            if file.metadata.num_rows > ROWS_FREE + n_bytes // ROW_BYTES_MIN:
                 raise LogError(expected(name, "rows", "as many as fit its bytes", file.metadata.num_rows))
             if sum(group.total_byte_size for group in groups) > UNPACKED_BYTES_MAX:
                 raise LogError(expected(name, "", f"at most {UNPACKED_BYTES_MAX} bytes, unpacked", "more"))
