@@ -45,6 +45,7 @@ HAS_MINARI = find_spec("minari") is not None
 def warm() -> None:
     """Import what commands import, so that forks need not."""
     os.environ["MPLBACKEND"] = "agg"
+    os.environ["MINARI_DATASETS_PATH"] = "minari"  # in the folder of a call, not in that of who tries
     from fireworld.cli import COMMANDS
 
     for name in COMMANDS:

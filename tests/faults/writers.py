@@ -233,7 +233,6 @@ if HAS_MINARI:
         ("minari",),
         PLAYED,
         again=("--force",),
-        before=lambda: os.environ.update(MINARI_DATASETS_PATH="minari"),
     )
 OFTEN: Final = tuple(name for name in WRITERS if name != "reproduce")
 

@@ -227,7 +227,7 @@ def _write(folder: Path, dataset_id: str, episodes: Recorded, sizes: Sizes, on_e
         data_format=_STORAGE,
         jpeg_encoding=False,
     )
-    size_of, storage.get_size = storage.get_size, lambda: 0.0  # else it measures all again after every episode
+    storage.get_size = lambda: 0.0  # else it measures all again after every episode
     storage.update_metadata({"dataset_id": dataset_id, "minari_version": minari_version})
     facts, numbers = list[dict[str, Any]](), Scenarios()
 
@@ -240,8 +240,8 @@ def _write(folder: Path, dataset_id: str, episodes: Recorded, sizes: Sizes, on_e
 
     storage.update_episodes(buffers())
     storage.update_episode_metadata(facts)
-    del storage.get_size
-    storage.update_metadata({"dataset_size": float(size_of()), KEY: _facts(episodes, sizes)})
+    n_bytes = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())  # of folders too, Minari's own
+    storage.update_metadata({"dataset_size": round(n_bytes / 1e6, 1), KEY: _facts(episodes, sizes)})
 
 
 def _buffer(trajectory: Trajectory, sizes: Sizes) -> Any:
