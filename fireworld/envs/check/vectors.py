@@ -17,7 +17,7 @@ from fireworld.envs.check.players import exact, randomly
 from fireworld.envs.setup import Scenarios
 from fireworld.envs.views import OBSERVATIONS
 
-_N, _SEED = 4, 11
+_N, _SEED, _LAST_STEP = 4, 11, 60
 
 
 def checks_of_vectors(scenario: Scenarios) -> Iterator[Check]:
@@ -25,7 +25,8 @@ def checks_of_vectors(scenario: Scenarios) -> Iterator[Check]:
     for mode in AutoresetMode:
         name = mode.name.lower().replace("_", " ")
         for kind in OBSERVATIONS:
-            yield Check(f"{name}, {kind}", "vector", partial(compare_with_single, scenario, mode, observation=kind))
+            compared = partial(compare_with_single, scenario, mode, observation=kind, steps=_LAST_STEP)
+            yield Check(f"{name}, {kind}", "vector", compared)
         yield Check(f"{name}, wrappers", "vector", partial(_wrapped, scenario, mode))
 
 
