@@ -22,7 +22,7 @@ install: .venv/.installed  ## Make .venv with everything in it, and nothing else
 # ensurepip (Debian keeps it in a package of its own) lends its own pip to the new environment.
 .venv/.installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv || { $(PYTHON) -m venv --without-pip .venv && $(PYTHON) -m pip --python $(BIN)/python install --quiet pip; }
-	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --editable '.[view,figures,gym,dev]'
+	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --editable '.[view,figures,gym,minari,dev]'
 	touch $@
 
 # No file is a target here: a recording is made anew each time, and half a one never counts as made.
@@ -62,7 +62,7 @@ oldest: .venv-oldest/.installed  ## Run the tests of everything but docs and pac
 
 .venv-oldest/.installed: pyproject.toml constraints-oldest.txt
 	$(PYTHON) -m venv .venv-oldest
-	PIP_CONSTRAINT=constraints-oldest.txt .venv-oldest/bin/python -m pip install --quiet --editable '.[view,film,osm,onnx,archive,gym]' \
+	PIP_CONSTRAINT=constraints-oldest.txt .venv-oldest/bin/python -m pip install --quiet --editable '.[view,film,osm,onnx,archive,gym,minari]' \
 		hypothesis import-linter protobuf pytest pytest-xdist scipy
 	touch $@
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import tempfile
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, Final
@@ -20,6 +22,7 @@ ACTION: Final = 3
 N_STEPS: Final = 40
 """The fire burns as long, whatever the random draws are."""
 SIZES: Final = (1, 16, 64, 256)
+N_RECORDED: Final = 64
 
 
 def from_python(built: BuiltScenario) -> Contender:
@@ -43,6 +46,19 @@ def in_batch(n: int, kind: str) -> Contender:
             worlds.step(actions)
 
     return Contender(f"{n} in one call", run, lambda: worlds.reset() and None, parts=N_STEPS * n)
+
+
+def at_random(name: str, worlds: envs.Worlds) -> Contender:
+    """Return steps of many worlds at random, episode after episode."""
+    worlds.reset()
+    chosen = np.random.default_rng(0).integers(0, 4, size=(500, N_RECORDED, worlds.n_brigades))
+    steps = itertools.cycle(chosen)
+
+    def run(_: None) -> None:
+        for _ in range(N_STEPS):
+            worlds.step(next(steps))
+
+    return Contender(name, run, lambda: None, parts=N_STEPS * N_RECORDED)
 
 
 def team_steps(env: Any) -> None:
@@ -82,6 +98,13 @@ def rows(*, quick: bool) -> Iterator[Row]:
         yield compare("envs", "a step of a world, features", size, in_batch(n, "features"), python, seconds=seconds)
     for kind in ("targets", "graph"):
         yield compare("envs", f"a step of a world, {kind}", size, in_batch(64, kind), python, seconds=seconds)
+    with tempfile.TemporaryDirectory() as folder:
+        worlds = {"recorded": envs.worlds(SCENARIO, N_RECORDED, record=folder)}
+        worlds["not recorded"] = envs.worlds(SCENARIO, N_RECORDED)
+        pair = [at_random(*one) for one in worlds.items()]
+        yield compare("envs", "a step of one of 64 worlds, episodes recorded", size, *pair, seconds=seconds)
+        for one in worlds.values():
+            one.close()
     forms = (
         form("envs.team", envs.team(SCENARIO), team_steps),
         form("envs.turns", envs.turns(SCENARIO), turns_steps),

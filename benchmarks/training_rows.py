@@ -12,8 +12,8 @@ from benchmarks.timing import Contender, Row, compare, measure
 from fireworld.recording.record import run
 from fireworld.training.curriculum import Curriculum, load_curriculum
 from fireworld.training.log.difference import diff_trainings
-from fireworld.training.log.episode_run import replay_episode
 from fireworld.training.log.reader import open_training
+from fireworld.training.log.replay import replay_episode
 from fireworld.training.log.verify import verify_training
 from fireworld.training.train import train
 

@@ -18,6 +18,10 @@ from typing import TYPE_CHECKING, Any
 from fireworld.version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from fireworld.envs.datasets.loading import Dataset as Dataset
+    from fireworld.envs.datasets.loading import load_dataset as load_dataset
+    from fireworld.envs.datasets.minari_form import export_minari as export_minari
+    from fireworld.envs.datasets.rlds import export_rlds as export_rlds
     from fireworld.errors import FireworldError as FireworldError
     from fireworld.evaluation.check_scenarios import check_scenarios as check_scenarios
     from fireworld.evaluation.compare import compare as compare
@@ -42,6 +46,7 @@ if TYPE_CHECKING:
     from fireworld.policy.teams.team import load_team as load_team
     from fireworld.recording.difference import Difference as Difference
     from fireworld.recording.difference import diff as diff
+    from fireworld.recording.episode import open_episode as open_episode
     from fireworld.recording.explain import Explanation as Explanation
     from fireworld.recording.explain import explain as explain
     from fireworld.recording.export import export as export
@@ -60,14 +65,15 @@ if TYPE_CHECKING:
     from fireworld.scenario import scenarios as scenarios
     from fireworld.simulation.session import Session as Session
     from fireworld.simulation.session import world as world
-    from fireworld.training.log.episode_run import replay_episode as replay_episode
     from fireworld.training.log.reader import TrainingLog as TrainingLog
     from fireworld.training.log.reader import open_training as open_training
+    from fireworld.training.log.replay import replay_episode as replay_episode
     from fireworld.training.train import train as train
 
 _ROOMS = {
     "Action": "policy.protocol",
     "Comparison": "evaluation.comparison",
+    "Dataset": "envs.datasets.loading",
     "Decision": "policy.protocol",
     "Difference": "recording.difference",
     "Explanation": "recording.explain",
@@ -95,17 +101,21 @@ _ROOMS = {
     "explain": "recording.explain",
     "export": "recording.export",
     "export_city": "maps.exporting",
+    "export_minari": "envs.datasets.minari_form",
+    "export_rlds": "envs.datasets.rlds",
     "fork": "recording.fork",
     "import_city": "maps.importing",
     "import_log": "recording.official_log.importer",
     "import_osm": "maps.osm",
+    "load_dataset": "envs.datasets.loading",
     "load_team": "policy.teams.team",
     "new_scenarios": "evaluation.new_scenarios",
+    "open_episode": "recording.episode",
     "open_log": "recording.run",
     "open_training": "training.log.reader",
     "policies": "policy.names",
     "recover": "recording.export",
-    "replay_episode": "training.log.episode_run",
+    "replay_episode": "training.log.replay",
     "reproduce": "reproduction.reproduce",
     "run": "recording.record",
     "scenarios": "scenario",

@@ -24,6 +24,7 @@ Wire = Literal["double", "float", "sfixed32", "fixed64", "uint8", "bool", "strin
 Entity = Literal[
     "building", "brigade", "civilian", "site", "event", "link", "corner", "node", "street", "refuge", "hydrant",
     "offset", "axis", "scenario", "step", "choice", "table", "entry", "update", "candidate", "fire", "weight",
+    "seed",
 ]  # fmt: skip
 """What an array can have an entry for. An offset is where the entries of a building begin in another array; the last
 one is where they end."""

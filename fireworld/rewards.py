@@ -7,9 +7,13 @@ field of its name to `fireworld.records.Rewards`: what is not recorded cannot be
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeVar
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 Kind = Literal["stock", "change"]
+Values = TypeVar("Values", float, "NDArray[Any]")
 KINDS: Final[dict[Kind, str]] = {
     "stock": "the weighted sum after the step, at every step anew",
     "change": "how that sum changed in the step",
@@ -78,6 +82,18 @@ def rewarded(kind: int, now: float, before: float) -> float:
         before: the same before the step.
     """
     return now - before if kind == CHANGE else now
+
+
+def share_gained(score: Values, score_max: Values, before: Values) -> Values:
+    """Return what a step is worth to learners in environments, if nothing else is asked for.
+
+    Args:
+        score: after the step.
+        score_max: its maximum.
+        before: score / maximum before the step.
+    """
+    gained: Values = score / score_max - before
+    return gained
 
 
 def reward_of(kind: Kind, weights: Mapping[str, float] | None = None) -> Reward:

@@ -26,7 +26,7 @@ COMMANDS: Final = {
     "explain": "Find the decisions that made one run better than another.",
     "replay": "Write an episode of a training as the log of a run.",
     "verify": "Replay a recording and compare every step.",
-    "export": "Write a recording as tables for data tools.",
+    "export": "Write a recording as tables, or several as a dataset.",
     "golden": "Run golden recordings again and compare.",
     "import-log": "Make a recording of an official kernel's log.",
     "recover": "Rescue the committed steps of a damaged recording.",

@@ -1,46 +1,95 @@
-"""`fireworld export`: write a recording as tables for data tools."""
+"""`fireworld export`: write recordings as tables for data tools, or as datasets for learners."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import click
 
+from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.progress import bar
 
 
 @click.command()
-@click.argument("log", metavar="LOG", type=click.Path(path_type=Path))
+@click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
     "--parquet",
-    "folder",
     metavar="DIR",
     type=click.Path(path_type=Path),
-    required=True,
     help="Write a Parquet file for each table into this folder.",
 )
+@click.option("--rlds", metavar="DIR", type=click.Path(path_type=Path), help="Write a dataset as Parquet files.")
+@click.option("--minari", metavar="ID", help="Write a dataset of Minari, as in fireworld/quick/random-v0.")
 @click.option(
     "--tables",
     metavar="NAMES",
-    help="Only these: city, buildings, brigades, decisions, civilians, sites, events, steps; of a training episodes, "
-    "steps, tables; of a search generations, candidates, fights. Separated by commas.",
+    help="Of --parquet, only these: city, buildings, brigades, decisions, civilians, sites, events, steps; of a "
+    "training episodes, steps, tables; of a search generations, candidates, fights; of what a learner played played, "
+    "actions. Separated by commas.",
+)
+@click.option(
+    "--observation",
+    type=click.Choice(("features", "targets")),
+    help="Of a dataset: what brigades see.  [default: as learners did, else features]",
+)
+@click.option(
+    "--reward",
+    type=click.Choice(("score", "scenario")),
+    help="Of a dataset: the change of the score, or the scenario's own.  [default: as learners got it, else scenario]",
+)
+@click.option(
+    "--own-targets",
+    type=click.IntRange(min=0),
+    metavar="N",
+    help="Of a dataset: how many targets a brigade may name itself.  [default: as many as are needed]",
 )
 @click.option("--force", is_flag=True, help="Replace an earlier export.")
 @click.option("--json", "as_json", is_flag=True, help="Write what was exported as JSON.")
-def command(*, log: Path, folder: Path, tables: str | None, force: bool, as_json: bool) -> None:
-    """Write LOG, a recording, as tables that pandas, polars and DuckDB open.
+def command(
+    *,
+    logs: tuple[Path, ...],
+    parquet: Path | None,
+    rlds: Path | None,
+    minari: str | None,
+    tables: str | None,
+    force: bool,
+    as_json: bool,
+    **dataset: Any,
+) -> None:
+    """Write LOG, a recording, as tables that pandas, polars and DuckDB open; or several as a dataset for learners.
 
     \b
     fireworld export run.mcap --parquet run
     fireworld export run.mcap --parquet run --tables buildings,steps --force
+    fireworld export runs/episodes-1.mcap run.mcap --rlds dataset
+    fireworld export runs/episodes-1.mcap --minari fireworld/quick/mine-v0
 
-    There is a row for each step and building, brigade and so on. Columns are named after the fields of the recording,
-    with unit and meaning in the metadata of the column; the header of the run is the metadata of each file.
+    Of tables there is a row for each step and building, brigade and so on. Columns are named after the fields of the
+    recording, with unit and meaning in the metadata of the column; the header of the run is the metadata of each file.
     A recording that was cut off or damaged is exported as far as it is good.
+
+    A dataset has what brigades saw, could do, did and got, from logs of runs and of what learners played in
+    environments. Every episode is played again for it, and docs/datasets.md explains how it is loaded back.
 
     Exit code: 0 exported, 2 could not export, 130 interrupted (nothing is left of it).
     """
+    if sum(one is not None for one in (parquet, rlds, minari)) != 1:
+        raise click.UsageError("Give one of --parquet, --rlds and --minari.")
+    given = {name: value for name, value in dataset.items() if value is not None}
+    if parquet is not None:
+        if given or len(logs) > 1:
+            raise click.UsageError("--parquet takes one LOG, and no --observation, --reward or --own-targets.")
+        _export_tables(logs[0], parquet, tables, force=force, as_json=as_json)
+        return
+    if tables is not None:
+        raise click.UsageError("--tables goes with --parquet.")
+    _export_dataset(logs, rlds, minari, given, force=force, as_json=as_json)
+
+
+def _export_tables(log: Path, folder: Path, tables: str | None, *, force: bool, as_json: bool) -> None:
     from fireworld.recording.export import export
     from fireworld.recording.inputs import is_training, open_run
     from fireworld.records import StoredRun
@@ -60,3 +109,32 @@ def command(*, log: Path, folder: Path, tables: str | None, force: bool, as_json
         return
     for name, n in n_rows.items():
         click.echo(f"{folder / name}.parquet: {n:,} rows")
+
+
+def _export_dataset(
+    logs: Sequence[Path], rlds: Path | None, minari: str | None, given: Mapping[str, Any], *, force: bool, as_json: bool
+) -> None:
+    from fireworld.envs.datasets.loading import load_dataset
+    from fireworld.envs.datasets.minari_form import export_minari
+    from fireworld.envs.datasets.recorded import recorded
+    from fireworld.envs.datasets.rlds import export_rlds
+
+    episodes = recorded(logs)
+    announce_compilation()
+    for log in episodes.logs:
+        if log.damage is not None:
+            click.echo(f"{getattr(log, 'path', '')}: {log.damage}; exported as far as it is good", err=True)
+    if episodes.n_unknown:
+        click.echo(f"{episodes.n_unknown} episodes began in states that nobody knows, and are left out", err=True)
+    with bar("export", len(episodes), quiet=as_json) as advance:
+        if rlds is not None:
+            export_rlds(episodes, rlds, force=force, on_episode=advance, **given)
+        elif minari is not None:
+            export_minari(episodes, minari, force=force, on_episode=advance, **given)
+    dataset = load_dataset(rlds if rlds is not None else minari or "")
+    n_steps = sum(one.n_steps for one in dataset.facts)
+    if as_json:
+        known = {"dataset": dataset.name, **dataset.shape, "n_unknown": episodes.n_unknown}
+        click.echo(json.dumps({**known, "n_episodes": len(dataset), "n_steps": n_steps}, indent=2))
+        return
+    click.echo(f"{dataset.name}: {len(dataset):,} episodes, {n_steps:,} steps")

@@ -27,14 +27,14 @@ if TYPE_CHECKING:
     from fireworld.envs.many_worlds import worlds as worlds
     from fireworld.envs.parallel_env import TeamEnv as TeamEnv
     from fireworld.envs.parallel_env import team as team
-    from fireworld.envs.seeds import Seeds as Seeds
     from fireworld.envs.team_env import WholeTeamEnv as WholeTeamEnv
     from fireworld.envs.vector_env import TeamVectorEnv as TeamVectorEnv
+    from fireworld.training.seeds import Seeds as Seeds
 
 _ROOMS = {
     "Autoreset": "autoreset",
     "BrigadeEnv": "brigade_env",
-    "Seeds": "seeds",
+    "Seeds": "many_worlds",
     "TeamEnv": "parallel_env",
     "TeamVectorEnv": "vector_env",
     "TurnsEnv": "aec_env",

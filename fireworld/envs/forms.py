@@ -15,12 +15,12 @@ from fireworld.arguments import seed_of, whole_number
 from fireworld.envs.many_worlds import Worlds
 from fireworld.envs.one_world import OneWorld
 from fireworld.envs.rendering import MODES, Rendering
-from fireworld.envs.seeds import WORKERS_MAX, Seeds
 from fireworld.envs.setup import Scenarios, SetupOptions, setup_of
 from fireworld.envs.snapshots import pack, unpack
 from fireworld.errors import LogError, expected
 from fireworld.policy.protocol import Policy
 from fireworld.scenario.document import Choices
+from fireworld.training.seeds import WORKERS_MAX, Seeds
 
 DEFAULT: Final = "default"
 """The scenario of forms that are made by their name in Gymnasium's registry, if none is named."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Self, Unpack
 
 import numpy as np
@@ -14,8 +14,8 @@ from fireworld.arguments import ArgumentError, seed_of, whole_number
 from fireworld.envs.actions import checked_actions
 from fireworld.envs.autoreset import Autoreset, autoreset_of
 from fireworld.envs.bound_worlds import BoundWorlds
+from fireworld.envs.record import UNRECORDED, recorder_of
 from fireworld.envs.rewards import score_share
-from fireworld.envs.seeds import EPISODES_MAX, WORKERS_MAX, Seeds
 from fireworld.envs.setup import Scenarios, Setup, SetupOptions, setup_of
 from fireworld.envs.snapshots import fitting, pack, unpack, within
 from fireworld.envs.views import observed
@@ -26,6 +26,7 @@ from fireworld.policy.kernel import KernelPolicy
 from fireworld.scenario import Scenario
 from fireworld.simulation.built import BuiltScenario
 from fireworld.simulation.world import World
+from fireworld.training.seeds import EPISODES_MAX, WORKERS_MAX, Seeds
 
 _FORM: Final = "fireworld-worlds/1"
 
@@ -88,6 +89,9 @@ class Worlds:
         self._share: Array = np.ones(n)
         playing = [self._scenario_of(index, 0) for index in range(n)]
         self._bound = BoundWorlds(setup, self._built, playing, threads=threads, others=others)
+        self._recorder = recorder_of(
+            self, setup, self._bound, self.scenarios, first_worker=first_worker, seeds=seeds, autoreset=autoreset
+        )
 
     @property
     def scenarios(self) -> tuple[Scenario, ...]:
@@ -187,6 +191,7 @@ class Worlds:
         if chosen is not None:
             self._bound.draw_anew(target, chosen)
         self.episode_number[target], self._ended[target] = max(self.episode_number[target], 0), self._ended[source]
+        self._recorder.fork(source, target, int(self.episode_number[target]), self.seeds.base)
         self._show(np.array([target]), begun=True)
 
     def world(self, index: int) -> World:
@@ -228,7 +233,7 @@ class Worlds:
         """Return the states of all worlds, to be restored here or in other worlds of the same scenarios."""
         head = {**self._layout(), "base": self.seeds.base, "test": self.seeds.test}
         counters = {"episode_number": self.episode_number, "ended": self._ended}
-        return pack(_FORM, head, {**counters, **self._bound.arrays()})
+        return pack(_FORM, head, {**counters, **self._bound.arrays(), **self._recorder.held()})
 
     def restore(self, snapshot: bytes) -> dict[str, Array]:
         """Bring all worlds into the states of a snapshot, their seeds included, and return what is seen of them.
@@ -244,15 +249,18 @@ class Worlds:
         number = within(held, "episode_number", self.episode_number, least=-1, most=EPISODES_MAX - 1)
         ended = fitting(held, "ended", self._ended)
         self._bound.check(held)
+        self._recorder.leave_for(held)
         self.seeds = seeds
         self.episode_number[:], self._ended[:] = number, ended
         self._bound.take(held)
         self._share = score_share(self._bound.result)
+        self._recorder.restore(held, number, seeds.base)
         return self.observe()
 
     def close(self) -> None:
-        """End the threads; one does the work from here on."""
+        """End the threads, one does the work from here on; and the log of episodes (or raise OutputError)."""
         self._bound.close()
+        self._recorder.close()
 
     def check_under_way(self) -> None:
         """Raise ArgumentError if a world has ended, and is not reset by itself in the next step."""
@@ -269,12 +277,12 @@ class Worlds:
             "first_worker": self._first_worker,
             "others": self._others,
         }
-        return again, (type(self), (self.setup, self.n), options, self.snapshot())
+        return again, (type(self), (replace(self.setup, record=None), self.n), options, self.snapshot())
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         copied = memo[id(self)] = type(self).__new__(type(self))
         own = {name: getattr(self, name).copy() for name in ("episode_number", "_ended", "_share")}
-        vars(copied).update(vars(self) | own | {"_bound": self._bound.another()})  # what is built never changes
+        vars(copied).update(vars(self) | own | {"_bound": self._bound.another(), "_recorder": UNRECORDED})
         return copied
 
     def __copy__(self) -> Self:
@@ -295,10 +303,12 @@ class Worlds:
         """Run a step of the worlds that are under way, and begin the episodes that are due."""
         begins, runs, before = np.flatnonzero(self._ended), np.flatnonzero(~self._ended), self._share
         run(runs)
+        self._recorder.ran(runs)
         result, reward = self._bound.result, np.zeros(self.n)
         self._share, self._ended = score_share(result), (result.terminated | result.truncated) != 0
         if len(runs):
             reward[runs] = self.setup.reward.of(result, before)[runs]  # it may fail: the step is done all the same
+        self._recorder.got(reward)
         if len(begins):
             self._next_episode(begins)
         terminated, truncated = result.terminated.astype(np.bool_), result.truncated.astype(np.bool_)
@@ -318,6 +328,7 @@ class Worlds:
             seed = self.seeds.seed(self._first_worker + index, episode) if world_seeds is None else world_seeds[place]
             self._bound.begin(index, self._scenario_of(index, episode), seed)
             self.episode_number[index], self._ended[index] = episode, False
+            self._recorder.begin(index, episode, self.seeds.base, seed_given=world_seeds is not None)
         self._show(which, begun=False)
 
     def _show(self, which: Array, *, begun: bool) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Final, Self
 
 import numpy as np
@@ -11,7 +12,6 @@ import numpy as np
 from fireworld.envs.actions import checked_action
 from fireworld.envs.autoreset import Autoreset
 from fireworld.envs.many_worlds import Stepped, Worlds, again
-from fireworld.envs.seeds import Seeds
 from fireworld.envs.setup import Setup
 from fireworld.kernels.arrays import Array
 from fireworld.kernels.batch import look_again, take_turn
@@ -20,6 +20,7 @@ from fireworld.kernels.others import decide_by_policy
 from fireworld.policy.asking import begin
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.protocol import Policy
+from fireworld.training.seeds import Seeds
 
 _WORLD: Final = 0
 
@@ -129,7 +130,7 @@ class OneWorld(Worlds):
     def __reduce__(self) -> tuple[Any, ...]:
         others = self._others if self._asked is None else self._asked
         options = {"seeds": self.seeds, "worker": self._first_worker, "others": others}
-        return again, (type(self), (self.setup,), options, self.snapshot())
+        return again, (type(self), (replace(self.setup, record=None),), options, self.snapshot())
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         copied = super().__deepcopy__(memo)

@@ -12,7 +12,7 @@ from fireworld.arguments import ArgumentError
 from fireworld.errors import expected, nearest
 from fireworld.kernels.arrays import TOTAL, Array
 from fireworld.kernels.batch import Result
-from fireworld.rewards import KINDS
+from fireworld.rewards import KINDS, share_gained
 from fireworld.scenario import Scenario
 from fireworld.scenario.document import with_kind
 
@@ -49,7 +49,7 @@ class Rewards:
                 raise ArgumentError(expected("reward", "", f"{before.shape} numbers", got))
             return found.astype(np.float64)
         if self.kind == SCORE:
-            return score_share(result) - before
+            return share_gained(result.score[:, 0], result.score[:, 1], before)
         return result.reward[:, TOTAL].copy()
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypedDict
 
-from fireworld.arguments import ArgumentError, last_step_of, settings_of, whole_number
+from fireworld.arguments import ArgumentError, last_step_of, path_of, settings_of, whole_number
 from fireworld.envs.rewards import Rewards, reward_of
 from fireworld.envs.views import observation_of
 from fireworld.errors import expected
@@ -32,6 +33,8 @@ class SetupOptions(TypedDict, total=False):
         n_burning_max: of "graph", how many burning buildings there is room for; 64 if left out.
         steps: the last step; None, as if left out: each scenario's.
         set: keys of the scenarios with other values, as in {"brigades.n": 7}.
+        record: the log to write, NAME.mcap, with the seed and the actions of every episode, from which each can be
+            replayed in full; or an existing folder for logs; None, as if left out: none. Copies do not record.
     """
 
     observation: str
@@ -40,6 +43,7 @@ class SetupOptions(TypedDict, total=False):
     n_burning_max: int
     steps: int | None
     set: Mapping[str, Any] | None
+    record: str | os.PathLike[str] | None
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,7 @@ class Setup:
     own_targets: int
     n_burning_max: int
     steps: int | None
+    record: str | None = None
 
     def build(self) -> list[BuiltScenario]:
         """Build the scenarios' cities, each city once.
@@ -78,6 +83,7 @@ def setup_of(
     n_burning_max: int = 64,
     steps: int | None = None,
     set: Mapping[str, Any] | None = None,
+    record: str | os.PathLike[str] | None = None,
 ) -> Setup:
     """Return what worlds are made of.
 
@@ -90,6 +96,7 @@ def setup_of(
         n_burning_max: the same.
         steps: the same.
         set: the same.
+        record: the same.
 
     Raises:
         ScenarioError: a scenario cannot be had.
@@ -98,6 +105,8 @@ def setup_of(
     several = scenarios if isinstance(scenarios, Sequence) and not isinstance(scenarios, str) else [scenarios]
     if not several:
         raise ArgumentError(expected("scenarios", "", "one at least", "none"))
+    if record is not None:
+        path_of("record", record)  # or an error; a path would lose the slash at the end of a folder
     values = settings_of(set)
     if choices is not None and values.get("choices", choices) != choices:
         other = "envs.turns" if choices == "simultaneous" else "envs.team"
@@ -110,4 +119,5 @@ def setup_of(
         own_targets=whole_number("own_targets", own_targets, least=0, most=10_000),
         n_burning_max=whole_number("n_burning_max", n_burning_max, least=1, most=1_000_000),
         steps=last_step_of(steps),
+        record=None if record is None else os.fspath(record),
     )

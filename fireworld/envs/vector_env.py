@@ -14,11 +14,11 @@ from fireworld.envs.autoreset import autoreset_of
 from fireworld.envs.forms import DEFAULT, Form, metadata_of, seeds_of
 from fireworld.envs.many_worlds import Worlds
 from fireworld.envs.rendering import Rendering
-from fireworld.envs.seeds import WORKERS_MAX, Seeds
 from fireworld.envs.setup import Scenarios, SetupOptions, setup_of
 from fireworld.envs.spaces import in_int8, team_actions, team_space
 from fireworld.errors import expected
 from fireworld.kernels.arrays import Array
+from fireworld.training.seeds import WORKERS_MAX, Seeds
 
 Seen = dict[str, Array]
 

@@ -55,6 +55,8 @@ PLANNERS: Final = {"planner": "fireworld.planning.planner:Planner"}
 """Where the classes of planners are: they use the world, which this layer does not know."""
 TEAM_ATTACHMENT: Final = "policy.npz"
 """What a recording calls the team file that its brigades followed."""
+RECORDED: Final = "recorded"
+"""Names the policy of brigades that decide as is recorded, whatever happens."""
 _FILE: Final = re.compile(rf"(.+?(?:{re.escape(CODE_SUFFIX)}|{re.escape(SUFFIX)}))(?::(.*))?", re.DOTALL)
 
 

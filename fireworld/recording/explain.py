@@ -13,13 +13,13 @@ from fireworld.errors import FireworldError, LogError, expected
 from fireworld.executors import AnyExecutor, Workers, threads, workers_for
 from fireworld.html_page import html_table, text_cell
 from fireworld.interrupt import gentle_interrupt
+from fireworld.policy.names import RECORDED
 from fireworld.policy.protocol import Policy
 from fireworld.recording.decisions import RecordedDecisions, check_same_draws
 from fireworld.recording.explanation.counterfactual import CounterfactualRun, MakePolicy, prepare_counterfactuals
 from fireworld.recording.explanation.search import ScoreAll, SearchResult, SpanEffect, search_effects
 from fireworld.recording.explanation.spans import DecisionSpan, find_spans
 from fireworld.recording.explanation.text import HEADS, closing_lines, opening_lines, rows
-from fireworld.recording.fork import RECORDED
 from fireworld.recording.inputs import AnyRun, check_replayable, open_run, run_name
 from fireworld.recording.replay import Replay, build_recorded, check_replay
 from fireworld.recording.resume import recorded_policy

@@ -12,7 +12,7 @@ from fireworld.arguments import ArgumentError, path_of, whole_number
 from fireworld.errors import LogError, expected
 from fireworld.files import check_output
 from fireworld.policy.asking import begin
-from fireworld.policy.names import TEAM_ATTACHMENT, NamedPolicy, find_policy, note_on_team
+from fireworld.policy.names import RECORDED, TEAM_ATTACHMENT, NamedPolicy, find_policy, note_on_team
 from fireworld.policy.protocol import Decision, Observation, Policy
 from fireworld.recording.decisions import (
     FALLBACK,
@@ -37,10 +37,8 @@ from fireworld.training.log.episode_run import LEARNING_ATTACHMENT
 from fireworld.version import __version__, simulator_digest
 
 FORK_ATTACHMENT: Final = "fork.json"
-OF_POLICY: Final = (TEAM_ATTACHMENT, LEARNING_ATTACHMENT)
 """Name of the attachment that lists the forks a recording comes from, the oldest first."""
-RECORDED: Final = "recorded"
-"""Names the policy that decides as is recorded, whatever happens."""
+OF_POLICY: Final = (TEAM_ATTACHMENT, LEARNING_ATTACHMENT)
 BUILDINGS_NAMED_MAX: Final = 8
 """Buildings that an error names at most."""
 

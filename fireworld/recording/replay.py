@@ -22,10 +22,11 @@ from fireworld.records import (
     Steps,
 )
 from fireworld.scenario import Scenario, parse_scenario
-from fireworld.simulation.built import BuiltScenario, build_scenario
+from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.placement import CITY_ATTACHMENT, SCENARIO_ATTACHMENT
 from fireworld.training.log.episode_run import LEARNING_ATTACHMENT, recorded_learning
+from fireworld.training.log.played_run import recorded_seeds
 
 
 class RecordedPolicy(Policy):
@@ -87,9 +88,15 @@ def recorded_scenario(header: RunHeader) -> Scenario:
     return parse_scenario(text, source=f"recording: {SCENARIO_ATTACHMENT}")
 
 
-def build_recorded(header: RunHeader) -> BuiltScenario:
-    """Build the scenario of a recorded run from the files attached to its recording; errors as `recorded_scenario`."""
-    return build_scenario(recorded_scenario(header), city_json=header.attachments.get(CITY_ATTACHMENT))
+def build_recorded(header: RunHeader, *, cities: CityCache | None = None) -> BuiltScenario:
+    """Build the scenario of a recorded run from the files attached to its recording; errors as `recorded_scenario`.
+
+    Args:
+        header: of the run.
+        cities: cities built before, used and added to.
+    """
+    content = header.attachments.get(CITY_ATTACHMENT)
+    return (cities or CityCache()).build(recorded_scenario(header), city_json=content)
 
 
 class Replay:
@@ -126,7 +133,7 @@ class Replay:
         if LEARNING_ATTACHMENT in header.attachments:
             yield from islice(recorded_learning(header, self._built), len(self.steps))
             return
-        world = self._built.world(seed=header.seed, n_steps_max=header.n_steps_max)
+        world, seeds = self._built.world(seed=header.seed, n_steps_max=header.n_steps_max), recorded_seeds(header)
         observer = Observer(world)
         policy = RecordedPolicy(self._recording)
         last = int(self.steps[-1]) if len(self.steps) else -1
@@ -139,6 +146,7 @@ class Replay:
         if last >= 0:
             yield finished(observer.record())
         while world.step_number < last and not (world.terminated or world.truncated):
+            world.seed = seeds.get(world.step_number, world.seed)
             record = observer.record(world.step(policy))
             yield finished(with_errors(record, policy.made(record.step)))
 

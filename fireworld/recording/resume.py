@@ -21,6 +21,7 @@ from fireworld.simulation.observer import Observer
 from fireworld.simulation.state import copy_into, copy_world, restore_snapshot
 from fireworld.simulation.world import World
 from fireworld.training.log.episode_run import LEARNING_ATTACHMENT
+from fireworld.training.log.played_run import recorded_seeds
 
 
 @dataclass(frozen=True)
@@ -98,12 +99,16 @@ def resume(built: BuiltScenario, beginning: Beginning, *, source: str, with_memo
         with_memory: the recorded policy, if it has a memory: it then sees every step from the first.
 
     Raises:
-        LogError: the recording does not begin with step 0, lacks a step, or does not replay to what is recorded.
+        LogError: the recording does not begin with step 0, lacks a step, went on with another seed in its middle, or
+            does not replay to what is recorded.
         PolicyError: `with_memory` would not have decided as is recorded.
     """
     header, steps = beginning.header, beginning.run.steps
     if not np.array_equal(steps[: beginning.last + 1], np.arange(beginning.last + 1)):
         raise LogError(expected(source, "steps", f"every step from 0 to {beginning.last}", "some are missing"))
+    if len(seeds := recorded_seeds(header)) > 1:
+        got = f"one that went on with another after step {[*seeds][1]}, where it was forked while it was played"
+        raise LogError(expected(source, "seed", "a run of one seed", got))
     world = built.world(seed=header.seed, n_steps_max=header.n_steps_max)
     start = _restore(world, beginning) if with_memory is None else 0
     decider: Policy = RecordedDecisions(beginning)

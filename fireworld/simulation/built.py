@@ -27,6 +27,8 @@ class BuiltScenario:
     city: City
     city_arrays: CityArrays
     placement: Placement
+    city_json: bytes | None = None
+    """Content of its city file, where that came with a recording."""
 
     @property
     def n_brigades(self) -> int:
@@ -62,7 +64,7 @@ class BuiltScenario:
     @cached_property
     def _carried(self) -> tuple[str, dict[str, bytes]]:
         """The scenario's digest, and the files that a replay needs."""
-        return self.scenario.digest, attachments(self.scenario)
+        return self.scenario.digest, attachments(self.scenario, city_json=self.city_json)
 
     def header(self, *, seed: int, policy: str, policy_digest: str, n_steps_max: int) -> RunHeader:
         """Return what identifies a run of this scenario."""
@@ -99,13 +101,13 @@ class CityCache:
         """
         fire = scenario.resolved_parameters.fire
         key = repr((scenario.city, scenario.city_sha256, fire))
+        content = city_json or self._files.get(scenario.city_sha256 or "")
         if key not in self._built:
-            content = city_json or self._files.get(scenario.city_sha256 or "")
             plan = scenario_plan(scenario, city_json=content)
             city = build_city(plan, fire, seed=scenario.city.ray_seed)
             self._built[key] = plan, city, city_arrays(city, fire)
         plan, city, arrays = self._built[key]
-        return BuiltScenario(scenario, city, arrays, place(scenario, plan))
+        return BuiltScenario(scenario, city, arrays, place(scenario, plan), content)
 
 
 def build_scenario(scenario: Scenario, *, city_json: bytes | None = None) -> BuiltScenario:

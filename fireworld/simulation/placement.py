@@ -70,14 +70,16 @@ def _plan_of_source(scenario: Scenario, city_json: bytes | None) -> Plan:
         raise ScenarioError(f"{scenario.source}: city.generated: {error}") from None
 
 
-def attachments(scenario: Scenario) -> dict[str, bytes]:
+def attachments(scenario: Scenario, *, city_json: bytes | None = None) -> dict[str, bytes]:
     """Return the files that a recording of the scenario carries, by name: all that a replay needs of it.
 
-    `parse_scenario` reads "scenario.yaml" back, and `scenario_plan` takes "city.json", there if the city is a file's.
+    `parse_scenario` reads "scenario.yaml" back, and `scenario_plan` takes "city.json", there if the city is a file's;
+    `city_json` is its content, where that is in a recording.
     """
     files = {SCENARIO_ATTACHMENT: scenario.to_yaml().encode()}
     if scenario.city.generated is None:
-        files[CITY_ATTACHMENT] = _check_city_file(scenario, read_city_file(scenario))
+        content = read_city_file(scenario) if city_json is None else city_json
+        files[CITY_ATTACHMENT] = _check_city_file(scenario, content)
     return files
 
 

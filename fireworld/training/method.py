@@ -217,6 +217,10 @@ class Trainer(ABC, Generic[AMethod, AReport]):
     def __iter__(self) -> Iterator[AReport]:
         return self.run(threads(1))
 
+    def last_step(self, scenario: Scenario) -> int:
+        """Return the last step of an episode in a scenario."""
+        return scenario.steps
+
     @abstractmethod
     def team(self) -> Team:
         """Return the team as it is now."""

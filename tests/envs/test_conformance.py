@@ -109,7 +109,7 @@ BROKEN = {
         "another state",
     ),
     "seeds that repeat": (
-        "seeds:Seeds.seed",
+        "many_worlds:Seeds.seed",
         lambda _: lambda *given: given[-1],
         lambda: check_seeds("vector", SMALL),
         "two episodes have the same seed|does not begin",

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fireworld import envs
 from fireworld.arguments import SEED_MAX, ArgumentError
-from fireworld.envs.seeds import EPISODES_MAX, TEST_BIT, WORKERS_MAX, Seeds
+from fireworld.training.seeds import EPISODES_MAX, TEST_BIT, WORKERS_MAX, Seeds
 from tests.envs.towns import SMALL
 
 BASES = st.integers(0, SEED_MAX)

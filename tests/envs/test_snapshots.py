@@ -12,8 +12,8 @@ import pytest
 import fireworld as fw
 from fireworld import envs
 from fireworld.arguments import ArgumentError
-from fireworld.envs.seeds import Seeds
 from fireworld.errors import LogError
+from fireworld.training.seeds import Seeds
 from tests.envs.towns import HOT, LATER, SMALL, pickled
 
 KINDS = ["features", "targets", "graph"]

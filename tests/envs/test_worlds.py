@@ -8,9 +8,9 @@ import pytest
 import fireworld as fw
 from fireworld import envs
 from fireworld.arguments import ArgumentError
-from fireworld.envs.seeds import Seeds
 from fireworld.errors import ScenarioError
 from fireworld.kernels.arrays import TOTAL
+from fireworld.training.seeds import Seeds
 from tests.envs.towns import HOT, LATER, SMALL, built, by_table, reference, table_policy
 
 

@@ -132,7 +132,9 @@ def altered(generator: random.Random, source: Path, scratch: Path) -> Damaged:
             first = _altered_message(generator, found.kind.first_type, bytes(first))
             continue
         part = generator.choice(parts)
-        at = generator.randrange(len(part) - 1) if len(part) > 1 else 0
+        if len(part) == 1:  # its only topic was taken out
+            continue
+        at = generator.randrange(len(part) - 1)
         types = {one.topic: one for one in found.kind.topics}
         topic, data = part[at]
         if generator.random() < 0.1:

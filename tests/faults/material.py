@@ -8,9 +8,11 @@ import io
 import os
 import shutil
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from tests.envs.played import play
 from tests.fuzz import test_onnx
 from tests.training.conftest import SHORT_WORDS, TINY
 
@@ -34,13 +36,16 @@ SEARCH_WORDS = (
 )
 TINY_SEARCH = ("train", "tiny.yaml", *SEARCH_WORDS, "--jobs", "1")
 RUN_LOGS = ("run.mcap", "other.mcap", "team.mcap", "scene.mcap", "mine.mcap")
-TRAINING_LOGS = ("training.mcap", "search.mcap")
+PLAYED_LOGS = ("played.mcap",)
+TRAINING_LOGS = ("training.mcap", "search.mcap", *PLAYED_LOGS)
 N_STEPS = 12
+HAS_MINARI = find_spec("minari") is not None
 
 
 def warm() -> None:
     """Import what commands import, so that forks need not."""
     os.environ["MPLBACKEND"] = "agg"
+    os.environ["MINARI_DATASETS_PATH"] = "minari"  # in the folder of a call, not in that of who tries
     from fireworld.cli import COMMANDS
 
     for name in COMMANDS:
@@ -51,6 +56,8 @@ def warm() -> None:
         "pyarrow.parquet",
         "rerun",
         "fireworld.conformance.check",
+        "fireworld.envs.datasets.loading",
+        "fireworld.envs.datasets.minari_form",
         "fireworld.evaluation.compare",
         "fireworld.evaluation.new_scenarios",
         "fireworld.recording.explanation",
@@ -63,6 +70,7 @@ def warm() -> None:
         "fireworld_viewer.pictures.film",
         "fireworld_viewer.rerun_view.app",
         "fireworld_viewer.rerun_view.live",
+        *(("minari",) if HAS_MINARI else ()),
     ):
         importlib.import_module(name)
 
@@ -90,6 +98,7 @@ def _make(folder: Path) -> None:
     _do("run", "quick", "--policy", "mine.py:Mine", *steps, "--record", "mine.mcap")
     _do(*TINY_TRAINING, "-o", "team.npz", "--record", "training.mcap")
     _do(*TINY_SEARCH, "-o", "ranking.npz", "--record", "search.mcap")
+    play(folder / "played.mcap", scenarios=["quick"], n=2, n_steps=24, steps=8, own_targets=2)
     (folder / "net.onnx").write_bytes(test_onnx.GOOD)
     _do("golden", "add", "quick", "--policy", "chief", *steps, "--name", "plain", "--dir", "golden")
     for name, words in (("first", ()), ("second", ("--set", "brigades.n=3"))):

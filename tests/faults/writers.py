@@ -14,7 +14,7 @@ from typing import Final
 
 from tests.faults import calls, whole
 from tests.faults.bench import DONE_OR_REFUSED, Bench
-from tests.faults.material import N_STEPS, TINY_SEARCH, TINY_TRAINING
+from tests.faults.material import HAS_MINARI, N_STEPS, TINY_SEARCH, TINY_TRAINING
 
 SCRATCH: Final = ".fireworld-"
 
@@ -50,6 +50,7 @@ TINY: Final = {"tiny.yaml": "tiny.yaml"}
 RUN: Final = {"run.mcap": "run.mcap"}
 TWO: Final = {**RUN, "other.mcap": "other.mcap"}
 TRAINING: Final = {"training.mcap": "training.mcap"}
+PLAYED: Final = {"played.mcap": "played.mcap"}
 STALE: Final = {"mine.py": "mine_changed.py", "stale": "stale"}
 COMPARE: Final = ("compare", "chief", "easiest", "--scenarios", "quick", "--seeds", 3, "--jobs", 1, "--set", "steps=12")
 NEW: Final = (
@@ -152,6 +153,19 @@ WRITERS: Final[dict[str, Writer]] = {
         ("out",),
         TRAINING,
     ),
+    "export a dataset": Writer(
+        ("export", "played.mcap", "run.mcap", "--rlds", "out"),
+        ("out",),
+        {**PLAYED, **RUN},
+        again=("--force",),
+    ),
+    "replay what was played": Writer(
+        ("replay", "played.mcap", "--every", 2, "-o", "episodes"),
+        ("episodes",),
+        {**PLAYED, "episodes/.keep": "mine.py"},
+        ("--force",),
+        partials=("episodes/*.partial",),
+    ),
     "golden add": Writer(
         ("golden", "add", "quick", "--policy", "chief", *STEPS, "--name", "plain"),
         ("recordings",),
@@ -213,6 +227,13 @@ WRITERS: Final[dict[str, Writer]] = {
         before=whole.small_paper,
     ),
 }
+if HAS_MINARI:
+    WRITERS["export for Minari"] = Writer(
+        ("export", "played.mcap", "--minari", "mine-v0"),
+        ("minari",),
+        PLAYED,
+        again=("--force",),
+    )
 OFTEN: Final = tuple(name for name in WRITERS if name != "reproduce")
 
 

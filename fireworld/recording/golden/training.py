@@ -19,6 +19,7 @@ from fireworld.shown import block_text, text_table
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import curriculum_names, find_curriculum
 from fireworld.training.log.difference import TrainingDifference
+from fireworld.training.log.environment import ANOTHERS
 from fireworld.training.log.reader import TrainingLog
 from fireworld.training.log.records import TrainingHeader
 from fireworld.training.log.verify import TrainedAgain
@@ -109,6 +110,9 @@ def prepare_training(
     if not spec.curriculum:
         if recorded is None:
             raise LogError(expected(SPEC_ATTACHMENT, "curriculum", "a name or a file", "none"))
+        if recorded.is_played:
+            hint = f"`fireworld verify {recorded.path}` plays it again"
+            raise LogError(expected(str(recorded.path), "method", ANOTHERS, recorded.method.name, hint))
         header = replace(recorded.header, fireworld_version=__version__, simulator_digest=simulator_digest())
         return TrainedAgain(recorded.trainer, header, workers, n_parts=None if recorded.done else len(recorded))
     shipped = spec.curriculum in {*curriculum_names(), *scenario_names()}

@@ -73,6 +73,7 @@ class Course:
         scenarios: names of those that have begun, in their order.
         stages: the stage of each.
         scenario: (k,) which of them each part is of; empty of a search.
+        in_turn: the scenarios come one after another.
         marks: ends of scenarios, or nothing.
         tables: the tables over the training; None where there are none.
     """
@@ -85,6 +86,7 @@ class Course:
     scenarios: tuple[str, ...]
     stages: tuple[str, ...]
     scenario: Array
+    in_turn: bool
     marks: tuple[Mark, ...]
     tables: TablePicture | None
 
@@ -108,6 +110,7 @@ def course_of(log: TrainingLog) -> Course:
         if report.milestone and Episode in part:
             marks.append(mark_of(log, number, part[Episode], report, names))
     scenario = np.array([getattr(line, "scenario", -1) for line in log.lines], dtype=np.int64)
+    in_turn = bool((np.diff(scenario) >= 0).all())
     return Course(
         name=log.path.name,
         unit=log.header.unit,
@@ -117,6 +120,7 @@ def course_of(log: TrainingLog) -> Course:
         scenarios=tuple(names[: scenario.max(initial=-1) + 1]),
         stages=tuple(log.curriculum.stages[k].name for k in log.plan.stage[: scenario.max(initial=-1) + 1]),
         scenario=scenario if (scenario >= 0).all() else scenario[:0],
+        in_turn=in_turn,
         marks=tuple(marks),
         tables=table_picture(log),
     )

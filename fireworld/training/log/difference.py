@@ -13,6 +13,7 @@ from fireworld_recorder.codec import encode
 from fireworld.errors import LogError, expected
 from fireworld.shown import SHOWN_MAX, Block, Shown, TextTable
 from fireworld.training.log.first_difference import FirstDifference, Trained, first_difference
+from fireworld.training.log.played_difference import compare_played
 from fireworld.training.log.reader import AnyTraining, Part, TrainingLog, opened
 from fireworld.training.log.records import TRAINING
 from fireworld.training.log.spread import SPREAD_HEADS, SPREAD_NOTE, ScenarioDifference, Spread, spread_cells
@@ -101,9 +102,13 @@ def diff_trainings(
         on_part: called after each part.
 
     Raises:
-        LogError: one cannot be read, or the trainings cannot be compared: other methods, other numbers of brigades.
+        LogError: one cannot be read, or nothing of it; or the trainings cannot be compared: other methods, other
+            numbers of brigades.
     """
     logs = [opened(one, partial=partial) for one in (a, b)]
+    for log in logs:
+        if log.damage is not None and not len(log):
+            raise LogError(f"{log.path}: {log.damage}; there is nothing to compare")
     return compare_trainings(logs[0], logs[1], names=(str(logs[0].path), str(logs[1].path)), on_part=on_part)
 
 
@@ -112,6 +117,9 @@ def compare_trainings(
 ) -> TrainingDifference:
     """Compare trainings part by part, each read once; arguments and errors as for `diff_trainings`."""
     _check_comparable(a, b, names)
+    if a.is_played:
+        n, where, scenarios = compare_played(a, b, on_part)
+        return TrainingDifference(names, _header(a, b), n, a.header.unit, where, scenarios)
     first: FirstDifference | None = None
     spread = Spread()
     n_parts = 0

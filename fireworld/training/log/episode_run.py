@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -13,9 +12,7 @@ import msgspec
 import numpy as np
 from fireworld_recorder.writer import PARTIAL_SUFFIX, LogWriter
 
-from fireworld.arguments import path_of, whole_number
-from fireworld.errors import LogError, OutputError, TrainingError, expected
-from fireworld.files import check_output
+from fireworld.errors import LogError, TrainingError, expected
 from fireworld.kernels.arrays import TOTAL, Array, Learner, Trace
 from fireworld.kernels.choice import table_state
 from fireworld.kernels.learning import EXPLORED, GREEDY, choose_and_learn, take_reward
@@ -24,13 +21,12 @@ from fireworld.policy.names import TEAM_ATTACHMENT
 from fireworld.policy.protocol import Decision, Observation, Policy
 from fireworld.policy.teams.table_team import TableTeam
 from fireworld.policy.teams.team import parse_team
-from fireworld.records import CityRecord, RunHeader, StepRecord
+from fireworld.records import CityRecord, RunHeader, StepRecord, Steps
 from fireworld.simulation.built import BuiltScenario
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.state import fresh_learner
-from fireworld.training.log.reader import AnyTraining, TrainingLog, opened
 from fireworld.training.log.records import TERM_NAMES, Episode
-from fireworld.training.method import COUNT_MAX, Trainer
+from fireworld.training.method import Trainer
 from fireworld.training.methods.sarsa import RULES, Sarsa, SarsaTrainer
 
 LEARNING_ATTACHMENT: Final = "learning.json"
@@ -161,112 +157,65 @@ def episode_run(trainer: SarsaTrainer, episode: Episode, tables: Array, visits: 
     return LearningRun(trainer.build(scenario), seed=episode.seed, team=team, learning=learning)
 
 
-def replay_episode(
-    log: AnyTraining,
-    scenario: str | int,
-    episode: int,
-    output: str | os.PathLike[str],
-    *,
-    force: bool = False,
-) -> str:
-    """Write an episode of a training as the log of a run, worked out by replay and compared with the training log.
+@dataclass(frozen=True)
+class CheckedRun:
+    """The run of an episode, a `fireworld.records.Steps`; the training log decides whether its steps are right.
 
-    Args:
-        log: the path of a training log, or one that is open; as far as it is good.
-        scenario: of the episode: its name, or its position in the plan.
-        episode: its number in the scenario, from 0; -1 is the last.
-        output: the log to write.
-        force: replace an existing one.
+    Attributes:
+        run: the run.
+        episode: as the training log has it.
+        source: what errors call that.
+    """
+
+    run: LearningRun
+    episode: Episode
+    source: str
+
+    @property
+    def header(self) -> RunHeader:
+        """What identifies the run."""
+        return self.run.header
+
+    @property
+    def city(self) -> CityRecord:
+        """The city it takes place in."""
+        return self.run.city
+
+    def __iter__(self) -> Iterator[StepRecord]:
+        """Yield the steps; raise LogError at the first that comes out otherwise."""
+        episode, source = self.episode, self.source
+        trace = episode.trace(len(self.city.brigade_tank_litres))
+        n_steps = -1
+        for record in self.run:
+            n_steps += 1
+            if n_steps > episode.n_steps:
+                break
+            if n_steps > 0:
+                _check_step(record, trace, episode, source=source)
+            yield record
+        if n_steps != episode.n_steps:
+            got = "more" if n_steps > episode.n_steps else str(n_steps)
+            raise LogError(_differs(source, episode, n_steps, f"{episode.n_steps} steps", got))
+
+
+def write_run(run: Steps, output: Path, *, force: bool) -> str:
+    """Write a run whose steps are compared with what is known of them; where one is not that, nothing stays of it.
 
     Returns:
         The digest of the run.
 
     Raises:
-        LogError: there is no such episode, or this fireworld computes another one.
+        LogError: a step comes out otherwise.
         OutputError: the output cannot be written.
     """
-    training = opened(log, partial=True)
-    return _replay(training, training.position(scenario, episode), path_of("output", output), force=force)
-
-
-def replay_every(
-    log: AnyTraining,
-    every: int,
-    folder: str | os.PathLike[str],
-    *,
-    scenario: str | None = None,
-    force: bool = False,
-    on_written: Callable[[], object] = lambda: None,
-) -> dict[Path, str]:
-    """Write every so many episodes of a training as `replay_episode` does.
-
-    Args:
-        log: the path of a training log, or one that is open.
-        every: episodes of a scenario, from its first on.
-        folder: the existing folder for them: SCENARIO-EPISODE.mcap.
-        scenario: of this scenario alone, by its name.
-        force: replace existing logs.
-        on_written: called after each.
-
-    Returns:
-        The digests of the runs by their logs.
-
-    Raises:
-        LogError: there are no such episodes, or this fireworld computes another one.
-        OutputError: one cannot be written; those before are there.
-    """
-    training = opened(log, partial=True)
-    every, place = whole_number("every", every, least=1, most=COUNT_MAX), path_of("folder", folder)
-    if not place.is_dir():
-        raise OutputError(expected(str(place), "", "an existing folder", "none", "make it first"))
-    names = [one.name for one in training.scenarios]
-    training.position(0 if scenario is None else scenario, -1)  # every training begins in the first
-    chosen = {
-        number: place / episode_file(names[line.scenario], line.episode)
-        for number, line in enumerate(training.lines)
-        if line.episode % every == 0 and scenario in (None, names[line.scenario])
-    }
-    for path in chosen.values():
-        check_output(path, force=force)
-    written = {}
-    for number, path in chosen.items():
-        written[path] = _replay(training, number, path, force=force)
-        on_written()
-    return written
-
-
-def _replay(log: TrainingLog, number: int, output: Path, *, force: bool) -> str:
-    found = log.episode_at(number)
-    run = episode_run(log.learner(), found.record, found.tables, found.visits)
-    return _write_run(run, output, found.record, force=force, source=str(log.path))
-
-
-def _write_run(run: LearningRun, output: Path, episode: Episode, *, force: bool, source: str) -> str:
-    """Write an episode that is known in outline; where it comes out otherwise, nothing stays of it."""
     try:
         with LogWriter(output, run.header, run.city, force=force) as writer:
-            for record in _checked(run, episode, source=source):
+            for record in run:
                 writer.write(record)
             return writer.digest
     except LogError:
         output.with_name(output.name + PARTIAL_SUFFIX).unlink(missing_ok=True)
         raise
-
-
-def _checked(run: LearningRun, episode: Episode, *, source: str) -> Iterator[StepRecord]:
-    """Yield the steps of a run; raise LogError at the first that is not what the training log has of it."""
-    trace = episode.trace(len(run.city.brigade_tank_litres))
-    n_steps = -1
-    for record in run:
-        n_steps += 1
-        if n_steps > episode.n_steps:
-            break
-        if n_steps > 0:
-            _check_step(record, trace, episode, source=source)
-        yield record
-    if n_steps != episode.n_steps:
-        got = "more" if n_steps > episode.n_steps else str(n_steps)
-        raise LogError(_differs(source, episode, n_steps, f"{episode.n_steps} steps", got))
 
 
 def _check_step(record: StepRecord, trace: Trace, episode: Episode, *, source: str) -> None:
@@ -323,7 +272,7 @@ class FullEpisodes:
             return
         name = episode_file(trainer.scenario(episode.scenario).name, episode.episode)
         run = episode_run(trainer, episode, *trainer.start)
-        _write_run(run, self.folder / name, episode, force=self.force, source="training")
+        write_run(CheckedRun(run, episode, "training"), self.folder / name, force=self.force)
 
 
 def episode_file(scenario: str, episode: int) -> str:

@@ -4,27 +4,24 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import ExitStack
 from dataclasses import fields
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from fireworld.errors import LogError, OutputError, expected, nearest
+from fireworld.errors import LogError, expected, nearest
 from fireworld.files import new_folder
 from fireworld.policy.teams.ranking_words import WEIGHTS
 from fireworld.policy.teams.table_words import first_state
-from fireworld.records import ACTIONS, CHOICES, Array
+from fireworld.records import ACTION_NAMES, ACTIONS, CHOICES
 from fireworld.rewards import TERMS
 from fireworld.training.log.learned import LearnedEpisode
+from fireworld.training.log.played import Played
 from fireworld.training.log.reader import Part, TrainingLog
 from fireworld.training.log.records import Episode, Tables, Tried
-
-SUFFIX: Final = ".parquet"
-ROWS_PER_GROUP: Final = 1 << 17
-Rows = dict[str, Array]
-"""Columns by name, all of one length."""
+from fireworld.training.log.rows_file import SUFFIX, Rows, RowsFile, check_pyarrow
 
 TABLES: Final[Mapping[str, str]] = {
     "episodes": "an episode that tables learned from: how it went and how the policy changed",
@@ -33,11 +30,14 @@ TABLES: Final[Mapping[str, str]] = {
     "generations": "a generation of a search: how its rankings fared",
     "candidates": "a ranking that was tried in a generation: its weights and its score",
     "fights": "a ranking on a fire of its generation",
+    "played": "an episode that a learner played: how it went",
+    "actions": "a brigade in a step of an episode that a learner played: what it did, as far as it is known",
 }
 """What a row of each table is."""
 OF_KIND: Final[Mapping[type[Any], tuple[str, ...]]] = {
     Episode: ("episodes", "steps", "tables"),
     Tried: ("generations", "candidates", "fights"),
+    Played: ("played", "actions"),
 }
 
 
@@ -65,6 +65,8 @@ def rows_of(log: TrainingLog, names: Collection[str]) -> Iterator[tuple[str, Row
     for number, part in enumerate(log.parts()):
         if Episode in part:
             yield from _episode_rows(log, trainer, number, part, scenarios, names)
+        elif Played in part:
+            yield from _played_rows(log, number, part[Played], names)
         elif Tried in part:
             yield from _generation_rows(part[Tried], scenarios, names)
 
@@ -163,6 +165,24 @@ def _generation_rows(tried: Tried, scenarios: list[str], names: Collection[str])
         )
 
 
+def _played_rows(log: TrainingLog, number: int, played: Played, names: Collection[str]) -> Iterator[tuple[str, Rows]]:
+    scenario = log.scenarios[played.scenario]
+    place = {"part": number, "scenario": scenario.name, "world": played.world, "episode": played.episode}
+    if "played" in names:
+        values = {item.name: getattr(played, item.name) for item in fields(played) if "per" not in item.metadata}
+        values |= {"state": played.state.hex(), "left": played.left, "replayable": played.replayable}
+        yield "played", {key: np.array([value]) for key, value in {**values, **place}.items()}
+    if "actions" in names:
+        action, target = (one.T.ravel() for one in played.decided(scenario.brigades.n))
+        n_rows = len(action) // scenario.brigades.n
+        columns: Rows = {key: np.full(len(action), value) for key, value in place.items()}
+        first = 0 if played.replayable else played.first_step
+        columns["step"] = np.tile(np.arange(first + 1, first + n_rows + 1, dtype=np.int32), scenario.brigades.n)
+        columns["brigade"] = np.repeat(np.arange(scenario.brigades.n, dtype=np.int32), n_rows)
+        columns["action"] = np.array([*ACTION_NAMES, ""], dtype=object)[action]
+        yield "actions", {**columns, "target": target}
+
+
 def export_training(
     log: TrainingLog,
     folder: Path,
@@ -187,71 +207,22 @@ def export_training(
         LogError: there is no such table, or the log changed since it was opened.
         OutputError: pyarrow is not installed, or the folder exists or cannot be written.
     """
-    if find_spec("pyarrow") is None:
-        raise OutputError("export: pyarrow is not installed; try pip install 'fireworld[archive]'")
+    check_pyarrow("export")
     names = tables_of(log) if tables is None else tuple(tables)
-    with new_folder(folder, own={f"{name}{SUFFIX}" for name in TABLES}, force=force) as scratch:
-        files = {name: _File(name, scratch, log) for name in names}
-        try:
-            part = 0
-            for name, rows in rows_of(log, names):
-                files[name].add(rows)
-                if name == names[0]:
-                    part += 1
-                    on_part()
-            return {name: file.finish() for name, file in files.items()}
-        finally:
-            for file in files.values():
-                file.close()
+    with new_folder(folder, own={f"{name}{SUFFIX}" for name in TABLES}, force=force) as scratch, ExitStack() as stack:
+        paths = {name: scratch / f"{name}{SUFFIX}" for name in names}
+        files = {name: stack.enter_context(RowsFile(path, _facts(log, name))) for name, path in paths.items()}
+        for name, rows in rows_of(log, names):
+            files[name].add(rows)
+            if name == names[0]:
+                on_part()
+        return {name: file.finish() for name, file in files.items()}
 
 
-class _File:
-    """Writes one table, a group of rows after the other."""
-
-    def __init__(self, name: str, folder: Path, log: TrainingLog) -> None:
-        header = log.header
-        facts = {"table": TABLES.get(name, ""), "digest": log.digest, "state": log.state, "damage": log.damage or ""}
-        facts |= {"method": json.dumps({"name": log.method.name, **log.method.as_dict()}), "seed": str(header.seed)}
-        facts |= {"curriculum": header.curriculum, "curriculum_digest": header.curriculum_digest}
-        self._facts = {f"fireworld.{key}": text for key, text in facts.items()}
-        self._path = folder / f"{name}{SUFFIX}"
-        self._held: list[Rows] = []
-        self._n_held = self._n_rows = 0
-        self._writer: Any = None
-        self._file: Any = None
-
-    def add(self, rows: Rows) -> None:
-        self._held.append(rows)
-        self._n_held += len(next(iter(rows.values())))
-        if self._n_held >= ROWS_PER_GROUP:
-            self._flush()
-
-    def finish(self) -> int:
-        """Write what is held; return the number of rows."""
-        self._flush()
-        return self._n_rows
-
-    def close(self) -> None:
-        if self._writer is not None:
-            with self._file:
-                self._writer.close()
-
-    def _flush(self) -> None:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        if not self._held:
-            return
-        arrays = {key: np.concatenate([rows[key] for rows in self._held]) for key in self._held[0]}
-        table = pa.table({key: pa.array(_texts(values)) for key, values in arrays.items()})
-        if self._writer is None:
-            schema = table.schema.with_metadata(self._facts)
-            self._file = self._path.open("wb")  # arrow itself takes no names of any bytes
-            self._writer = pq.ParquetWriter(self._file, schema, compression="zstd")
-        self._writer.write_table(table.replace_schema_metadata(self._facts))
-        self._n_rows += self._n_held
-        self._held, self._n_held = [], 0
-
-
-def _texts(values: Array) -> Any:
-    return values.tolist() if values.dtype.kind in "UO" else values
+def _facts(log: TrainingLog, table: str) -> dict[str, str]:
+    """Return the metadata of the file of a table."""
+    header = log.header
+    facts = {"table": TABLES.get(table, ""), "digest": log.digest, "state": log.state, "damage": log.damage or ""}
+    facts |= {"method": json.dumps({"name": log.method.name, **log.method.as_dict()}), "seed": str(header.seed)}
+    facts |= {"curriculum": header.curriculum, "curriculum_digest": header.curriculum_digest}
+    return {f"fireworld.{key}": text for key, text in facts.items()}

@@ -63,6 +63,7 @@ class FirstDifference:
         entries: of the tables after the episode that differ: (table, state, action, value in A, value in B); of states
             that a table takes for one the first.
         n_entries: how many there are.
+        world: the world, of what a learner played; then the number is that of the episode in it.
     """
 
     part: int
@@ -77,11 +78,13 @@ class FirstDifference:
     b: str
     entries: tuple[tuple[int, int, str, float, float], ...] = ()
     n_entries: int = 0
+    world: int | None = None
 
     @property
     def where(self) -> str:
         """The place, as in "train-3, episode 41, step 17"."""
-        names = [f"{self.scenario}, episode {self.number}" if self.scenario else f"generation {self.number}"]
+        world = "" if self.world is None else f"world {self.world}, "
+        names = [f"{self.scenario}, {world}episode {self.number}" if self.scenario else f"generation {self.number}"]
         return ", ".join([*names, *([f"step {self.step}"] if self.step is not None else [])])
 
     @property

@@ -23,11 +23,13 @@ from fireworld.scenario import Scenario, parse_scenario
 from fireworld.shown import SHOWN_MAX, Block, Shown
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import Curriculum, CurriculumStage
+from fireworld.training.log.environment import Environment, PlayedTrainer, method_named
 from fireworld.training.log.learned import LearnedEpisode, learned
+from fireworld.training.log.played import Played
+from fireworld.training.log.played_run import PlayedEpisode
 from fireworld.training.log.records import TRAINING, Episode, PartCommit, Plan, TrainingHeader, check_places
 from fireworld.training.log.writer import CITY_FOLDER, CURRICULUM_ATTACHMENT, METHOD_ATTACHMENT
 from fireworld.training.method import Method, Report, Trainer
-from fireworld.training.methods import find_method
 from fireworld.training.methods.sarsa import SarsaTrainer
 
 if TYPE_CHECKING:
@@ -93,6 +95,7 @@ class TrainingLog(Shown):
         except LogError as error:
             raise LogError(f"{path}: {error}") from None
         self._topics = self.trainer().topics
+        self._n_brigades = [one.brigades.n for one in self.scenarios]
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -124,7 +127,7 @@ class TrainingLog(Shown):
             try:
                 part = {one: decode(one, payloads[one.topic]) for one in self._topics if one.topic in payloads}
                 for record in part.values():
-                    check_places(record, len(self.scenarios))
+                    check_places(record, self._n_brigades)
                 yield part
             except LogError as error:
                 raise LogError(f"{self.path}: part {number}: {error}") from error
@@ -212,7 +215,7 @@ class TrainingLog(Shown):
             record = next(iter(part.values()), None)
             if record is None:
                 raise LogError(f"{self.path}: part {number}: it holds nothing of the method {self.method.name}")
-            lines.append(_without_columns(record))
+            lines.append(without_columns(record))
             if whole in part:
                 wholes.append(number)
         return lines, wholes
@@ -266,30 +269,26 @@ class TrainingLog(Shown):
         """What is learned in, in the order of the plan."""
         return self.curriculum.scenarios
 
-    def position(self, scenario: str | int, episode: int) -> int:
+    @property
+    def is_played(self) -> bool:
+        """Whether somebody else's learner played it in environments."""
+        return isinstance(self.method, Environment)
+
+    def position(self, scenario: str | int | None, episode: int, *, world: int | None = None) -> int:
         """Return the number of the part that an episode is.
 
         Args:
-            scenario: its name, or its position in the plan.
-            episode: its number in the scenario, from 0; -1 is the last.
+            scenario: its name, or its position in the plan; None: of what a learner played, any.
+            episode: its number in the scenario, from 0; -1 is the last. Of what a learner played, it counts those that
+                are recorded, in the order in which they ended; with a world, it is its number in that world.
+            world: the world that a learner played it in; of several forks of an episode the first that ended.
 
         Raises:
             LogError: there is no such episode, or the method has none.
         """
-        self.learner()
-        names = [one.name for one in self.scenarios]
-        if isinstance(scenario, str) and scenario not in names:
-            raise LogError(expected(str(self.path), "scenario", f"one of {', '.join(names)}", scenario))
-        wanted = names.index(scenario) if isinstance(scenario, str) else scenario
-        found = [k for k, line in enumerate(self.lines) if line.scenario == wanted]
-        if not found:
-            raise LogError(expected(str(self.path), "scenario", "one that has begun", scenario))
-        numbers = [self.lines[k].episode for k in found]
-        number = numbers[-1] if episode == -1 else episode
-        if number not in numbers:
-            held = f"one from {numbers[0]} to {numbers[-1]} of {names[wanted]}"
-            raise LogError(expected(str(self.path), "episode", held, episode))
-        return found[numbers.index(number)]
+        from fireworld.training.log.places import position_of
+
+        return position_of(self, scenario, episode, world)
 
     def episode(self, scenario: str | int, episode: int) -> LearnedEpisode:
         """Return an episode with all that was learned in it; arguments and errors as for `position`."""
@@ -302,6 +301,38 @@ class TrainingLog(Shown):
         if part is None or Episode not in part or not isinstance(trainer, SarsaTrainer):
             raise LogError(expected(str(self.path), "part", "an episode", number))
         return self._learned(trainer, part[Episode], number)
+
+    def played_at(self, number: int) -> PlayedEpisode:
+        """Return the episode of somebody else's learner that is a part.
+
+        Raises:
+            LogError: there is none, or what is recorded of it cannot be.
+        """
+        player = self.player
+        part = next(self.parts(number), None) if 0 <= number < len(self) else None
+        if part is None or Played not in part:
+            raise LogError(expected(str(self.path), "part", f"one from 0 to {len(self) - 1}", number))
+        return PlayedEpisode.of(
+            part[Played],
+            player.built(part[Played].scenario),
+            player.method,
+            log=self.digest,
+            source=f"{self.path}: part {number}",
+        )
+
+    @cached_property
+    def player(self) -> PlayedTrainer:
+        """What builds the scenarios of somebody else's learner, each of them once.
+
+        Raises:
+            LogError: fireworld itself trained.
+        """
+        trainer = self.trainer()
+        if not isinstance(trainer, PlayedTrainer):
+            raise LogError(
+                expected(str(self.path), "method", "an environment that a learner played in", self.method.name)
+            )
+        return trainer
 
     def describe(self, *, limit: int = SHOWN_MAX) -> Iterator[Block]:
         """Yield what there is to see of the training: its header, then a table of its scenarios or generations."""
@@ -324,7 +355,7 @@ def _setting(header: TrainingHeader) -> tuple[Method, Curriculum, CityCache]:
     try:
         method = json.loads(files[METHOD_ATTACHMENT])
         name = method.pop("name")
-        made = find_method(name).with_settings(method)
+        made = method_named(name).with_settings(method)
         text = json.loads(files[CURRICULUM_ATTACHMENT])
         stages = tuple(
             CurriculumStage(
@@ -349,7 +380,7 @@ def _setting(header: TrainingHeader) -> tuple[Method, Curriculum, CityCache]:
     return made, curriculum, CityCache(cities)
 
 
-def _without_columns(record: Any) -> Any:
+def without_columns(record: Any) -> Any:
     """Return a record with its columns left empty."""
     empty = np.zeros(0)
     return replace(record, **{item.name: empty for item in fields(record) if "per" in item.metadata})

@@ -6,7 +6,7 @@ Schemas, docs and exported tables are derived from the field metadata here. A fi
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Final, Self
 
@@ -22,6 +22,7 @@ from fireworld.policy.words import N_STATES
 from fireworld.records import ACTIONS, CHOICES, Array, column, value
 from fireworld.rewards import TERMS
 from fireworld.simulation.state import fresh_trace
+from fireworld.training.log.played import Played, check_played
 
 FORMAT: Final = "fireworld-training/1"
 PACKAGE: Final = "fireworld.training.v1"
@@ -226,20 +227,27 @@ class PartCommit:
     hash: bytes = value(3, "bytes", "32 bytes, chained to the commit before: the digest of the training up to here")
 
 
-def check_places(record: Any, n_scenarios: int) -> None:
+def check_places(record: Any, n_brigades: Sequence[int]) -> None:
     """Check that a record is of scenarios that the plan has, and of seeds that a run can have.
+
+    Args:
+        record: of whatever type.
+        n_brigades: of each scenario.
 
     Raises:
         LogError: it is not.
     """
-    fires = {Episode: ("scenario", "seed"), Tried: ("fire", "seed")}.get(type(record))
+    places = {Episode: ("scenario", "seed"), Played: ("scenario", "seed"), Tried: ("fire", "seed")}
+    fires = places.get(type(record))
     if fires is None:
         return
     scenario, seed = (np.atleast_1d(getattr(record, name)) for name in fires)
-    if len(scenario) and not 0 <= int(scenario.min()) <= int(scenario.max()) < n_scenarios:
+    if len(scenario) and not 0 <= int(scenario.min()) <= int(scenario.max()) < len(n_brigades):
         raise LogError(f"{record.topic}: {fires[0]}: a scenario that the plan has not")
     if len(seed) and int(seed.max()) > SEED_MAX:
         raise LogError(f"{record.topic}: {fires[1]}: {int(seed.max())} is above {SEED_MAX}, the largest of a run")
+    if isinstance(record, Played):
+        check_played(record, n_brigades[record.scenario])
 
 
 TRAINING: Final = LogKind(
@@ -248,7 +256,7 @@ TRAINING: Final = LogKind(
     header_type=TrainingHeader,
     commit_type=PartCommit,
     first_type=Plan,
-    topics=(Plan, Episode, Tables, Updates, Tried, PartCommit),
+    topics=(Plan, Episode, Tables, Updates, Tried, Played, PartCommit),
     unchained=frozenset({Tables.topic, Updates.topic}),
     unit="part",
     rescue="--resume to continue, or --force to begin again",

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from fireworld.training.log.played import Played
 from fireworld.training.log.reader import Part
 from fireworld.training.log.records import Episode, Tables
 
@@ -66,15 +67,16 @@ class Spread:
         self._same: dict[int, set[int]] = {}
         self._tables: dict[int, list[Tables | None]] = {}
 
-    def add(self, one: Part | None, other: Part | None, *, same: bool) -> None:
-        """Add the next part of both."""
+    def add(self, one: Part | None, other: Part | None, *, same: bool, number: int | None = None) -> None:
+        """Add the next part of both; with a number, if they have none of their own."""
         for side, part in enumerate((one, other)):
             if part is None:
                 continue
-            key, number, line = _line(part)
-            self._lines.setdefault(key, ({}, {}))[side][number] = line
+            key, own, line = _line(part)
+            place = own if number is None else number
+            self._lines.setdefault(key, ({}, {}))[side][place] = line
             if same:
-                self._same.setdefault(key, set()).add(number)
+                self._same.setdefault(key, set()).add(place)
             if Tables in part and part[Episode].ended:
                 self._tables.setdefault(key, [None, None])[side] = part[Tables]
 
@@ -105,7 +107,7 @@ class Spread:
 def _line(part: Part) -> tuple[int, int, tuple[float, float, float]]:
     """Return scenario (-1: all), number, and return, score and steps of a part."""
     record = next(iter(part.values()))
-    if isinstance(record, Episode):
+    if isinstance(record, Episode | Played):
         score = record.score / record.score_max if record.score_max else 0.0
         return record.scenario, record.episode, (record.total_reward, score, float(record.n_steps))
     score = float(getattr(record, "score_mean", np.nan))

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import asdict
-from typing import Any
+from typing import Any, Final
 
 from fireworld.shown import SHOWN_MAX, Block, TextTable
+from fireworld.training.log.played import Played
 from fireworld.training.log.reader import TrainingLog
 from fireworld.training.log.records import FORMAT, Episode
+from fireworld.training.log.spread import LAST
 from fireworld.version import simulator_version
+
+HEADS: Final = ("scenario", "episodes", "steps", "ends", "return", "score", "states")
+HEADS_PLAYED: Final = ("scenario", "episodes", "steps", "left", "unknown", "return", "score")
+NOTE_PLAYED: Final = (
+    f"left: before their end; unknown: begun in states that nobody knows, so that they\n"
+    f"cannot be replayed; return, score: means of the last {LAST}"
+)
 
 
 def training_summary(log: TrainingLog) -> dict[str, Any]:
@@ -33,8 +43,8 @@ def training_summary(log: TrainingLog) -> dict[str, Any]:
         "unit": header.unit,
         "n_parts": len(log),
         "done": log.done,
-        "team_digest": log.team().digest if len(log) else None,
-        "scenarios": list(_scenarios(log)),
+        "team_digest": log.team().digest if len(log) and not log.is_played else None,
+        "scenarios": list(played_in_scenarios(log) if log.is_played else _scenarios(log)),
         "attachments": {name: len(data) for name, data in header.attachments.items()},
         "n_bytes": log.found.n_bytes,
         "topics": {topic: asdict(size) for topic, size in log.topics.items()},
@@ -63,19 +73,38 @@ def _scenarios(log: TrainingLog) -> Iterator[dict[str, Any]]:
             }
 
 
+def played_in_scenarios(log: TrainingLog) -> Iterator[dict[str, Any]]:
+    """Yield what a learner played in each scenario of which an episode is recorded."""
+    names = [scenario.name for scenario in log.scenarios]
+    for name in dict.fromkeys(names):
+        mine: list[Played] = [line for line in log.lines if names[line.scenario] == name]
+        last = mine[-LAST:]
+        if mine:
+            yield {
+                "name": name,
+                "n_episodes": len(mine),
+                "n_steps": sum(line.n_steps for line in mine),
+                "n_left": sum(line.left for line in mine),
+                "n_unknown": sum(not line.replayable for line in mine),
+                "return": math.fsum(line.total_reward for line in last) / len(last),
+                "score": math.fsum(line.score for line in last) / len(last),
+                "score_max": last[-1].score_max,
+            }
+
+
 def describe_training(log: TrainingLog, *, limit: int = SHOWN_MAX) -> Iterator[Block]:
     """Yield what there is to see of a training: its header, then a table of its scenarios or generations."""
     found = training_summary(log)
+    complete = "complete" if log.done or log.is_played else "complete as far as it goes: the training is not done"
     method = ", ".join(f"{key} {value}" for key, value in found["method"].items() if key != "name")
     lines = {
         "training": f"{log.path}, {found['n_bytes']:,} bytes, {found['format']}",
-        "state": found["damage"]
-        or ("complete" if log.done else "complete as far as it goes: the training is not done"),
+        "state": found["damage"] or complete,
         "method": f"{found['method']['name']}: {method}",
         "curriculum": f"{found['curriculum']['name']} ({found['curriculum']['digest'][:12]}), seed {found['seed']}",
         "fireworld": simulator_version(found["fireworld_version"], found["simulator_digest"]),
         "digest": found["digest"],
-        "team": found["team_digest"] or "none",
+        "team": found["team_digest"] or ("not known" if log.is_played else "none"),
         log.header.unit + "s": f"{len(log):,}",
     }
     for label, text in lines.items():
@@ -83,11 +112,13 @@ def describe_training(log: TrainingLog, *, limit: int = SHOWN_MAX) -> Iterator[B
     rows = found["scenarios"]
     if rows:
         yield ""
-        heads = ["scenario", "episodes", "steps", "ends", "return", "score", "states"]
+        heads, cells = (HEADS_PLAYED, played_cells) if log.is_played else (HEADS, _cells)
         shown = rows if len(rows) <= limit else [*rows[: limit // 2], *rows[-(limit - limit // 2) :]]
-        yield TextTable(heads, [_cells(row) for row in shown])
+        yield TextTable(heads, [cells(row) for row in shown])
         if len(rows) > len(shown):
             yield f"{len(rows) - len(shown)} scenarios between these; --json has all"
+        if log.is_played:
+            yield from ("", NOTE_PLAYED)
     elif len(log):
         yield ""
         table = [
@@ -96,6 +127,19 @@ def describe_training(log: TrainingLog, *, limit: int = SHOWN_MAX) -> Iterator[B
             if hasattr(line, "generation")
         ]
         yield TextTable(["generation", "score", "of the best", "spread"], table)
+
+
+def played_cells(row: dict[str, Any]) -> list[str]:
+    """Return a row of `played_in_scenarios` under `HEADS_PLAYED`."""
+    return [
+        row["name"],
+        f"{row['n_episodes']:,}",
+        f"{row['n_steps']:,}",
+        str(row["n_left"]),
+        str(row["n_unknown"]),
+        f"{row['return']:.4g}",
+        f"{row['score']:.2f}/{row['score_max']:.0f}",
+    ]
 
 
 def _cells(row: dict[str, Any]) -> list[str]:

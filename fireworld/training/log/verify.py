@@ -15,6 +15,8 @@ from fireworld.executors import Workers, threads
 from fireworld.policy.teams.team import Team, read_team
 from fireworld.scenario import Scenario
 from fireworld.training.log.difference import TrainingDifference, compare_trainings
+from fireworld.training.log.first_difference import Trained
+from fireworld.training.log.played_difference import PlayedAgain
 from fireworld.training.log.reader import AnyTraining, Part, TrainingLog, opened
 from fireworld.training.log.records import TrainingHeader
 from fireworld.training.method import Method, Report, Trainer
@@ -72,24 +74,31 @@ class TrainingVerification(Verified):
     """Whether a recorded training is still what this fireworld learns; true if it is."""
 
     team_digest: str
-    """Of the team at its end."""
+    """Of the team at its end; "" of what a learner played."""
     n_parts: int
     """Episodes or generations in the log."""
     unit: str
     """What a part is."""
+    n_unknown: int = 0
+    """Episodes of a learner that began in states that nobody knows, and were not played again."""
     difference: TrainingDifference | None = None
     """How the training differs when it is repeated, the log's values as `a`; None if it does not."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as plain values, as `fireworld verify --json` writes it."""
         known = {**self.known(), "digest": self.digest, "team_digest": self.team_digest, "unit": self.unit}
+        known |= {"n_unknown": self.n_unknown} if self.n_unknown else {}
         return {**known, "n_parts": self.n_parts, **({} if self.difference is None else self.difference.to_dict())}
 
     def __repr__(self) -> str:
         if self.difference is None or self.difference.first is None:
-            what = f"the same training, {self.n_parts} {self.unit}s, digest {self.digest}"
-            return f"{self.name}: {what}; its team {self.team_digest}"
-        return f"{self.name}: learned again it differs: {self.difference.first.sentence}"
+            what = f"{self.n_parts} {self.unit}s, digest {self.digest}"
+            if self.team_digest:
+                return f"{self.name}: the same training, {what}; its team {self.team_digest}"
+            left = f"; {self.n_unknown} that began in unknown states were not played again" if self.n_unknown else ""
+            return f"{self.name}: played again they are the same, {what}{left}"
+        how = "learned again it differs" if self.team_digest else "played again they differ"
+        return f"{self.name}: {how}: {self.difference.first.sentence}"
 
 
 def check_team(log: TrainingLog, team: Team, *, source: str) -> str:
@@ -141,6 +150,8 @@ def verify_training(
 ) -> TrainingVerification:
     """Learn everything again that a training log holds, and compare every part.
 
+    What somebody else's learner played is played again.
+
     Args:
         log: the path of a training log, or one that is open.
         team: the team file that came of it, to be compared too.
@@ -157,11 +168,17 @@ def verify_training(
     training = opened(log)
     if not len(training):
         raise LogError(f"{training.path}: it holds no {training.header.unit}s; there is nothing to verify")
-    digest = (
-        training.team().digest if team is None else check_team(training, read_team(Path(team))[0], source=str(team))
-    )
-    n_parts = None if training.done else len(training)
-    again = TrainedAgain(training.trainer, training.header, threads(jobs), n_parts=n_parts)
+    digest, n_unknown = "", 0
+    again: Trained
+    if training.is_played and team is None:
+        n_unknown = sum(not line.replayable for line in training.lines)
+        again = PlayedAgain(training, threads(jobs))
+    else:
+        digest = (
+            training.team().digest if team is None else check_team(training, read_team(Path(team))[0], source=str(team))
+        )
+        n_parts = None if training.done else len(training)
+        again = TrainedAgain(training.trainer, training.header, threads(jobs), n_parts=n_parts)
     difference = compare_trainings(training, again, names=(str(training.path), "again"), on_part=on_part)
     return TrainingVerification(
         name=str(training.path),
@@ -171,5 +188,6 @@ def verify_training(
         team_digest=digest,
         n_parts=len(training),
         unit=training.header.unit,
+        n_unknown=n_unknown,
         difference=None if difference.same else difference,
     )

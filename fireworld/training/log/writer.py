@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import os
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Final, Self
 
 import numpy as np
 from fireworld_recorder.chain import Chain
 from fireworld_recorder.codec import decode, encode
 from fireworld_recorder.header import to_metadata
 from fireworld_recorder.reader import RawStep
-from fireworld_recorder.writer import StepFile
+from fireworld_recorder.writer import PARTIAL_SUFFIX, StepFile
 
-from fireworld.errors import TrainingError, expected
+from fireworld.arguments import path_of
+from fireworld.errors import OutputError, TrainingError, expected
+from fireworld.files import check_output
 from fireworld.simulation.placement import CITY_ATTACHMENT, attachments
 from fireworld.training.log.records import TRAINING, PartCommit, Plan, TrainingHeader, channels_of
 from fireworld.training.method import Trainer
@@ -25,6 +29,7 @@ from fireworld.version import __version__, simulator_digest
 CURRICULUM_ATTACHMENT = "curriculum.json"
 METHOD_ATTACHMENT = "method.json"
 CITY_FOLDER = "cities/"
+SUFFIX: Final = ".mcap"
 
 
 def header_of(trainer: Trainer[Any, Any]) -> TrainingHeader:
@@ -69,7 +74,7 @@ def plan_of(trainer: Trainer[Any, Any]) -> Plan:
         stage=np.array([k for k, _, _ in pairs]),
         cooperation=np.array([stage.cooperation for _, stage, _ in pairs], dtype=np.uint8),
         n_brigades=np.array([one.brigades.n for _, _, one in pairs]),
-        n_steps_max=np.array([one.steps for _, _, one in pairs]),
+        n_steps_max=np.array([trainer.last_step(one) for _, _, one in pairs]),
         digests=b"".join(bytes.fromhex(one.digest) for _, _, one in pairs),
     )
 
@@ -155,6 +160,11 @@ class TrainingWriter:
                 raise
 
     @property
+    def path(self) -> Path:
+        """The log, when it has its name."""
+        return self._file.path
+
+    @property
     def partial(self) -> Path:
         """The log while the training is not at its end."""
         return self._file.partial
@@ -183,6 +193,48 @@ class TrainingWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         self._file.abort()
+
+
+def open_writer(record: str | os.PathLike[str], trainer: Trainer[Any, Any]) -> TrainingWriter:
+    """Begin the log of episodes: one of a given name, or in an existing folder one of a name that is free.
+
+    Raises:
+        OutputError: the name is taken or ends otherwise, or the log cannot be made.
+        ArgumentError: it is no path.
+    """
+    path = path_of("record", record)
+    if path.is_dir():
+        return _new_in(path, trainer)
+    if os.fspath(record).endswith(os.sep):
+        raise OutputError(expected(str(path), "", "an existing folder", "none", "make it first"))
+    if any(one.exists() for one in _names(path)):
+        hint = "with a folder as record every log gets a name of its own"
+        raise OutputError(expected(str(path), "", "a name that is free", "an existing file", hint))
+    check_output(path, endings=(SUFFIX,))
+    return TrainingWriter(path, trainer)
+
+
+def _new_in(folder: Path, trainer: Trainer[Any, Any]) -> TrainingWriter:
+    """Begin a log in a folder that others may begin logs in, too."""
+    for number in itertools.count(1):
+        path = folder / f"episodes-{number}{SUFFIX}"
+        if any(one.exists() for one in _names(path)):
+            continue
+        try:
+            writer = TrainingWriter(path, trainer)
+        except OutputError:
+            if any(one.exists() for one in _names(path)):
+                continue
+            raise
+        if not path.exists():
+            return writer
+        writer.abort()
+    raise AssertionError("numbers do not end")
+
+
+def _names(path: Path) -> tuple[Path, Path]:
+    """Return the names that a log has, one after the other."""
+    return path.with_name(path.name + PARTIAL_SUFFIX), path
 
 
 def _json(value: object) -> bytes:

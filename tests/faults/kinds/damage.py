@@ -17,7 +17,7 @@ from fireworld.errors import FireworldError
 from fireworld.training.log.reader import open_training
 from tests.faults.bench import Bench, as_process
 from tests.faults.damaged import Damaged, damaged, kind_of
-from tests.faults.material import RUN_LOGS, SHORT_WORDS, TRAINING_LOGS
+from tests.faults.material import PLAYED_LOGS, RUN_LOGS, SHORT_WORDS, TRAINING_LOGS
 from tests.faults.outcomes import Done, Outcome
 
 NAME: Final = "damage"
@@ -74,6 +74,7 @@ OF_RUNS: Final = (
     Reader(("fork", "a.mcap", "--at", 4, "--record", "o.mcap"), outputs=("o.mcap",)),
     Reader(("fork", "a.mcap", "--at", 2, "--policy", "recorded", "--record", "o.mcap"), outputs=("o.mcap",)),
     Reader(("fork", "good.mcap", "--at", 2, "--swap", "a.mcap:0", "--record", "o.mcap"), outputs=("o.mcap",)),
+    Reader(("export", "good.mcap", "a.mcap", "--rlds", "o"), outputs=("o",)),
     Reader(("explain", "a.mcap", "other.mcap", "--budget", 6), whole=True),
     Reader(("explain", "other.mcap", "a.mcap", "--budget", 6, "--json"), whole=True),
 )
@@ -86,13 +87,22 @@ OF_TRAININGS: Final = (
     Reader(("train", "tiny.yaml", *SHORT_WORDS, "--jobs", 1, "-o", "t.npz", "--record", "r.mcap", "--resume")),
 )
 
+OF_PLAYED: Final = (
+    Reader(("replay", "a.mcap", "--episode", 1, "-o", "o.mcap"), outputs=("o.mcap",)),
+    Reader(("replay", "a.mcap", "--world", 1, "--episode", 0, "-o", "o.mcap"), outputs=("o.mcap",)),
+    Reader(("replay", "a.mcap", "--scenario", "quick", "--episode", -1, "-o", "o.mcap"), outputs=("o.mcap",)),
+    Reader(("replay", "a.mcap", "--every", 2, "-o", "episodes")),
+    Reader(("export", "a.mcap", "--rlds", "o"), outputs=("o",)),
+    Reader(("export", "good.mcap", "a.mcap", "other.mcap", "--rlds", "o", "--observation", "targets"), outputs=("o",)),
+)
+
 
 def run(generator: random.Random, bench: Bench) -> Outcome:
     """Do something to a log, and let a command read it."""
     name = generator.choice((*RUN_LOGS, *RUN_LOGS, *TRAINING_LOGS))
     source = bench.material / name
     of_run = kind_of(source) == RUN
-    reader = generator.choice((*OF_ALL, *(OF_RUNS if of_run else OF_TRAININGS)))
+    reader = generator.choice((*OF_ALL, *_readers_of(name, of_run=of_run)))
     other = bench.material / generator.choice((*RUN_LOGS, *TRAINING_LOGS))
     found = damaged(generator, source, other, bench.folder)
     bench.processes = as_process(generator, 0.05)
@@ -113,6 +123,12 @@ def run(generator: random.Random, bench: Bench) -> Outcome:
     bench.outcome.refused += done.code == 2
     bench.outcome.survived += done.code != 2
     return bench.outcome
+
+
+def _readers_of(name: str, *, of_run: bool) -> tuple[Reader, ...]:
+    if of_run:
+        return OF_RUNS
+    return OF_PLAYED if name in PLAYED_LOGS else OF_TRAININGS
 
 
 def _state(path: Path, *, of_run: bool) -> str:

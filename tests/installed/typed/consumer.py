@@ -49,6 +49,9 @@ def runs(folder: Path) -> None:
     assert_type(fw.explain(log, folder / "b.mcap", budget=20), fw.Explanation)
     fw.recover(folder / "broken.mcap", folder / "good.mcap", force=True)
     fw.export(log, folder / "tables", tables=["brigades"])
+    fw.export_rlds([log, folder / "episodes.mcap"], folder / "dataset", observation="targets")
+    assert_type(fw.load_dataset(folder / "dataset").run(0), fw.Run)
+    assert_type(fw.open_episode(folder / "episodes.mcap", 3), fw.Run)
 
 
 def loop() -> float:

@@ -97,6 +97,10 @@ def test_what_cannot_be_compared(make_log, log_path, tmp_path, curriculum):
         diff_trainings(log_path, tmp_path / "q.mcap")
     with pytest.raises(LogError, match="diff of trainings"):
         fw.diff(log_path, log_path, tolerances={"hp": 1})
+    start = open_training(log_path).found.starts[0].offset
+    (tmp_path / "cut.mcap").write_bytes(log_path.read_bytes()[: start + 1])
+    with pytest.raises(LogError, match=r"cut\.mcap: .*there is nothing to compare"):
+        diff_trainings(log_path, tmp_path / "cut.mcap", partial=True)
     with pytest.raises(LogError, match="it is the log of a training, not of a run"):
         fw.open_log(log_path)
 

@@ -10,8 +10,8 @@ import fireworld as fw
 from fireworld.errors import LogError, OutputError, PolicyError, TrainingError
 from fireworld.records import CHOICES
 from fireworld.training.log import episode_run
-from fireworld.training.log.episode_run import replay_episode, replay_every
 from fireworld.training.log.reader import open_training
+from fireworld.training.log.replay import replay_episode, replay_every
 from fireworld.training.train import train
 from tests.training.log.conftest import SHORT
 from tests.training.log.test_log import VARIANTS

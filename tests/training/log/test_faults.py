@@ -60,7 +60,8 @@ def test_a_cut_log_is_good_up_to_the_last_part(log_path, tmp_path):
         prefix = [[bytes(data) for _, data in raw] for raw in log.raw_parts()]
         full = [[bytes(data) for _, data in raw] for raw in open_training(log_path).raw_parts()]
         assert prefix == full[: len(prefix)]
-        assert diff_trainings(log_path, path, partial=True).same == (len(prefix) == len(full))
+        if prefix:
+            assert diff_trainings(log_path, path, partial=True).same == (len(prefix) == len(full))
 
 
 def rewrite(log, path, *, header=None, change=lambda _, messages: messages):

@@ -23,6 +23,7 @@ from fireworld.records import Array
 from fireworld.scenario import scenario_names
 from fireworld.training.curriculum import curriculum_names, find_curriculum
 from fireworld.training.log.course import Course, course_of, opening
+from fireworld.training.log.pages.played import again_played, scenarios_played
 from fireworld.training.log.pages.view import TABLES_HELP, names_of, open_trainings
 from fireworld.training.log.reader import AnyTraining, TrainingLog
 from fireworld.training.log.records import Episode
@@ -36,6 +37,7 @@ RETURN: Final = "return"
 SCORE: Final = "score"
 CONVERGENCE: Final = (
     (RETURN, 1000.0, "return of the episode, in thousands"),
+    ("learner_return", 1.0, "return of the episode, as the learner got it"),
     (SCORE, 1.0, "score of the episode, as a share of the best"),
 )
 """Plots that are drawn scenario by scenario, by what their values are divided, and their labels."""
@@ -90,6 +92,8 @@ def course_picture(log: TrainingLog) -> Picture:
 def training_page(logs: Sequence[TrainingLog]) -> str:
     """Return the page; errors as for `report_training`."""
     names, courses = names_of(logs), [course_of(log) for log in logs]
+    by_part = f"All curves, {courses[0].unit} by {courses[0].unit}."
+    scenarios, again = (scenarios_played, again_played) if logs[0].is_played else (_scenarios, _repetition)
     title = " against ".join(f"{one.header.method} in {one.header.curriculum}, seed {one.header.seed}" for one in logs)
     with plain_style():
         body = [
@@ -101,11 +105,11 @@ def training_page(logs: Sequence[TrainingLog]) -> str:
             *_convergence(courses, names),
             "<h2>The whole training</h2>",
             html_figure(png_bytes(_whole(courses, names)),
-                        CAPTION if courses[0].scenarios else "All curves, generation by generation."),
+                        CAPTION if courses[0].scenarios and not logs[0].is_played else by_part),
             *(part for course, name in zip(courses, names, strict=True) for part in _tables(course, name)),
-            *(part for log, name in zip(logs, names, strict=True) for part in _scenarios(log, name)),
+            *(part for log, name in zip(logs, names, strict=True) for part in scenarios(log, name)),
             "<h2>How to get the same again</h2>",
-            *(part for log, name in zip(logs, names, strict=True) for part in _repetition(log, name)),
+            *(part for log, name in zip(logs, names, strict=True) for part in again(log, name)),
         ]  # fmt: skip
     return html_page(f"fireworld: {one_line(title)}", body, style=_STYLE)
 
@@ -125,7 +129,8 @@ def _facts(logs: Sequence[TrainingLog], names: Sequence[str]) -> str:
         facts |= {
             "recorded by": f"fireworld {simulator_version(log.header.fireworld_version, log.header.simulator_digest)}"
         }
-        facts |= {"ended": "yes" if log.done else "no", "digest": log.digest[:16], "team": log.team().digest[:16]}
+        facts |= {"ended": "yes" if log.done else "no", "digest": log.digest[:16]}
+        facts |= {"team": "not known" if log.is_played else log.team().digest[:16]}
         columns.append(facts)
     rows = [compared_row(escape(key), [column[key] for column in columns]) for key in columns[0]]
     note = "<p>Bold: where they differ.</p>" if len(logs) > 1 else ""
@@ -151,7 +156,9 @@ def _panels(courses: Sequence[Course], names: Sequence[str]) -> list[CoursePanel
 
 
 def _bands(course: Course) -> list[tuple[int, int]]:
-    """Return first and last part of every scenario."""
+    """Return first and last part of every scenario; nothing where they do not come one after another."""
+    if not course.in_turn:
+        return []
     places = [np.flatnonzero(course.scenario == number) for number in range(len(course.scenarios))]
     return [(int(one[0]), int(one[-1])) for one in places if len(one)]
 
@@ -179,6 +186,8 @@ def _convergence(courses: Sequence[Course], names: Sequence[str]) -> Iterator[st
         return
     yield "<h2>Convergence</h2>"
     for plot, scale, label in CONVERGENCE:
+        if plot not in courses[0].plots:
+            continue
         panels = _by_scenario(courses, names, plot, scale)
         figure = draw_learning_curves(panels, label=label, mark="policy settled", shares=plot == SCORE)
         caption = f"By scenario: {label}. The dotted lines: the policy has settled."
@@ -192,9 +201,9 @@ def _by_scenario(courses: Sequence[Course], names: Sequence[str], plot: str, sca
         curves: dict[str, list[Array]] = {}
         marks = {}
         for course, name in zip(courses, names, strict=True):
-            if scenario not in course.scenarios:
+            mine = np.isin(course.scenario, [k for k, one in enumerate(course.scenarios) if one == scenario])
+            if not mine.any():
                 continue
-            mine = course.scenario == course.scenarios.index(scenario)
             curves[name] = [course.plots[plot][""][mine] / scale]
             if any(mark.settled and mine[mark.part] for mark in course.marks):
                 marks[name] = float(mine.sum() - 1)
