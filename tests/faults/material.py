@@ -60,6 +60,7 @@ def warm() -> None:
         "fireworld.envs.datasets.minari_form",
         "fireworld.evaluation.compare",
         "fireworld.evaluation.new_scenarios",
+        "fireworld.recording.difference",
         "fireworld.recording.explanation",
         "fireworld.recording.fork",
         "fireworld.recording.golden.update",

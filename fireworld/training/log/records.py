@@ -228,7 +228,7 @@ class PartCommit:
 
 
 def check_places(record: Any, n_brigades: Sequence[int]) -> None:
-    """Check that a record is of scenarios that the plan has, and of seeds that a run can have.
+    """Check that a record is of scenarios that the plan has, of seeds that a run can have, and of columns that fit.
 
     Args:
         record: of whatever type.
@@ -248,6 +248,16 @@ def check_places(record: Any, n_brigades: Sequence[int]) -> None:
         raise LogError(f"{record.topic}: {fires[1]}: {int(seed.max())} is above {SEED_MAX}, the largest of a run")
     if isinstance(record, Played):
         check_played(record, n_brigades[record.scenario])
+    if isinstance(record, Tried) and not _fits(record):
+        raise LogError(f"{record.topic}: its columns are not of the same rankings, weights and fires")
+
+
+def _fits(tried: Tried) -> bool:
+    """Return whether the columns of a generation are of the same rankings, weights and fires."""
+    n_weights = len(tried.mean)
+    if not n_weights or n_weights != len(tried.spread) or len(tried.weights) % n_weights:
+        return False
+    return len(tried.weights) // n_weights * len(tried.fire) == len(tried.scores)
 
 
 TRAINING: Final = LogKind(

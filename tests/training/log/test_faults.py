@@ -10,6 +10,7 @@ from fireworld_recorder.writer import StepFile
 
 from fireworld.errors import FireworldError, LogError
 from fireworld.training.log.difference import diff_trainings
+from fireworld.training.log.export import export_training
 from fireworld.training.log.reader import open_training
 from fireworld.training.log.records import TRAINING, channels_of
 from fireworld.training.log.summary import training_summary
@@ -135,6 +136,25 @@ def test_columns_that_cannot_be_are_refused(log, tmp_path):
         with pytest.raises(LogError, match=f"^{path}: part [12]: "):
             for _ in open_training(path).reports():
                 pass
+
+
+@pytest.mark.parametrize("name", ["weights", "scores", "fire", "mean", "spread"])
+def test_generations_whose_columns_do_not_fit_are_refused(make_log, tmp_path, name):
+    from dataclasses import replace
+
+    from fireworld_recorder.codec import decode, encode
+
+    from fireworld.training.log.records import Tried
+
+    log = open_training(make_log("search"))
+
+    def change(_, messages):
+        tried = decode(Tried, dict(messages)["/generation"])
+        return [("/generation", encode(replace(tried, **{name: getattr(tried, name)[:-1]})))]
+
+    path = rewrite(log, tmp_path / "a.mcap", change=change)
+    with pytest.raises(LogError, match="part 0: /generation: its columns are not of the same"):
+        export_training(open_training(path), tmp_path / "tables")
 
 
 @pytest.mark.parametrize(("name", "value"), [("scenario", 99), ("scenario", -1), ("seed", 2**63)])
