@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import _thread
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -45,7 +44,7 @@ def no_more() -> None:
 def _send() -> None:
     if _lost.is_set():
         _lost.clear()
-        _thread.interrupt_main()
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)  # a real one ends a wait, too
 
 
 def was_interrupted(error: BaseException) -> bool:
