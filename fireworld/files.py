@@ -304,8 +304,20 @@ def _remove(scratch: Path) -> None:
 
 
 def name_from(path: Path, folder: Path) -> str:
-    """Name a file as a text in a folder does: relative to the folder, with slashes."""
-    return Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
+    """Name a file as a text in a folder does: relative to the folder, with slashes, the same on every machine.
+
+    Raises:
+        OutputError: there are bytes in the name that no text can hold.
+    """
+    name = Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
+    if name != text_of(name):
+        raise OutputError(expected(text_of(name), "", "a name in UTF-8, to write it into a file", "other bytes"))
+    return name
+
+
+def text_of(name: str) -> str:
+    """Return the name of a file as text: bytes in it that are none are written as Python writes them."""
+    return name.encode("utf-8", "backslashreplace").decode()
 
 
 def write_file(path: Path, data: bytes | str) -> None:
@@ -315,4 +327,4 @@ def write_file(path: Path, data: bytes | str) -> None:
         OutputError: it cannot be written.
     """
     with written_beside(path) as partial:
-        partial.write_bytes(data if isinstance(data, bytes) else data.encode("utf-8", "backslashreplace"))
+        partial.write_bytes(data if isinstance(data, bytes) else text_of(data).encode())

@@ -14,7 +14,7 @@ import msgspec
 import msgspec.inspect
 
 from fireworld.errors import ScenarioError, expected
-from fireworld.files import read_input
+from fireworld.files import read_input, text_of
 from fireworld.parameters import Parameters
 from fireworld.rewards import paper_weights
 from fireworld.scenario.document import Document, broken_rules, resolve_parameters
@@ -147,7 +147,7 @@ class Scenario(Document, frozen=True, kw_only=True):
 
     def _document(self) -> dict[str, Any]:
         """Return the content of the scenario's file, as plain values."""
-        content: dict[str, Any] = json.loads(msgspec.json.encode(self))
+        content: dict[str, Any] = json.loads(json.dumps(msgspec.to_builtins(self)))  # a path may have odd bytes
         del content["source"], content["city_sha256"]
         return content
 
@@ -218,7 +218,7 @@ def read_scenario(path: Path, *, source: str | None = None) -> Scenario:
         or_names="a scenario file",
     )
     scenario = parse_scenario(text, source=source, folder=path.parent)
-    return scenario if scenario.name else msgspec.structs.replace(scenario, name=path.stem)
+    return scenario if scenario.name else msgspec.structs.replace(scenario, name=text_of(path.stem))
 
 
 def read_city_file(scenario: Scenario) -> bytes:

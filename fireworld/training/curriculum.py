@@ -16,7 +16,7 @@ import msgspec
 from msgspec import Meta, Struct
 
 from fireworld.errors import FireworldError, TrainingError, expected
-from fireworld.files import read_input
+from fireworld.files import read_input, text_of
 from fireworld.scenario import Scenario, load_scenario, scenario_names
 from fireworld.scenario.shipped import shipped_folder
 from fireworld.scenario.yaml_text import read_yaml
@@ -188,7 +188,7 @@ def _build(document: Any, *, source: str, path: Path) -> Curriculum:
             wanted = "true, as in the stage before: what was learned with cooperation has no place without"
             raise TrainingError(expected(where, "cooperation", wanted, "false"))
         stages.append(_build_stage(text, where=where, folder=path.parent))
-    return Curriculum(name=path.stem, stages=tuple(stages))
+    return Curriculum(name=text_of(path.stem), stages=tuple(stages))
 
 
 def _build_stage(stage: StageText, *, where: str, folder: Path) -> CurriculumStage:

@@ -89,3 +89,37 @@ def test_an_encoding_without_a_letter_shows_it(here, fireworld_process, monkeypa
     assert fireworld_process(*RUN, "é.mcap").code == 0
     assert sys.getfilesystemencoding() == "utf-8"
     assert (here / "é.mcap").exists()
+
+
+TOWN = """
+preset: paper
+city: {generated: {columns: 6, rows: 6}}
+fires: [{at: [0.5, 0.5], n_buildings: 3}]
+steps: 5
+"""
+
+
+@pytest.mark.parametrize("odd", ODD[:1] + ODD[-1:], ids=repr)
+def test_inputs_with_names_of_any_bytes_are_read(here, fireworld, odd):
+    town, curriculum, log, training = f"{odd}s.yaml", f"{odd}c.yaml", f"{odd}.mcap", f"{odd}t.mcap"
+    (here / town).write_text(TOWN)
+    (here / curriculum).write_text("stages: [{name: one, cooperation: false, scenarios: [quick]}]")
+    for words in (
+        ("run", town, "--set", "steps=4", "--record", log),
+        ("view", log, "--save", "a.rrd"),
+        ("report", log, "-o", "a.html"),
+        ("compare", "chief", "easiest", "--scenarios", town, "--seeds", 1, "--jobs", 1),
+        ("train", curriculum, "--set", "n_episodes_max=1", "--jobs", 1, "-o", "t.npz", "--record", training),
+        ("view", training, "--save", "t.rrd"),
+        ("replay", training, "--scenario", "quick", "--episode", 0, "-o", f"{odd}e.mcap"),
+        ("verify", f"{odd}e.mcap"),
+    ):
+        done = fireworld(*words)
+        assert done.code == 0, done.err
+
+
+def test_a_golden_of_a_name_that_is_no_text_is_refused_in_a_line(here, fireworld):
+    (here / f"{ODD[0]}s.yaml").write_text(TOWN)
+    done = fireworld("golden", "add", f"{ODD[0]}s.yaml", "--policy", "chief")
+    assert (done.code, len(done.err.splitlines())) == (2, 1)
+    assert "expected a name in UTF-8" in done.err

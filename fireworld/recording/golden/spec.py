@@ -12,6 +12,7 @@ from typing import Annotated, Any, Final
 import msgspec
 
 from fireworld.errors import LogError, expected
+from fireworld.files import name_from
 from fireworld.policy.names import NamedPolicy, find_policy, with_file
 from fireworld.recording.replay import build_recorded
 from fireworld.recording.resume import refind_policy
@@ -73,8 +74,8 @@ def make_spec(
     if not shipped:
         load_scenario(scenario)  # the error names the path as given, not as seen from the folder
     return GoldenSpec(
-        scenario=str(scenario) if shipped else path_from(folder, Path(scenario)),
-        policy=with_file(policy, lambda path: path_from(folder, Path(path))),
+        scenario=str(scenario) if shipped else name_from(Path(scenario), folder),
+        policy=with_file(policy, lambda path: name_from(Path(path), folder)),
         seed=seed,
         steps=steps,
         settings=setting_texts(settings),
@@ -154,11 +155,6 @@ def hash_line(digest: str) -> str:
 def setting_texts(settings: Mapping[str, Any] | None) -> dict[str, str]:
     """Return settings as `--set` takes them."""
     return {key: value if isinstance(value, str) else json.dumps(value) for key, value in (settings or {}).items()}
-
-
-def path_from(folder: Path, path: Path) -> str:
-    """Return the path of a file relative to a folder, the same on every machine."""
-    return Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
 
 
 def path_to(folder: Path, relative: str) -> Path:

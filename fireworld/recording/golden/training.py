@@ -13,7 +13,8 @@ import msgspec
 
 from fireworld.errors import LogError, expected
 from fireworld.executors import threads
-from fireworld.recording.golden.spec import SPEC_ATTACHMENT, hash_line, path_from, path_to, setting_texts
+from fireworld.files import name_from
+from fireworld.recording.golden.spec import SPEC_ATTACHMENT, hash_line, path_to, setting_texts
 from fireworld.scenario import scenario_names
 from fireworld.shown import block_text, text_table
 from fireworld.simulation.built import CityCache
@@ -69,7 +70,7 @@ def make_training_spec(
         find_curriculum(curriculum)  # the error names the path as given, not as seen from the folder
     names = [name.strip() for name in stages.split(",")] if isinstance(stages, str) else stages
     return TrainingSpec(
-        curriculum=str(curriculum) if shipped else path_from(folder, Path(curriculum)),
+        curriculum=str(curriculum) if shipped else name_from(Path(curriculum), folder),
         method=method,
         seed=seed,
         stages=None if names is None else tuple(names),

@@ -14,6 +14,7 @@ from fireworld_viewer.rerun_view import app
 from fireworld_viewer.rerun_view.pages import OutcomePage
 from fireworld_viewer.story.steps import check_same_city, select_steps
 
+from fireworld.files import text_of
 from fireworld.recording.difference_text import totals_rows
 from fireworld.recording.inputs import AnyRecording, open_to_show, run_name
 from fireworld.records import Recording
@@ -48,7 +49,7 @@ def view(
             folder = Path(stack.enter_context(TemporaryDirectory(prefix="fireworld-")))
             held = [_with_air(one, folder / f"{k}.mcap", source=names[k]) for k, one in enumerate(held)]
         shown = [select_steps(one, first=first_step, last=last_step, every=every) for one in held]
-        outcome = _outcome([Path(name).name for name in names], shown)
+        outcome = _outcome([text_of(Path(name).name) for name in names], shown)
         write = functools.partial(app.save, shown, focus=focus, outcome=outcome)
         if save is not None:
             write(Path(save), force=force)

@@ -20,6 +20,7 @@ from fireworld_viewer.rerun_view.training_curves import (
 from fireworld_viewer.table_pixels import table_pixels
 
 from fireworld.errors import LogError, expected
+from fireworld.files import text_of
 from fireworld.records import ACTIONS
 from fireworld.training.log.course import TablePicture, opening, table_picture
 from fireworld.training.log.reader import AnyTraining, TrainingLog, opened
@@ -92,7 +93,7 @@ def view_trainings(
         ViewError: there is no Rerun, or no display.
     """
     opened = open_trainings(logs)
-    identity = hashlib.sha256("".join(f"{one.path.name} {one.digest}" for one in opened).encode()).hexdigest()
+    identity = hashlib.sha256("".join(f"{text_of(one.path.name)} {one.digest}" for one in opened).encode()).hexdigest()
     title = f"training-{opened[0].method.name}"
     write = functools.partial(
         app.save_training, functools.partial(_write, opened), identity=identity, title=title, force=force
@@ -126,7 +127,7 @@ def open_trainings(logs: AnyTraining | Sequence[AnyTraining]) -> list[TrainingLo
 
 def names_of(logs: Sequence[TrainingLog]) -> list[str]:
     """Return what to call trainings: the names of their files, and their paths where these are the same."""
-    names = [one.path.name for one in logs]
+    names = [text_of(one.path.name) for one in logs]
     if len(set(names)) == len(names):
         return names
     return [f"{letter}: {one.path}" for letter, one in zip("AB", logs, strict=True)]
