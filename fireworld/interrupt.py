@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -36,9 +37,18 @@ def once_more() -> None:
 def no_more() -> None:
     """Send no Ctrl-C again, and end with an exit code: the program is at its end."""
     _lost.clear()
+    atexit.unregister(_ignore)
+    atexit.register(_ignore)
     # Python ends by a signal of its own after a Ctrl-C that came while it executed text, as dataclasses do, caught or
     # not; to execute a text again makes it forget that.
     exec("")  # noqa: S102
+
+
+def _ignore() -> None:
+    """Let nothing end a program whose work is done, while Python puts itself away."""
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGINT, signal.SIGTERM):  # ignored: what is masked here goes to another thread
+            signal.signal(number, signal.SIG_IGN)
 
 
 def _send() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import os
 import sys
-from typing import Final
+from typing import Final, NoReturn
 
 import click
 
@@ -87,8 +87,8 @@ root.params.append(DEBUG)
 def main() -> None:
     """Run the command line; an error ends in one line and exit code 2, one of fireworld's own too, Ctrl-C in 130."""
     from fireworld.errors import FireworldError, described
-    from fireworld.interrupt import end_like_ctrl_c, no_more, was_interrupted
-    from fireworld.stdout import StandardOutputError, be_patient, leave
+    from fireworld.interrupt import end_like_ctrl_c, was_interrupted
+    from fireworld.stdout import StandardOutputError, be_patient
 
     try:
         end_like_ctrl_c()
@@ -117,8 +117,19 @@ def main() -> None:
             code = INTERRUPTED
         else:
             code = _show(error, f"internal error: {described(error)}; run it again with --debug")
-    no_more()
-    leave()
+    _end(code)
+
+
+def _end(code: int) -> NoReturn:
+    """End the program, whose work is done: a Ctrl-C that comes now is too late."""
+    from fireworld.interrupt import no_more
+    from fireworld.stdout import leave
+
+    try:
+        no_more()
+        leave()
+    except KeyboardInterrupt:
+        leave()
     sys.exit(code)
 
 

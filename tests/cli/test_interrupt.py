@@ -154,3 +154,16 @@ def test_ctrl_c_while_text_is_executed_ends_in_an_exit_code_too(here, last, code
     program = "\n".join(("import sys", "from fireworld.interrupt import no_more", *lines))
     (here / "program.py").write_text(program)
     assert subprocess.run([sys.executable, "-m", "program"], cwd=here, check=False).returncode == code
+
+
+def test_ctrl_c_while_python_ends_changes_no_exit_code(here):
+    lines = (
+        "import atexit, os, signal, sys",
+        "from fireworld.interrupt import no_more",
+        "atexit.register(lambda: [os.kill(os.getpid(), one) for one in (signal.SIGINT, signal.SIGTERM)])",
+        "no_more()",
+        "sys.exit(1)",
+    )
+    (here / "program.py").write_text("\n".join(lines))
+    done = subprocess.run([sys.executable, "-m", "program"], cwd=here, check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (1, "")
