@@ -163,7 +163,7 @@ class Trainer(ABC, Generic[AMethod, AReport]):
         unit: what is reported on, as in "episode".
         uses_workers: whether one training keeps all workers busy.
         topics: record types of what a training log holds of a part, declared with `fireworld.records.column` and
-            `value`; none: trainings of this method cannot be recorded.
+            `value`; the first is in every part. None: trainings of this method cannot be recorded.
         whole: the one of them that holds the whole team, after some parts at least.
         recording: somebody will ask for `records` after each report.
         detailed: these shall also hold what follows from the rest, but shows where a changed rule of learning differs.

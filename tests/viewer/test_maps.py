@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from dataclasses import replace
 from pathlib import Path
 
@@ -255,6 +256,22 @@ def test_what_cannot_be_drawn_is_a_line(monkeypatch):
 
     monkeypatch.setattr(figure, "savefig", fails)
     with pytest.raises(ViewError, match="these values cannot be drawn: RuntimeError: raster overflow"):
+        figure_files.png_bytes(figure)
+
+
+def test_a_ctrl_c_that_becomes_another_error_is_still_one(monkeypatch):
+    from fireworld_viewer.pictures import figure_files
+
+    figure = figure_files.new_figure(1, 1)
+
+    def fails(*_, **__):
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            raise ValueError("Invalid bounding box") from None
+
+    monkeypatch.setattr(figure, "savefig", fails)
+    with pytest.raises(KeyboardInterrupt):
         figure_files.png_bytes(figure)
 
 

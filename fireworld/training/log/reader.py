@@ -120,17 +120,23 @@ class TrainingLog(Shown):
         """Yield the parts: records by type.
 
         Raises:
-            LogError: the log changed since it was opened, or a part holds nothing of its method or does not fit.
+            LogError: the log changed since it was opened, or a part lacks what its method has in each, or does not fit.
         """
         for number, raw in enumerate(self.raw_parts(first), first):
             payloads = dict(raw)
             try:
-                part = {one: decode(one, payloads[one.topic]) for one in self._topics if one.topic in payloads}
-                for record in part.values():
-                    check_places(record, self._n_brigades)
-                yield part
+                yield self._part(payloads)
             except LogError as error:
                 raise LogError(f"{self.path}: part {number}: {error}") from error
+
+    def _part(self, payloads: Mapping[str, memoryview]) -> Part:
+        part = {one: decode(one, payloads[one.topic]) for one in self._topics if one.topic in payloads}
+        always = self._topics[0]
+        if always not in part:
+            raise LogError(f"no {always.topic}, of which the method {self.method.name} has one in every part")
+        for record in part.values():
+            check_places(record, self._n_brigades)
+        return part
 
     def __iter__(self) -> Iterator[Part]:
         return self.parts()
@@ -212,10 +218,7 @@ class TrainingLog(Shown):
     def _index(self) -> tuple[list[Any], list[int]]:
         lines, wholes, whole = [], [], self.trainer().whole
         for number, part in enumerate(self.parts()):
-            record = next(iter(part.values()), None)
-            if record is None:
-                raise LogError(f"{self.path}: part {number}: it holds nothing of the method {self.method.name}")
-            lines.append(without_columns(record))
+            lines.append(without_columns(part[self._topics[0]]))
             if whole in part:
                 wholes.append(number)
         return lines, wholes

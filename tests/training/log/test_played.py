@@ -50,7 +50,7 @@ def log(path):
 
 
 def rewrite(log, path, change):
-    """Write a log again, sealed as if it were true, with something changed: `change(number, record)`."""
+    """Write a log again, sealed as if it were true, changed: `change(number, record)`; None: left out."""
     chain = Chain(log.found.first, TRAINING)
     with StepFile(
         path,
@@ -62,10 +62,12 @@ def rewrite(log, path, change):
         force=True,
     ) as file:
         for number, raw in enumerate(log.raw_parts()):
-            data = encode(change(number, decode(Played, raw[0][1])))
-            chain.add(Played.topic, data)
+            changed = change(number, decode(Played, raw[0][1]))
+            messages = [] if changed is None else [(Played.topic, encode(changed))]
+            for topic, data in messages:
+                chain.add(topic, data)
             commit = chain.seal(PartCommit(step=number, done=False, hash=b""))
-            file.commit(number, [(Played.topic, data), (PartCommit.topic, encode(commit))])
+            file.commit(number, [*messages, (PartCommit.topic, encode(commit))])
     return path
 
 
@@ -340,3 +342,18 @@ def test_a_log_is_not_the_checkpoint_of_a_training(path, tmp_path, curriculum_fi
 
 def test_codes():
     assert (OWN, NOTHING) == (4, 5)
+
+
+def test_a_part_without_an_episode_is_a_line(path, log, tmp_path, fireworld):
+    file = rewrite(log, tmp_path / "b.mcap", lambda number, record: None if number == 2 else record)
+    calls = (["diff", path, file], ["diff", file, path], ["verify", file], ["report", file, "-o", tmp_path / "r.html"])
+    for words in (
+        *calls,
+        ["export", file, "--parquet", tmp_path / "csv"],
+        ["replay", file, "--episode", 0, "-o", tmp_path / "r.mcap"],
+    ):
+        done = fireworld(*words)
+        assert done.code == 2, words
+        assert done.err.endswith("part 2: no /played, of which the method environment has one in every part\n"), (
+            done.err
+        )

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from fireworld.errors import ViewError, described
 from fireworld.files import check_output, written_beside
+from fireworld.interrupt import postponed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -84,13 +85,15 @@ def plain_style() -> Iterator[None]:
 
 @contextmanager
 def drawing() -> Iterator[None]:
-    """Turn what matplotlib raises while it draws, of numbers that no picture can hold, into a line (ViewError)."""
-    try:
-        yield
-    except (ArithmeticError, RuntimeError, ValueError) as error:
-        if isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
-            raise
-        raise ViewError(f"pictures: these values cannot be drawn: {described(error)}") from error
+    """Turn what matplotlib raises while it draws, of numbers that no picture can hold, into a line (ViewError).
+
+    Ctrl-C waits meanwhile: matplotlib's compiled code makes errors of its own of it.
+    """
+    with postponed():
+        try:
+            yield
+        except (ArithmeticError, RuntimeError, ValueError) as error:
+            raise ViewError(f"pictures: these values cannot be drawn: {described(error)}") from error
 
 
 def save_figure(figure: Figure, path: Path, *, force: bool = False) -> None:
