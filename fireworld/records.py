@@ -63,6 +63,13 @@ MATERIALS: Final = ("wood", "steel", "concrete")
 LEVELS: Final = ("low", "medium", "high")
 VOLUMES: Final = ("very-low", "low", "medium", "high", "very-high", "huge")
 SIDES: Final = ("N", "E", "S", "W")
+
+
+def name_of(names: Sequence[str], code: int, what: str = "code") -> str:
+    """Return the name of a recorded code; where only a later version knows it, its number: "code 7"."""
+    return names[code] if 0 <= code < len(names) else f"{what} {code}"
+
+
 DTYPES: Final[Mapping[str, str]] = {
     "double": "<f8",
     "float": "<f4",

@@ -16,7 +16,7 @@ _FLOATS: Final = frozenset({"double", "float"})
 ALWAYS: Final = (Brigades, Buildings, Civilians, CityRecord)
 """Topics whose columns are there in every step, and whose numbers all have names; others have no columns in step 0, and
 later versions may add names."""
-BUILDING: Final = frozenset({"link_building", "refuge_building", "civilian_building", "in_building"})
+BUILDING: Final = frozenset({"link_building", "refuge_building", "civilian_building", "in_building", "target"})
 """Fields that hold indices of buildings, -1 for none."""
 PLACES: Final = frozenset({"x_m", "y_m", "outline_x_m", "outline_y_m", "node_x_m", "node_y_m"})
 PLACE_MAX_M: Final = 1e8

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from fireworld.records import ACTIONS, EVENT_KINDS, Array, CityRecord, Decisions, Draws, Events, StepRecord
+from fireworld.records import ACTIONS, EVENT_KINDS, Array, CityRecord, Decisions, Draws, Events, StepRecord, name_of
 from fireworld_recorder.match import FieldDifference
 from fireworld_recorder.schema import Field
 
@@ -87,7 +87,7 @@ def _event_words(events: Events, index: int) -> str:
     if index >= len(events.kind):
         return "nothing"
     code = int(events.kind[index])
-    kind = EVENT_KINDS[code] if code < len(EVENT_KINDS) else f"event of kind {code}"
+    kind = name_of(EVENT_KINDS, code, "event of kind")
     owner = {"civilian": "civilian", "brigade": "brigade", "tank": "brigade", "refilled": "brigade", "site": "site"}
     return f"{kind} {owner.get(kind.partition('-')[0], 'building')} {_at(events.entity, index)}"
 

@@ -17,7 +17,7 @@ from fireworld.recording.golden.spec import GoldenSpec, hash_line, spec_of
 from fireworld.recording.golden.training import store_training, training_text
 from fireworld.recording.inputs import is_training
 from fireworld.recording.replay import recorded_scenario
-from fireworld.records import EVENT_KINDS, Array, Steps
+from fireworld.records import EVENT_KINDS, Array, Steps, name_of
 from fireworld.scenario import Scenario
 from fireworld.scenario.document import DIRECTIONS
 from fireworld.training.log.reader import TrainingLog, open_training
@@ -136,7 +136,7 @@ def _step_events(kinds: Array, entities: Array) -> str:
     events = zip(kinds.tolist(), entities.tolist(), strict=True)
     parts = []
     for kind, group in groupby(events, key=lambda event: event[0]):
-        name = EVENT_KINDS[kind] if kind < len(EVENT_KINDS) else f"kind {kind}"
+        name = name_of(EVENT_KINDS, kind, "kind")
         parts.append(f"{name} {', '.join(str(entity) for _, entity in group)}")
     return "; ".join(parts)
 

@@ -23,7 +23,7 @@ from fireworld.files import check_output, write_file
 from fireworld.html_page import compared_row, html_credit, html_figure, html_page, html_table, text_cell
 from fireworld.outcome import NOT_RECORDED, QUANTITIES
 from fireworld.recording.inputs import AnyRun, open_one_or_two, run_name
-from fireworld.records import ACTION_NAMES, EVENT_KINDS, Recording, StoredRun
+from fireworld.records import ACTION_NAMES, EVENT_KINDS, Recording, StoredRun, name_of
 from fireworld.version import simulator_version
 
 _STYLE: Final = """
@@ -191,7 +191,7 @@ def _steps_by_kind(log: Recording) -> dict[str, list[int]]:
 
 def _event_kind(kind: int) -> str:
     """Return the name of a kind of events, its number where only a later version knows it."""
-    return EVENT_KINDS[kind] if kind < len(EVENT_KINDS) else f"kind {kind}"
+    return name_of(EVENT_KINDS, kind, "kind")
 
 
 def _events_of_note(log: Recording, name: str) -> Iterator[str]:

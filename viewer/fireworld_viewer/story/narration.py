@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fireworld.records import ACTIONS, EVENT_KINDS, LEVELS, VOLUMES, Recording
+from fireworld.records import ACTIONS, EVENT_KINDS, LEVELS, VOLUMES, Recording, name_of
 from fireworld_viewer import colors
 from fireworld_viewer.story.series import ChoiceTables, action_name, per_brigade
 
@@ -106,7 +106,8 @@ def state_words(observed: Mapping[str, int]) -> str:
     others = [action for name, action in _OTHERS.items() if observed[name] == 1]
     return (
         f"state {observed['state_index']}: free edges {observed['free_edges']}, "
-        f"center {LEVELS[observed['distance_from_center']]}, "
-        f"civilian {LEVELS[observed['distance_from_civilian']]}, volume {VOLUMES[observed['volume']]}, "
+        f"center {name_of(LEVELS, observed['distance_from_center'])}, "
+        f"civilian {name_of(LEVELS, observed['distance_from_civilian'])}, "
+        f"volume {name_of(VOLUMES, observed['volume'])}, "
         f"others {' '.join(others) or 'nothing'}"
     )

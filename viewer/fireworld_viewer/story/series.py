@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fireworld.outcome import QUANTITIES
-from fireworld.records import ACTION_NAMES, ACTIONS, EVENT_KINDS, Array, CityRecord, Recording
+from fireworld.records import ACTION_NAMES, ACTIONS, EVENT_KINDS, Array, CityRecord, Recording, name_of
 
 REWARD_TERMS: Final = ("rewards.water_damaged", "rewards.burning", "rewards.burnt_out", "rewards.civilians")
 
@@ -87,7 +87,7 @@ def existing(buildings: NDArray[Any], city: CityRecord) -> NDArray[Any]:
 
 def action_name(action: int) -> str:
     """Return the name of an action, its number where only a later version knows it."""
-    return ACTION_NAMES[action] if action < len(ACTION_NAMES) else f"action {action}"
+    return name_of(ACTION_NAMES, action, "action")
 
 
 def per_brigade(recording: Recording, name: str, *, missing: float, topic: str = "/decisions") -> NDArray[Any]:
