@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from fireworld.policy.protocol import Observation as Observation
     from fireworld.policy.protocol import Policy as Policy
     from fireworld.policy.teams.network_team import NetworkTeam as NetworkTeam
+    from fireworld.policy.teams.table_team import TableTeam as TableTeam
     from fireworld.policy.teams.team import Team as Team
     from fireworld.policy.teams.team import load_team as load_team
     from fireworld.recording.difference import Difference as Difference
@@ -92,6 +93,7 @@ _ROOMS = {
     "ScenarioCheck": "evaluation.scenario_check",
     "ScenarioChecks": "evaluation.scenario_check",
     "Session": "simulation.session",
+    "TableTeam": "policy.teams.table_team",
     "Team": "policy.teams.team",
     "TrainingLog": "training.log.reader",
     "Verification": "recording.verify",
