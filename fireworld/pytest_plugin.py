@@ -232,9 +232,11 @@ class Recorder:
         """Return what differs, and record the new run where it can be looked at."""
         from fireworld.recording.golden.store import store_recording
 
-        lines = [f"{_shown(result.path)}: the {result.kind} is not the same any more", result.sentence]
-        if result.fresh is not None and result.differs:
-            lines += [f"  {line}".rstrip() for line in result.changes]
+        cause = result.cause if result.differs else None
+        lines = [result.sentence if cause is None else f"{cause.short}; {result.sentence}"]
+        lines.append(f"{_shown(result.path)}: the {result.kind} is not the same any more")
+        if result.fresh is not None and cause is not None:
+            lines += [f"  {line}".rstrip() for line in (*cause.lines, *result.changes)]
             new = self._factory.mktemp("fireworld") / result.path.name
             store_recording(new, result.fresh)
             lines.append(

@@ -10,8 +10,10 @@ from typing import Any
 
 from fireworld_recorder.codec import encode
 
+from fireworld.cause import Cause
 from fireworld.errors import LogError, expected
 from fireworld.shown import SHOWN_MAX, Block, Shown, TextTable
+from fireworld.training.log.cause import training_cause
 from fireworld.training.log.first_difference import FirstDifference, Trained, first_difference
 from fireworld.training.log.played_difference import compare_played
 from fireworld.training.log.reader import AnyTraining, Part, TrainingLog, opened
@@ -25,7 +27,7 @@ class TrainingDifference(Shown):
 
     Attributes:
         names: what they are called.
-        header: what was asked for differently: name, value of A, value of B.
+        cause: what was asked for differently, or computed by another simulator.
         n_parts: episodes or generations compared.
         unit: what a part is.
         digests: of either, of as much as was compared.
@@ -34,7 +36,7 @@ class TrainingDifference(Shown):
     """
 
     names: tuple[str, str]
-    header: Mapping[str, tuple[Any, Any]]
+    cause: Cause
     n_parts: int
     unit: str
     first: FirstDifference | None
@@ -53,19 +55,24 @@ class TrainingDifference(Shown):
             "names": list(self.names),
             "unit": self.unit,
             "n_parts_compared": self.n_parts,
-            "header": {key: list(pair) for key, pair in self.header.items()},
+            "cause": self.cause.to_dict(),
             "first": first,
             "scenarios": [{**_plain(asdict(one)), "verdict": one.verdict} for one in self.spread],
         }
 
     def describe(self, *, limit: int = SHOWN_MAX) -> Iterator[Block]:
-        """Yield the first difference, what was asked for differently, and how it spread."""
-        yield f"the same: {self.n_parts} {self.unit}s" if self.first is None else self.first.sentence
-        for key, (a, b) in self.header.items():
-            yield f"{key}: {b}, was {a}"
+        """Yield what changed, the first difference, and how it spread."""
         if self.first is None:
+            yield f"the same: {self.n_parts} {self.unit}s"
+            yield from self.cause.lines if self.cause.changes else ()
             return
-        if self.first.entries:
+        yield from self.cause.lines
+        yield self.first.sentence
+        yield from self.spread_blocks(limit=limit)
+
+    def spread_blocks(self, *, limit: int = SHOWN_MAX) -> Iterator[Block]:
+        """Yield how the first difference spread: in the tables, and scenario by scenario."""
+        if self.first is not None and self.first.entries:
             yield ""
             yield f"tables after it: {self.first.n_entries} values differ"
             rows = [[f"{t}", f"{s}", action, f"{a:.6g}", f"{b:.6g}"] for t, s, action, a, b in self.first.entries]
@@ -119,7 +126,7 @@ def compare_trainings(
     _check_comparable(a, b, names)
     if a.is_played:
         n, where, scenarios = compare_played(a, b, on_part)
-        return TrainingDifference(names, _header(a, b), n, a.header.unit, where, scenarios)
+        return TrainingDifference(names, training_cause(a, b), n, a.header.unit, where, scenarios)
     first: FirstDifference | None = None
     spread = Spread()
     n_parts = 0
@@ -131,7 +138,7 @@ def compare_trainings(
         n_parts += 1
         on_part()
     found = spread.scenarios([scenario.name for scenario in a.scenarios])
-    return TrainingDifference(names, _header(a, b), n_parts, a.header.unit, first, found)
+    return TrainingDifference(names, training_cause(a, b), n_parts, a.header.unit, first, found)
 
 
 def _messages(part: Part) -> list[bytes]:
@@ -147,23 +154,6 @@ def _check_comparable(a: Trained, b: Trained, names: tuple[str, str]) -> None:
         if one.brigades.n != other.brigades.n:
             wanted = f"{one.brigades.n} in {one.name}, as in {names[0]}"
             raise LogError(expected(names[1], "brigades", wanted, f"{other.brigades.n} in {other.name}"))
-
-
-def _header(a: Trained, b: Trained) -> dict[str, tuple[Any, Any]]:
-    """Return what was asked for differently; of the simulators, where both logs know theirs."""
-    both_know = bool(a.header.simulator_digest and b.header.simulator_digest)
-    values = [
-        {
-            **one.method.as_dict(),
-            "seed": one.header.seed,
-            "curriculum": f"{one.header.curriculum} ({one.header.curriculum_digest[:12]})",
-            "fireworld": one.header.fireworld_version,
-            **({"simulator": one.header.simulator_digest[:12]} if both_know else {}),
-        }
-        for one in (a, b)
-    ]
-    keys = [*dict.fromkeys([*values[0], *values[1]])]
-    return {key: (values[0].get(key), values[1].get(key)) for key in keys if values[0].get(key) != values[1].get(key)}
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
