@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from fireworld.scenario import Scenario
 from fireworld.version import simulator_version
+
+if TYPE_CHECKING:
+    from fireworld.scenario import Scenario
 
 LINES_MAX: Final = 8
 """Changed keys that are listed; of more their number is said."""

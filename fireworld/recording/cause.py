@@ -6,7 +6,6 @@ from typing import Final
 
 from fireworld.cause import SIMULATOR, Cause, cause_of, scenario_changes, simulator_changes
 from fireworld.errors import FireworldError
-from fireworld.recording.replay import recorded_scenario
 from fireworld.records import RunHeader
 
 DIGEST_SHOWN: Final = 12
@@ -36,6 +35,8 @@ def _scenario_changes(a: RunHeader, b: RunHeader) -> list[str]:
     """Compare scenarios key by key, as they were resolved; and the files of their cities."""
     if a.scenario_digest == b.scenario_digest:
         return []
+    from fireworld.recording.replay import recorded_scenario
+
     try:
         changes = scenario_changes(recorded_scenario(a), recorded_scenario(b))
     except FireworldError:  # of an imported log, or with keys that only another version knows
@@ -48,9 +49,7 @@ def _policy_changes(a: RunHeader, b: RunHeader) -> list[str] | None:
         return None
     if a.policy != b.policy or not (a.policy_digest and b.policy_digest):
         return _change(a.policy, b.policy) or None
-    return [
-        f"{a.policy} {line}" for line in _change(*(f"with digest {one.policy_digest[:DIGEST_SHOWN]}" for one in (a, b)))
-    ]
+    return [f"{a.policy}, digest {line}" for line in _change(*(one.policy_digest[:DIGEST_SHOWN] for one in (a, b)))]
 
 
 def _origin(header: RunHeader) -> str:

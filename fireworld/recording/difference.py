@@ -72,6 +72,13 @@ class Difference:
         """How both runs came out, at the last step of each that was compared."""
         return self.found.totals
 
+    @property
+    def header(self) -> Mapping[str, tuple[str | int, str | int]]:
+        """What the runs' headers say differently; no difference by itself."""
+        from fireworld_recorder.header import header_differences
+
+        return header_differences(self.runs[0].header, self.runs[1].header)
+
     @cached_property
     def cause(self) -> Cause:
         """What the runs were made of differently: scenario, policy, seed, simulator; no difference by itself."""
@@ -115,8 +122,9 @@ class Difference:
             "digests": digests,
             "recordings": recordings,
             "cause": self.cause.to_dict(),
+            **plain(self.found),
         }
-        return known | plain(self.found)
+        return known
 
     def junit(self) -> bytes:
         """Return the comparison as JUnit XML, with a test case for each topic."""

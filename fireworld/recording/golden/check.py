@@ -91,10 +91,15 @@ class GoldenResult:
         return ""
 
     @property
+    def headline(self) -> str:
+        """What is wrong, in a line that begins with what changed; empty if nothing is."""
+        return f"{self.cause.short}; {self.sentence}" if self.cause is not None and self.differs else self.sentence
+
+    @property
     def lines(self) -> list[str]:
-        """What is wrong, in lines: what changed, where that is first seen, what else is different."""
+        """What stands below the headline: what changed, and what else is different, line by line."""
         cause = self.cause.lines if self.cause is not None and self.differs else []
-        return [*cause, self.sentence, *self.changes]
+        return [*cause, *self.changes]
 
     @property
     def changes(self) -> list[str]:
@@ -134,6 +139,7 @@ class GoldenResult:
             "scenario": header and header.scenario,
             "policy": header and header.policy,
             "first": run and plain(run.first),
+            "header": plain(run.header) if run else {},
             "totals": run and plain(run.totals),
         }
 
@@ -254,8 +260,7 @@ def goldens_junit(results: Sequence[GoldenResult]) -> bytes:
         case = Element("testcase", {"classname": "golden", "name": clean(result.name), **place})
         if result.result != "same":
             kind = "error" if result.difference is None else "failure"
-            cause = f"{result.cause.short}: " if result.cause is not None and result.differs else ""
-            message = {"message": clean(cause + result.sentence), "type": result.result}
-            SubElement(case, kind, message).text = clean("\n".join(result.lines))
+            fault = SubElement(case, kind, {"message": clean(result.headline), "type": result.result})
+            fault.text = clean("\n".join((result.headline, *result.lines)))
         cases.append(case)
     return report("fireworld golden", "fireworld golden", cases)

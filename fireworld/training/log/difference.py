@@ -27,7 +27,8 @@ class TrainingDifference(Shown):
 
     Attributes:
         names: what they are called.
-        cause: what was asked for differently, or computed by another simulator.
+        header: what was asked for differently: name, value of A, value of B.
+        cause: the same, key by key of the scenarios, in words.
         n_parts: episodes or generations compared.
         unit: what a part is.
         digests: of either, of as much as was compared.
@@ -36,6 +37,7 @@ class TrainingDifference(Shown):
     """
 
     names: tuple[str, str]
+    header: Mapping[str, tuple[Any, Any]]
     cause: Cause
     n_parts: int
     unit: str
@@ -55,6 +57,7 @@ class TrainingDifference(Shown):
             "names": list(self.names),
             "unit": self.unit,
             "n_parts_compared": self.n_parts,
+            "header": {key: list(pair) for key, pair in self.header.items()},
             "cause": self.cause.to_dict(),
             "first": first,
             "scenarios": [{**_plain(asdict(one)), "verdict": one.verdict} for one in self.spread],
@@ -126,7 +129,7 @@ def compare_trainings(
     _check_comparable(a, b, names)
     if a.is_played:
         n, where, scenarios = compare_played(a, b, on_part)
-        return TrainingDifference(names, training_cause(a, b), n, a.header.unit, where, scenarios)
+        return TrainingDifference(names, _header(a, b), training_cause(a, b), n, a.header.unit, where, scenarios)
     first: FirstDifference | None = None
     spread = Spread()
     n_parts = 0
@@ -138,7 +141,7 @@ def compare_trainings(
         n_parts += 1
         on_part()
     found = spread.scenarios([scenario.name for scenario in a.scenarios])
-    return TrainingDifference(names, training_cause(a, b), n_parts, a.header.unit, first, found)
+    return TrainingDifference(names, _header(a, b), training_cause(a, b), n_parts, a.header.unit, first, found)
 
 
 def _messages(part: Part) -> list[bytes]:
@@ -154,6 +157,23 @@ def _check_comparable(a: Trained, b: Trained, names: tuple[str, str]) -> None:
         if one.brigades.n != other.brigades.n:
             wanted = f"{one.brigades.n} in {one.name}, as in {names[0]}"
             raise LogError(expected(names[1], "brigades", wanted, f"{other.brigades.n} in {other.name}"))
+
+
+def _header(a: Trained, b: Trained) -> dict[str, tuple[Any, Any]]:
+    """Return what was asked for differently; of the simulators, where both logs know theirs."""
+    both_know = bool(a.header.simulator_digest and b.header.simulator_digest)
+    values = [
+        {
+            **one.method.as_dict(),
+            "seed": one.header.seed,
+            "curriculum": f"{one.header.curriculum} ({one.header.curriculum_digest[:12]})",
+            "fireworld": one.header.fireworld_version,
+            **({"simulator": one.header.simulator_digest[:12]} if both_know else {}),
+        }
+        for one in (a, b)
+    ]
+    keys = [*dict.fromkeys([*values[0], *values[1]])]
+    return {key: (values[0].get(key), values[1].get(key)) for key in keys if values[0].get(key) != values[1].get(key)}
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
