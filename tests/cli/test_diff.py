@@ -62,7 +62,7 @@ def only_line(done):
     return text.removeprefix("fireworld: ")
 
 
-RANDOM = "changed: policy: random, was easiest; scenario, seed and simulator are the same"
+RANDOM = "changed: policy: random, was easiest; scenario and seed are the same; simulator is not known"
 
 
 def test_the_same_run_is_told_in_a_line(diff, folder):
@@ -232,7 +232,8 @@ def test_the_json_of_two_recordings(diff):
     assert facts["first"]["sentence"].startswith("step 21, choose: brigade 1")
     assert facts["header"] == {"policy": ["easiest", "random"]}
     assert facts["cause"]["changes"] == {"policy": ["random, was easiest"]}
-    assert facts["cause"]["same"] == ["scenario", "seed", "simulator"]
+    assert facts["cause"]["same"] == ["scenario", "seed"]
+    assert facts["cause"]["unknown"] == ["simulator"]
     assert facts["n_steps_differing"] == {"/decisions": 1, "/buildings": 9}
     assert facts["spread"]["n_reached"] == {"building": 9, "brigade": 1, "civilian": 0}
     assert facts["spread"]["rows"][1]["score"] == [4.5, 4.5]

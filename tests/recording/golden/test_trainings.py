@@ -115,7 +115,8 @@ def test_another_default_is_located(kept, golden, other_default, changes, senten
     for part in sentence.split("*"):
         assert part.strip() in first
     (key,) = changes
-    assert f"  changed: method: {key}: {changes[key]}, was {getattr(sarsa.PAPER, key)}; curriculum, seed" in done.out
+    words = [str(value).lower() for value in (changes[key], getattr(sarsa.PAPER, key))]
+    assert f"  changed: method: {key}: {words[0]}, was {words[1]}; curriculum, seed" in done.out
     assert 'If that is meant: fireworld golden update --reason "..."' in done.out
 
 
@@ -226,7 +227,7 @@ def test_a_search(here, golden, monkeypatch):
     monkeypatch.setattr(search, "METHOD", dataclasses.replace(search.METHOD, step=0.5))
     done = golden("check")
     assert done.code == 1
-    assert "quick-search-training-seed-3: generation 0: " in done.out
+    assert "quick-search-training-seed-3: method changed; generation 0: " in done.out
 
 
 def test_stages(here, golden):
