@@ -1,0 +1,164 @@
+// The legend: only what occurs in the runs; a click on a state of buildings outlines those that are in it.
+import { css, mixed } from "./colour.js";
+import { buildingColors, cross, drawBall } from "./map.js";
+
+const SIZE = 20;
+
+export class Legend {
+  constructor(runs, theme, onChoice) {
+    Object.assign(this, { runs, theme, onChoice, kinds: new Set() });
+    this.element = document.getElementById("legend");
+    this.build();
+  }
+
+  build() {
+    const [run] = this.runs;
+    const { look, city } = run;
+    const shades = buildingColors(look);
+    const list = document.createElement("ul");
+    const item = (text, draw, code = null) => {
+      const line = document.createElement("li");
+      const swatch = this.swatch(draw);
+      if (code === null) line.append(swatch, text);
+      else {
+        const button = Object.assign(document.createElement("button"), { type: "button", title: "outline these on the map" });
+        button.setAttribute("aria-pressed", String(this.kinds.has(code)));
+        button.append(swatch, text);
+        button.addEventListener("click", () => this.toggle(code, button));
+        line.append(button);
+      }
+      list.append(line);
+    };
+    for (const code of this.occurring("buildings.fieryness")) {
+      item(look.codes[code]?.[0] ?? `code ${code}`, (pen) => box(pen, (shades[code] ?? shades[0])[0], this.theme), code);
+    }
+    if (this.runs.some((one) => one.column("buildings.temperature"))) item("the hotter, the darker", (pen) => heat(pen, look, this.theme));
+    if (city.refuge_building.length) item("refuge", (pen) => box(pen, css(look.refuge), this.theme, "R"));
+    if (city.hydrant_x_m.length) item("hydrant", (pen) => box(pen, css(look.hydrant), this.theme, "", 8));
+    this.people(item, look);
+    if (this.runs.length > 1) {
+      item("differs in state", (pen) => box(pen, css(this.theme.ground), this.theme, "", 14, [css(look.differs), 3]));
+      item("differs in a number", (pen) => box(pen, css(this.theme.ground), this.theme, "", 14, [css(look.differs), 1.4]));
+    }
+    this.element.replaceChildren(Object.assign(document.createElement("h2"), { textContent: "Legend" }), list);
+  }
+
+  people(item, look) {
+    const activities = this.occurring("brigades.activity");
+    for (const code of activities) {
+      const [name, rgb] = look.activities[code] ?? [`activity ${code}`, look.unknownBrigade];
+      item(`brigade, ${name}`, (pen) => drawBall(pen, SIZE / 2, SIZE / 2, 8, rgb, ""));
+    }
+    if (!activities.length && this.runs[0].nBrigades) item("brigade", (pen) => drawBall(pen, SIZE / 2, SIZE / 2, 8, look.unknownBrigade, ""));
+    if (this.runs.some((run) => run.nBrigades && run.city.brigade_tank_litres.some((full) => full > 0))) {
+      item("its tank", (pen) => tank(pen, look));
+    }
+    if (activities.includes(2)) item("water, to its target", (pen) => jet(pen, look, this.theme));
+    if (activities.includes(1)) item("driving, to its target", (pen) => way(pen, this.theme));
+    for (const health of this.healths()) {
+      item(`civilian, ${["well", "hurt", "dying", "dead"][health]}`, (pen) => person(pen, look, health));
+    }
+  }
+
+  // The codes of a field that occur in any run at any step.
+  occurring(field) {
+    const found = new Set();
+    for (const run of this.runs) for (const code of run.column(field)?.whole ?? []) found.add(code);
+    return [...found].sort((a, b) => a - b);
+  }
+
+  healths() {
+    const found = new Set();
+    for (const run of this.runs) {
+      for (let row = 0; row < run.steps.length; row += 1) {
+        for (let k = 0; k < run.nCivilians; k += 1) found.add(run.health(row, k));
+      }
+    }
+    return [...found].sort();
+  }
+
+  swatch(draw) {
+    const canvas = Object.assign(document.createElement("canvas"), { width: 2 * SIZE, height: 2 * SIZE });
+    canvas.setAttribute("aria-hidden", "true");
+    const pen = canvas.getContext("2d");
+    pen.scale(2, 2);
+    draw(pen);
+    return canvas;
+  }
+
+  toggle(code, button) {
+    if (!this.kinds.delete(code)) this.kinds.add(code);
+    button.setAttribute("aria-pressed", String(this.kinds.has(code)));
+    this.onChoice();
+  }
+}
+
+function box(pen, fill, theme, letter = "", size = 14, [edge, width] = [theme.edge, 1]) {
+  const from = (SIZE - size) / 2;
+  pen.fillStyle = fill;
+  pen.fillRect(from, from, size, size);
+  pen.strokeStyle = edge;
+  pen.lineWidth = width;
+  pen.strokeRect(from, from, size, size);
+  if (!letter) return;
+  pen.font = "bold 11px system-ui, sans-serif";
+  pen.textAlign = "center";
+  pen.textBaseline = "middle";
+  pen.fillStyle = "#000";
+  pen.fillText(letter, SIZE / 2, SIZE / 2 + 0.5);
+}
+
+function heat(pen, look, theme) {
+  [0, 0.17, 0.34].forEach((dark, k) => {
+    pen.fillStyle = css(mixed(look.codes[2][1], [0, 0, 0], dark));
+    pen.fillRect(1 + 6 * k, 3, 6, 14);
+  });
+  pen.strokeStyle = theme.edge;
+  pen.strokeRect(1, 3, 18, 14);
+}
+
+function tank(pen, look) {
+  pen.fillStyle = "#fff";
+  pen.fillRect(7, 1, 6, 18);
+  pen.fillStyle = css(look.water);
+  pen.fillRect(7, 8, 6, 11);
+  pen.strokeStyle = "#000";
+  pen.strokeRect(7, 1, 6, 18);
+}
+
+function jet(pen, look, theme) {
+  for (const [color, width] of [[theme.jetEdge, 5], [css(look.water), 3]]) {
+    pen.strokeStyle = color;
+    pen.lineWidth = width;
+    pen.beginPath();
+    pen.moveTo(2, 16);
+    pen.lineTo(18, 4);
+    pen.stroke();
+  }
+}
+
+function way(pen, theme) {
+  pen.strokeStyle = theme.ink;
+  pen.lineWidth = 1.3;
+  pen.setLineDash([4, 3]);
+  pen.beginPath();
+  pen.moveTo(2, 16);
+  pen.lineTo(18, 4);
+  pen.stroke();
+}
+
+function person(pen, look, health) {
+  const middle = SIZE / 2;
+  pen.beginPath();
+  if (health === 3) cross(pen, middle, middle, 5);
+  else pen.arc(middle, middle, 5, 0, 2 * Math.PI);
+  pen.strokeStyle = health === 3 ? "#fff" : "#000";
+  pen.lineWidth = health === 3 ? 5 : 1.2;
+  pen.stroke();
+  pen.fillStyle = css(look.health[health]);
+  if (health === 3) {
+    pen.strokeStyle = pen.fillStyle;
+    pen.lineWidth = 2.4;
+    pen.stroke();
+  } else pen.fill();
+}

@@ -1,0 +1,167 @@
+// The controls, the cursor, and lanes of marks above it: a lane for each kind of event that occurs.
+import { css, parsed, seenOn } from "./colour.js";
+import { counted } from "./numbers.js";
+import { SPEEDS } from "./player.js";
+
+export const LANE_HEIGHT = 13;
+const THUMB = 8;
+
+export class Timeline {
+  constructor(runs, player, first, theme) {
+    Object.assign(this, { runs, player, first, theme });
+    for (const id of ["first", "back", "play", "next", "last", "speed", "step", "link", "lanes", "cursor", "difference"]) {
+      this[`${id}_`] = document.getElementById(id);
+    }
+    this.lanes = this.countLanes();
+    this.listen();
+    player.onChange(() => this.show());
+  }
+
+  // For each kind of event of each run: how many there are at each place of the cursor.
+  countLanes() {
+    const kinds = [...new Set(this.runs.flatMap((run) => run.happened.map((one) => one.kind)))].sort((a, b) => a - b);
+    return kinds.flatMap((kind) => this.runs.map((run) => ({ kind, run, counts: this.count(run, kind) })))
+      .filter(({ counts }) => counts.size);
+  }
+
+  count(run, kind) {
+    const counts = new Map();
+    for (const one of run.happened) {
+      if (one.kind !== kind) continue;
+      const step = run.steps[one.row];
+      counts.set(step, (counts.get(step) ?? 0) + 1);
+    }
+    return counts;
+  }
+
+  listen() {
+    const { player } = this;
+    const does = {
+      first: () => player.go(0), back: () => player.go(player.place - 1), play: () => player.toggle(),
+      next: () => player.go(player.place + 1), last: () => player.go(player.last),
+      difference: () => player.goToStep(this.first.step),
+    };
+    for (const [id, act] of Object.entries(does)) {
+      this[`${id}_`].addEventListener("click", () => {
+        if (id !== "play") player.pause();
+        act();
+      });
+    }
+    for (const speed of SPEEDS) this.speed_.append(new Option(String(speed), String(speed)));
+    this.speed_.addEventListener("change", () => player.setSpeed(Number(this.speed_.value)));
+    this.cursor_.max = String(player.last);
+    this.cursor_.addEventListener("input", () => {
+      player.pause();
+      player.go(Number(this.cursor_.value));
+    });
+    this.lanes_.addEventListener("click", (event) => this.goTo(event));
+    if (this.first) {
+      this.difference_.hidden = false;
+      this.difference_.textContent = `◆ first difference: step ${this.first.step}`;
+    }
+  }
+
+  // Go to the mark next to a click in the lanes, if one is near.
+  goTo(event) {
+    const left = event.clientX - this.lanes_.getBoundingClientRect().left;
+    if (left < this.label) return;
+    const place = ((left - this.from) / (this.to - this.from)) * this.player.last;
+    const lane = this.lanes[Math.floor((event.clientY - this.lanes_.getBoundingClientRect().top - this.top) / LANE_HEIGHT)];
+    const near = lane ? [...lane.counts.keys()].map((step) => this.placeOf(step)) : [];
+    const best = near.reduce((a, b) => (Math.abs(b - place) < Math.abs(a - place) ? b : a), Infinity);
+    const pixels = (Math.abs(best - place) / Math.max(1, this.player.last)) * (this.to - this.from);
+    this.player.pause();
+    this.player.go(pixels < 12 ? best : place);
+  }
+
+  placeOf(step) {
+    const after = this.player.steps.findIndex((one) => one > step);
+    return after < 0 ? this.player.last : Math.max(0, after - 1);
+  }
+
+  // The steps, rising, in which anything happens in any run.
+  eventPlaces() {
+    return [...new Set(this.lanes.flatMap(({ counts }) => [...counts.keys()].map((step) => this.placeOf(step))))].sort((a, b) => a - b);
+  }
+
+  resize() {
+    const dots = window.devicePixelRatio || 1;
+    const width = this.lanes_.parentElement.clientWidth;
+    this.label = width < 520 ? 96 : 128;
+    this.top = this.first ? 14 : 0;
+    const height = this.top + LANE_HEIGHT * this.lanes.length + 4;
+    this.lanes_.style.height = `${height}px`;
+    Object.assign(this.lanes_, { width: Math.round(width * dots), height: Math.round(height * dots) });
+    this.cursor_.style.marginLeft = `${this.label}px`;
+    this.cursor_.style.width = `${width - this.label}px`;
+    [this.from, this.to] = [this.label + THUMB, width - THUMB];
+    const pen = this.lanes_.getContext("2d");
+    pen.setTransform(dots, 0, 0, dots, 0, 0);
+    this.lanes.forEach((lane, k) => this.drawLane(pen, lane, this.top + k * LANE_HEIGHT));
+    if (this.first) this.drawFirst(pen, height);
+    const said = this.lanes.map(({ kind, run, counts }) => {
+      const n = [...counts.values()].reduce((a, b) => a + b, 0);
+      return `${this.nameOf(run, kind)} ${counted(n, "time")}`;
+    });
+    this.lanes_.setAttribute("aria-label", `Events over the steps: ${said.join(", ") || "none"}`);
+    this.show();
+  }
+
+  nameOf(run, kind) {
+    return `${this.runs.length > 1 ? `${run.letter} ` : ""}${run.eventName(kind)}`;
+  }
+
+  x(place) {
+    return this.from + (place / Math.max(1, this.player.last)) * (this.to - this.from);
+  }
+
+  drawLane(pen, { kind, run, counts }, top) {
+    pen.font = "11px system-ui, sans-serif";
+    pen.fillStyle = this.theme.faint;
+    pen.textAlign = "right";
+    pen.textBaseline = "middle";
+    pen.fillText(this.nameOf(run, kind), this.label - 4, top + LANE_HEIGHT / 2);
+    pen.fillStyle = this.theme.line;
+    pen.fillRect(this.from, top + LANE_HEIGHT - 2, this.to - this.from, 1);
+    pen.fillStyle = css(seenOn(run.eventRgb[kind] ?? [128, 128, 128], this.theme.paper));
+    for (const [step, n] of counts) {
+      const high = Math.min(LANE_HEIGHT - 3, 4 + 2.2 * Math.log2(n));
+      pen.fillRect(this.x(this.placeOf(step)) - 1.25, top + LANE_HEIGHT - 2 - high, 2.5, high);
+    }
+  }
+
+  drawFirst(pen, height) {
+    const x = this.x(this.placeOf(this.first.step));
+    pen.fillStyle = pen.strokeStyle = css(seenOn(this.runs[0].look.differs, this.theme.paper));
+    pen.lineWidth = 1.5;
+    pen.beginPath();
+    pen.moveTo(x, 10);
+    pen.lineTo(x, height);
+    pen.stroke();
+    pen.beginPath();
+    for (const [right, down] of [[0, -5], [5, 0], [0, 5], [-5, 0]]) pen.lineTo(x + right, 6 + down);
+    pen.fill();
+  }
+
+  show() {
+    const { player } = this;
+    this.cursor_.value = String(player.place);
+    this.cursor_.setAttribute("aria-valuetext", `step ${player.step} of ${player.steps.at(-1)}`);
+    this.play_.textContent = player.playing ? "❚❚ Pause" : "▶ Play";
+    this.play_.setAttribute("aria-label", player.playing ? "Pause" : "Play");
+    this.speed_.value = String(player.speed);
+    this.step_.textContent = `step ${player.step} of ${player.steps.at(-1)}`;
+    this.link_.href = `#${player.step}`;
+  }
+}
+
+// The colors of the page as CSS has them, for what is drawn on canvases.
+export function readTheme(name) {
+  const style = getComputedStyle(document.documentElement);
+  const value = (key) => style.getPropertyValue(`--${key}`).trim();
+  return {
+    name, paper: parsed(value("paper")), ground: parsed(value("ground")), inkRgb: parsed(value("ink")),
+    ink: value("ink"), faint: value("faint"), line: value("line"), street: value("street"), edge: value("edge"),
+    casing: value("casing"), jetEdge: value("jet-edge"),
+  };
+}
