@@ -2,6 +2,7 @@
 import { Panel } from "./curves.js";
 import { HISTORIES, nameOf, valuesOf } from "./pick.js";
 
+const HINT = "Click a building, a brigade or a civilian on the map, or give its number.";
 const COLOR_OF = {
   "buildings.temperature": (look) => look.codes[2][1],
   "buildings.water_litres": (look) => look.water,
@@ -16,6 +17,7 @@ export class Chosen {
     const counts = { building: this.city.n, brigade: runs[0].nBrigades, civilian: runs[0].nCivilians };
     this.counts = counts;
     for (const [kind, n] of Object.entries(counts)) if (n) this.kind_.append(new Option(kind, kind));
+    this.hint_.textContent = HINT;
     this.find_.addEventListener("submit", (event) => {
       event.preventDefault();
       this.find(this.kind_.value, Number(this.which_.value));
@@ -31,7 +33,7 @@ export class Chosen {
   choose(thing) {
     this.thing = thing;
     this.panels = [];
-    this.hint_.textContent = thing ? "" : "Click a building, a brigade or a civilian on the map, or give its number.";
+    this.hint_.textContent = thing ? "" : HINT;
     this.values_.replaceChildren();
     if (thing) {
       this.kind_.value = thing.kind;
@@ -54,7 +56,7 @@ export class Chosen {
       const shownRuns = this.runs.filter((run) => run.column(field));
       if (!shownRuns.length) continue;
       const panel = new Panel(label, shownRuns.map((run) => ({
-        label: this.runs.length > 1 ? run.letter : "", rgb: COLOR_OF[field]?.(run.look) ?? null, digits,
+        label: "", letter: this.runs.length > 1 ? run.letter : "", rgb: COLOR_OF[field]?.(run.look) ?? null, digits,
         second: run.index === 1, steps: run.steps, numbers: run.column(field).over(thing.index).map((one) => one * factor),
       })), this.player, this.theme, { height: 96 });
       curves.append(panel.element);
@@ -68,7 +70,7 @@ export class Chosen {
   show(rows) {
     if (!this.thing) return;
     const columns = this.runs.map((run, k) => valuesOf(run, rows[k], this.thing));
-    const lines = columns[0].map(([label], k) => {
+    const lines = columns[0].map(([label]) => {
       const line = document.createElement("tr");
       line.append(Object.assign(document.createElement("th"), { scope: "row", textContent: label }));
       const texts = columns.map((values) => values.find(([one]) => one === label)?.[1] ?? "");
@@ -77,7 +79,6 @@ export class Chosen {
         if (new Set(texts).size > 1) cell.className = "other";
         line.append(cell);
       }
-      void k;
       return line;
     });
     if (this.runs.length > 1) {

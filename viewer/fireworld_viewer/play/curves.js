@@ -5,15 +5,16 @@ import { brief, shown, ticks } from "./numbers.js";
 const ROOM = { left: 46, right: 10, top: 8, bottom: 20 };
 const DASHES = { dotted: [2, 3], second: [7, 4] };
 
-// A panel: curves of the same quantity, each {label, rgb, digits, dotted, second, steps, numbers}.
+// A panel: curves of the same quantity, each {label, letter, rgb, digits, dotted, second, steps, numbers}.
 export class Panel {
   constructor(title, curves, player, theme, { fromZero = true, height = 150 } = {}) {
-    Object.assign(this, { title, curves, player, theme, fromZero, height });
+    Object.assign(this, { title, curves, player, theme, fromZero, height, keys: new Map() });
     this.element = document.createElement("figure");
     this.element.className = "panel";
     const head = document.createElement("figcaption");
     head.append(Object.assign(document.createElement("h3"), { textContent: title }));
-    this.labels = curves.map((curve) => this.label(curve, head));
+    this.labels = curves.map((curve) => this.label(curve));
+    head.append(...this.keys.values());
     this.canvas = document.createElement("canvas");
     this.canvas.setAttribute("role", "img");
     this.canvas.style.height = `${height}px`;
@@ -23,15 +24,17 @@ export class Panel {
     this.canvas.addEventListener("pointermove", (event) => event.buttons && this.goTo(event));
   }
 
-  label(curve, head) {
-    const line = document.createElement("span");
-    line.className = "key";
+  // Add what a curve is called, and where its value is written; curves of one label stand together.
+  label(curve) {
+    if (!this.keys.has(curve.label)) {
+      const key = Object.assign(document.createElement("span"), { className: "key", textContent: curve.label });
+      this.keys.set(curve.label, key);
+    }
     const swatch = document.createElement("canvas");
     Object.assign(swatch, { width: 44, height: 8 });
     swatch.setAttribute("aria-hidden", "true");
     const value = document.createElement("b");
-    line.append(swatch, ` ${curve.label} `, value);
-    head.append(line);
+    this.keys.get(curve.label).append(" ", swatch, curve.letter ? ` ${curve.letter} ` : " ", value);
     return { swatch, value };
   }
 
@@ -162,7 +165,7 @@ export class Panel {
         pen.fill();
       }
       this.labels[k].value.textContent = text;
-      return `${curve.label} ${text}`;
+      return `${curve.letter} ${curve.label} ${text}`.trim();
     });
     this.canvas.setAttribute("aria-label", `${this.title} at step ${this.player.step}: ${said.join(", ")}`);
   }

@@ -109,7 +109,7 @@ function box(pen, fill, theme, letter = "", size = 14, [edge, width] = [theme.ed
 }
 
 function heat(pen, look, theme) {
-  [0, 0.17, 0.34].forEach((dark, k) => {
+  [0, 0.14, 0.28].forEach((dark, k) => {
     pen.fillStyle = css(mixed(look.codes[2][1], [0, 0, 0], dark));
     pen.fillRect(1 + 6 * k, 3, 6, 14);
   });

@@ -12,6 +12,8 @@ import { Timeline, readTheme } from "./timeline.js";
 import { unpack } from "./unpack.js";
 import { View, boxOfEvents, followHands } from "./view.js";
 
+const MEASURED = ["buildings.temperature", "buildings.fuel_share", "buildings.water_litres"];
+
 const byId = (id) => document.getElementById(id);
 
 class Page {
@@ -111,8 +113,8 @@ class Page {
   addPanel({ title, curves, fromZero }) {
     const drawn = curves.flatMap((curve) => this.runs.filter((run) => run.column(`curve.${curve.field}`)).map((run) => {
       const column = run.column(`curve.${curve.field}`);
-      const label = this.alone ? curve.label : `${run.letter} ${curve.label}`;
-      return { ...curve, label, digits: column.digits, second: run.index === 1, steps: run.steps, numbers: column.over() };
+      const letter = this.alone ? "" : run.letter;
+      return { ...curve, letter, digits: column.digits, second: run.index === 1, steps: run.steps, numbers: column.over() };
     }));
     if (!drawn.length) return null;
     const panel = new Panel(title, drawn, this.player, this.theme, { fromZero });
@@ -169,15 +171,25 @@ class Page {
   }
 
   drawMaps() {
-    const differs = this.columns.get("both.differs");
     this.maps.forEach((map, k) => {
       const run = this.runs[k];
       map.draw({
         row: this.rowOf(run), selected: this.chosen.thing, kinds: this.legend.kinds.size ? this.legend.kinds : null,
-        differs: differs && ((building) => differs.at(this.player.place, building)),
+        differs: this.alone ? null : (building) => this.differs(building),
       });
       map.canvas.setAttribute("aria-label", `Map of ${run.title} at ${this.summaryOf(run)}`);
     });
+  }
+
+  // How a building differs between the runs in what is shown of it: 2 in its state, 1 in a number, 0 not at all.
+  differs(building) {
+    const [a, b] = this.runs.map((run) => this.rowOf(run));
+    const other = (name) => {
+      const [one, two] = this.runs.map((run) => run.column(name));
+      return one && two && one.whole[a * one.width + building] !== two.whole[b * two.width + building];
+    };
+    if (other("buildings.fieryness")) return 2;
+    return MEASURED.some(other) ? 1 : 0;
   }
 
   summary() {

@@ -3,7 +3,7 @@ import { css, inkOn, mixed, seenOn } from "./colour.js";
 import { BRIGADE_RADIUS, CIVILIAN_RADIUS, brigadeSpots, civilianSpots } from "./spots.js";
 
 const SHADES = 6;
-const DARKEST = 0.34;
+const DARKEST = 0.28;
 const STREET_M = 4;
 const LENGTHS_M = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000];
 
@@ -29,6 +29,7 @@ export class CityMap {
     const { canvas, view } = this;
     const dots = window.devicePixelRatio || 1;
     const [width, height] = [Math.round(view.width * dots), Math.round(view.height * dots)];
+    if (!width || !height) return; // the page is not laid out
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     this.drawGround(width, height, dots);
     const pen = canvas.getContext("2d");
@@ -127,8 +128,8 @@ export class CityMap {
     edge(sight, theme.edge, Math.max(0.4, Math.min(1, view.scale * 0.3)));
     if (differs) {
       const color = css(seenOn(this.run.look.differs, theme.ground));
-      edge(sight.filter((k) => differs(k) === 1), color, 1.4);
-      const codes = sight.filter((k) => differs(k) === 2);
+      const [numbers, codes] = [1, 2].map((much) => sight.filter((k) => differs(k) === much));
+      edge(numbers, color, 1.4);
       edge(codes, theme.casing, 5);
       edge(codes, color, 3);
     }
@@ -206,7 +207,7 @@ export class CityMap {
   }
 
   drawCivilians(pen, row) {
-    const { run, view, theme } = this;
+    const { run, view } = this;
     civilianSpots(run, row, view).forEach(([left, top], k) => {
       const health = run.health(row, k);
       pen.beginPath();
@@ -222,7 +223,6 @@ export class CityMap {
         pen.stroke();
       } else pen.fill();
     });
-    void theme;
   }
 
   drawBrigades(pen, row) {

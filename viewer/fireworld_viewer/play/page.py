@@ -14,8 +14,6 @@ from html import escape
 from importlib.resources import files
 from typing import Final
 
-import numpy as np
-
 from fireworld.errors import one_line
 from fireworld.records import Recording
 from fireworld_viewer.play.columns import Columns
@@ -32,7 +30,6 @@ FRAME_HEIGHT: Final = 900
 _LEVEL: Final = 9
 _IMPORT: Final = re.compile(r"^import [^;]*;\n", re.MULTILINE)
 _EXPORT: Final = re.compile(r"^export ", re.MULTILINE)
-_COMPARED: Final = ("temperature", "energy", "fuel_share", "water_litres", "fieryness")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,7 +104,7 @@ def _data(
         for index, (recording, name, damage) in enumerate(zip(recordings, names, damages, strict=False))
     ]
     if len(recordings) > 1:
-        _add_differences(columns, *recordings)
+        _add_steps(columns, *recordings)
     words = {
         "look": look(),
         "city": city,
@@ -119,18 +116,10 @@ def _data(
     return zlib.compress(len(text).to_bytes(4, "little") + text + columns.content, _LEVEL)
 
 
-def _add_differences(columns: Columns, first: Recording, second: Recording) -> None:
-    """Add the steps of either run, the row of each run there, and which buildings differ: 1, and 2 in their codes."""
+def _add_steps(columns: Columns, first: Recording, second: Recording) -> None:
+    """Add the steps of either run, and the row of each run with its state there."""
     check_same_city(first.city, second.city)
-    steps, rows_a, rows_b = common_steps(first.steps, second.steps)
-    differs = np.zeros((len(steps), len(first.city.building_id)), dtype=np.int64)
-    for name in _COMPARED:
-        if first.header.lacks(f"buildings.{name}") or second.header.lacks(f"buildings.{name}"):
-            continue
-        a, b = (one.column("/buildings", name) for one in (first, second))
-        if a.shape[1] == b.shape[1] == differs.shape[1]:
-            differs[a[rows_a] != b[rows_b]] = 2 if name == "fieryness" else 1
-    for column, numbers in (("steps", steps), ("rowA", rows_a), ("rowB", rows_b), ("differs", differs)):
+    for column, numbers in zip(("steps", "rowA", "rowB"), common_steps(first.steps, second.steps), strict=True):
         columns.add(f"both.{column}", numbers)
 
 

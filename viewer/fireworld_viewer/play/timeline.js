@@ -3,7 +3,8 @@ import { css, parsed, seenOn } from "./colour.js";
 import { counted } from "./numbers.js";
 import { SPEEDS } from "./player.js";
 
-export const LANE_HEIGHT = 13;
+const LANE = 14;
+const HALF_LANE = 10;
 const THUMB = 8;
 
 export class Timeline {
@@ -20,8 +21,7 @@ export class Timeline {
   // For each kind of event of each run: how many there are at each place of the cursor.
   countLanes() {
     const kinds = [...new Set(this.runs.flatMap((run) => run.happened.map((one) => one.kind)))].sort((a, b) => a - b);
-    return kinds.flatMap((kind) => this.runs.map((run) => ({ kind, run, counts: this.count(run, kind) })))
-      .filter(({ counts }) => counts.size);
+    return kinds.map((kind) => ({ kind, counts: this.runs.map((run) => this.count(run, kind)) }));
   }
 
   count(run, kind) {
@@ -66,8 +66,8 @@ export class Timeline {
     const left = event.clientX - this.lanes_.getBoundingClientRect().left;
     if (left < this.label) return;
     const place = ((left - this.from) / (this.to - this.from)) * this.player.last;
-    const lane = this.lanes[Math.floor((event.clientY - this.lanes_.getBoundingClientRect().top - this.top) / LANE_HEIGHT)];
-    const near = lane ? [...lane.counts.keys()].map((step) => this.placeOf(step)) : [];
+    const lane = this.lanes[Math.floor((event.clientY - this.lanes_.getBoundingClientRect().top - this.top) / this.laneHeight)];
+    const near = lane ? lane.counts.flatMap((counts) => [...counts.keys()].map((step) => this.placeOf(step))) : [];
     const best = near.reduce((a, b) => (Math.abs(b - place) < Math.abs(a - place) ? b : a), Infinity);
     const pixels = (Math.abs(best - place) / Math.max(1, this.player.last)) * (this.to - this.from);
     this.player.pause();
@@ -81,15 +81,16 @@ export class Timeline {
 
   // The steps, rising, in which anything happens in any run.
   eventPlaces() {
-    return [...new Set(this.lanes.flatMap(({ counts }) => [...counts.keys()].map((step) => this.placeOf(step))))].sort((a, b) => a - b);
+    const steps = this.runs.flatMap((run) => run.happened.map((one) => run.steps[one.row]));
+    return [...new Set(steps.map((step) => this.placeOf(step)))].sort((a, b) => a - b);
   }
 
   resize() {
     const dots = window.devicePixelRatio || 1;
-    const width = this.lanes_.parentElement.clientWidth;
+    const width = this.lanes_.clientWidth;
     this.label = width < 520 ? 96 : 128;
-    this.top = this.first ? 14 : 0;
-    const height = this.top + LANE_HEIGHT * this.lanes.length + 4;
+    this.top = this.runs.length > 1 ? 14 : 0;
+    const height = this.top + this.laneHeight * this.lanes.length + 2;
     this.lanes_.style.height = `${height}px`;
     Object.assign(this.lanes_, { width: Math.round(width * dots), height: Math.round(height * dots) });
     this.cursor_.style.marginLeft = `${this.label}px`;
@@ -97,37 +98,47 @@ export class Timeline {
     [this.from, this.to] = [this.label + THUMB, width - THUMB];
     const pen = this.lanes_.getContext("2d");
     pen.setTransform(dots, 0, 0, dots, 0, 0);
-    this.lanes.forEach((lane, k) => this.drawLane(pen, lane, this.top + k * LANE_HEIGHT));
+    this.lanes.forEach((lane, k) => this.drawLane(pen, lane, this.top + k * this.laneHeight));
+    if (this.runs.length > 1) this.write(pen, "A above, B below", 6);
     if (this.first) this.drawFirst(pen, height);
-    const said = this.lanes.map(({ kind, run, counts }) => {
-      const n = [...counts.values()].reduce((a, b) => a + b, 0);
-      return `${this.nameOf(run, kind)} ${counted(n, "time")}`;
+    const said = this.lanes.map(({ kind, counts }) => {
+      const times = counts.map((one) => counted([...one.values()].reduce((a, b) => a + b, 0), "time"));
+      return `${this.runs[0].eventName(kind)} ${times.join(" and ")}`;
     });
     this.lanes_.setAttribute("aria-label", `Events over the steps: ${said.join(", ") || "none"}`);
     this.show();
   }
 
-  nameOf(run, kind) {
-    return `${this.runs.length > 1 ? `${run.letter} ` : ""}${run.eventName(kind)}`;
+  get laneHeight() {
+    return this.runs.length > 1 ? 2 * HALF_LANE : LANE;
   }
 
   x(place) {
     return this.from + (place / Math.max(1, this.player.last)) * (this.to - this.from);
   }
 
-  drawLane(pen, { kind, run, counts }, top) {
+  write(pen, text, middle) {
     pen.font = "11px system-ui, sans-serif";
     pen.fillStyle = this.theme.faint;
     pen.textAlign = "right";
     pen.textBaseline = "middle";
-    pen.fillText(this.nameOf(run, kind), this.label - 4, top + LANE_HEIGHT / 2);
+    pen.fillText(text, this.label - 4, middle);
+  }
+
+  // Marks of one kind of event, the higher the more: of a second run below the line.
+  drawLane(pen, { kind, counts }, top) {
+    const room = this.runs.length > 1 ? HALF_LANE : LANE - 1;
+    this.write(pen, this.runs[0].eventName(kind), top + this.laneHeight / 2);
     pen.fillStyle = this.theme.line;
-    pen.fillRect(this.from, top + LANE_HEIGHT - 2, this.to - this.from, 1);
-    pen.fillStyle = css(seenOn(run.eventRgb[kind] ?? [128, 128, 128], this.theme.paper));
-    for (const [step, n] of counts) {
-      const high = Math.min(LANE_HEIGHT - 3, 4 + 2.2 * Math.log2(n));
-      pen.fillRect(this.x(this.placeOf(step)) - 1.25, top + LANE_HEIGHT - 2 - high, 2.5, high);
-    }
+    pen.fillRect(this.from, top + room, this.to - this.from, 1);
+    const rgb = this.runs.map((run) => run.eventRgb[kind]).find(Boolean) ?? [128, 128, 128];
+    pen.fillStyle = css(seenOn(rgb, this.theme.paper));
+    counts.forEach((one, k) => {
+      for (const [step, n] of one) {
+        const high = Math.min(room - 1, 4 + 2 * Math.log2(n));
+        pen.fillRect(this.x(this.placeOf(step)) - 1.25, k ? top + room + 1 : top + room - high, 2.5, high);
+      }
+    });
   }
 
   drawFirst(pen, height) {
