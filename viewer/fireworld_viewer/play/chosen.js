@@ -44,7 +44,7 @@ export class Chosen {
   }
 
   build(thing) {
-    const head = document.createElement("h3");
+    const head = document.createElement("h2");
     head.textContent = nameOf(thing, this.city);
     const close = Object.assign(document.createElement("button"), { type: "button", textContent: "Close" });
     close.addEventListener("click", () => this.choose(null));
@@ -83,8 +83,9 @@ export class Chosen {
     });
     if (this.runs.length > 1) {
       const head = document.createElement("tr");
-      for (const text of ["", ...this.runs.map((run) => run.letter)]) {
-        head.append(Object.assign(document.createElement("th"), { scope: "col", textContent: text }));
+      head.append(document.createElement("td"));
+      for (const { letter } of this.runs) {
+        head.append(Object.assign(document.createElement("th"), { scope: "col", textContent: letter }));
       }
       lines.unshift(head);
     }

@@ -1,6 +1,6 @@
-// Curves over the steps: drawn once for their size, the cursor over them at each step; a click goes to a step.
+// Curves over the steps: drawn once for their size, with the cursor as a line above; a click goes to a step.
 import { css, seenOn } from "./colour.js";
-import { brief, shown, ticks } from "./numbers.js";
+import { brief, shown, ticks, write } from "./numbers.js";
 
 const ROOM = { left: 46, right: 10, top: 8, bottom: 20 };
 const DASHES = { dotted: [2, 3], second: [7, 4] };
@@ -18,8 +18,10 @@ export class Panel {
     this.canvas = document.createElement("canvas");
     this.canvas.setAttribute("role", "img");
     this.canvas.style.height = `${height}px`;
-    this.element.append(head, this.canvas);
-    this.still = document.createElement("canvas");
+    this.cursor = Object.assign(document.createElement("div"), { className: "cursor" });
+    const plot = Object.assign(document.createElement("div"), { className: "plot" });
+    plot.append(this.canvas, this.cursor);
+    this.element.append(head, plot);
     this.canvas.addEventListener("click", (event) => this.goTo(event));
     this.canvas.addEventListener("pointermove", (event) => event.buttons && this.goTo(event));
   }
@@ -61,14 +63,11 @@ export class Panel {
   // Set the size and draw everything anew.
   resize() {
     const dots = window.devicePixelRatio || 1;
-    this.dots = dots;
     this.width = this.canvas.clientWidth;
     if (!this.width) return;
-    for (const one of [this.canvas, this.still]) {
-      Object.assign(one, { width: Math.round(this.width * dots), height: Math.round(this.height * dots) });
-    }
+    Object.assign(this.canvas, { width: Math.round(this.width * dots), height: Math.round(this.height * dots) });
     this.scale();
-    const pen = this.still.getContext("2d");
+    const pen = this.canvas.getContext("2d");
     pen.setTransform(dots, 0, 0, dots, 0, 0);
     this.drawAxes(pen);
     for (const curve of this.curves) this.drawCurve(pen, curve);
@@ -140,33 +139,17 @@ export class Panel {
     pen.setLineDash([]);
   }
 
-  // Draw the cursor, and write the values there.
+  // Move the cursor, and write the values there.
   draw() {
     if (!this.width) return;
-    const pen = this.canvas.getContext("2d");
-    pen.setTransform(1, 0, 0, 1, 0, 0);
-    pen.clearRect(0, 0, this.canvas.width, this.canvas.height);
-    pen.drawImage(this.still, 0, 0);
-    pen.setTransform(this.dots, 0, 0, this.dots, 0, 0);
-    const x = this.x(this.player.step);
-    pen.strokeStyle = this.theme.ink;
-    pen.lineWidth = 1;
-    pen.beginPath();
-    pen.moveTo(x, ROOM.top);
-    pen.lineTo(x, this.height - ROOM.bottom);
-    pen.stroke();
+    this.cursor.style.transform = `translateX(${this.x(this.player.step)}px)`;
     const said = this.curves.map((curve, k) => {
       const value = valueAt(curve, this.player.step);
       const text = Number.isNaN(value) ? "–" : shown(value, curve.digits);
-      if (!Number.isNaN(value)) {
-        pen.fillStyle = this.color(curve);
-        pen.beginPath();
-        pen.arc(x, this.y(value), 3.2, 0, 2 * Math.PI);
-        pen.fill();
-      }
-      this.labels[k].value.textContent = text;
+      write(this.labels[k].value, text);
       return `${curve.letter} ${curve.label} ${text}`.trim();
     });
+    if (this.player.playing) return;
     this.canvas.setAttribute("aria-label", `${this.title} at step ${this.player.step}: ${said.join(", ")}`);
   }
 }

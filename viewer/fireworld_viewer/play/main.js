@@ -12,7 +12,9 @@ import { Timeline, readTheme } from "./timeline.js";
 import { unpack } from "./unpack.js";
 import { View, boxOfEvents, followHands } from "./view.js";
 
-const MEASURED = ["buildings.temperature", "buildings.fuel_share", "buildings.water_litres"];
+const COMPARED = [
+  ["buildings.temperature", 1], ["buildings.fuel_share", 1], ["buildings.water_litres", 1], ["buildings.fieryness", 2],
+];
 
 const byId = (id) => document.getElementById(id);
 
@@ -171,25 +173,29 @@ class Page {
   }
 
   drawMaps() {
+    const differs = this.alone ? null : this.differences();
     this.maps.forEach((map, k) => {
       const run = this.runs[k];
       map.draw({
         row: this.rowOf(run), selected: this.chosen.thing, kinds: this.legend.kinds.size ? this.legend.kinds : null,
-        differs: this.alone ? null : (building) => this.differs(building),
+        differs,
       });
-      map.canvas.setAttribute("aria-label", `Map of ${run.title} at ${this.summaryOf(run)}`);
+      if (!this.player.playing) map.canvas.setAttribute("aria-label", `Map of ${run.title} at ${this.summaryOf(run)}`);
     });
   }
 
-  // How a building differs between the runs in what is shown of it: 2 in its state, 1 in a number, 0 not at all.
-  differs(building) {
+  // How each building differs between the runs in what is shown of it: 2 in its state, 1 in a number, 0 not at all.
+  differences() {
     const [a, b] = this.runs.map((run) => this.rowOf(run));
-    const other = (name) => {
+    const found = new Uint8Array(this.city.n);
+    for (const [name, much] of COMPARED) {
       const [one, two] = this.runs.map((run) => run.column(name));
-      return one && two && one.whole[a * one.width + building] !== two.whole[b * two.width + building];
-    };
-    if (other("buildings.fieryness")) return 2;
-    return MEASURED.some(other) ? 1 : 0;
+      if (!one || !two) continue;
+      for (let k = 0; k < found.length; k += 1) {
+        if (one.whole[a * one.width + k] !== two.whole[b * two.width + k]) found[k] = much;
+      }
+    }
+    return found;
   }
 
   summary() {
@@ -208,6 +214,7 @@ class Page {
 async function start() {
   try {
     const page = new Page(await unpack(byId("data").textContent));
+    performance.mark("ready");
     document.documentElement.dataset.ready = "yes";
     window.fireworldPage = page;
   } catch (fault) {

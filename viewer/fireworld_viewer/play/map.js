@@ -32,16 +32,17 @@ export class CityMap {
     if (!width || !height) return; // the page is not laid out
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     this.drawGround(width, height, dots);
-    const pen = canvas.getContext("2d");
+    const pen = canvas.getContext("2d", { alpha: false });
     pen.setTransform(1, 0, 0, 1, 0, 0);
     pen.drawImage(this.ground, 0, 0);
     pen.setTransform(dots, 0, 0, dots, 0, 0);
     pen.lineJoin = "round";
     pen.lineCap = "round";
     this.drawBuildings(pen, marks);
-    this.drawWays(pen, marks.row);
+    const spots = brigadeSpots(this.run, marks.row, view);
+    this.drawWays(pen, marks.row, spots);
     this.drawCivilians(pen, marks.row);
-    this.drawBrigades(pen, marks.row);
+    this.drawBrigades(pen, marks.row, spots);
     this.drawSelected(pen, marks);
     this.drawBar(pen);
   }
@@ -85,12 +86,14 @@ export class CityMap {
   // The buildings that can be seen.
   inSight() {
     const { view } = this;
+    if (this.seenAt === view.version) return this.seen;
     const [west, north] = view.toCity(0, 0);
     const [east, south] = view.toCity(view.width, view.height);
     const found = [];
     this.city.boxes.forEach(([w, s, e, n], k) => {
       if (e >= west && w <= east && n >= south && s <= north) found.push(k);
     });
+    Object.assign(this, { seenAt: view.version, seen: found });
     return found;
   }
 
@@ -128,7 +131,7 @@ export class CityMap {
     edge(sight, theme.edge, Math.max(0.4, Math.min(1, view.scale * 0.3)));
     if (differs) {
       const color = css(seenOn(this.run.look.differs, theme.ground));
-      const [numbers, codes] = [1, 2].map((much) => sight.filter((k) => differs(k) === much));
+      const [numbers, codes] = [1, 2].map((much) => sight.filter((k) => differs[k] === much));
       edge(numbers, color, 1.4);
       edge(codes, theme.casing, 5);
       edge(codes, color, 3);
@@ -167,9 +170,8 @@ export class CityMap {
   }
 
   // Jets of water to what is sprayed, dashed lines to where a brigade drives, a ring around each target.
-  drawWays(pen, row) {
+  drawWays(pen, row, spots) {
     const { run, city, view, theme } = this;
-    const spots = brigadeSpots(run, row, view);
     const line = (from, to, color, width, dash = []) => {
       pen.setLineDash(dash);
       pen.strokeStyle = color;
@@ -225,9 +227,9 @@ export class CityMap {
     });
   }
 
-  drawBrigades(pen, row) {
-    const { run, view } = this;
-    brigadeSpots(run, row, view).forEach(([left, top], k) => {
+  drawBrigades(pen, row, spots) {
+    const { run } = this;
+    spots.forEach(([left, top], k) => {
       const rgb = run.activity(row, k)?.[1] ?? run.look.unknownBrigade;
       drawBall(pen, left, top, BRIGADE_RADIUS, rgb, String(k));
       const share = run.tankShare(row, k);

@@ -1,11 +1,19 @@
-// Numbers as text.
+// Numbers as text, and text in its place.
 
 export const NOT_RECORDED = "not recorded";
 
+const FORMATS = [];
+
 export function shown(value, digits = 0) {
   if (value === null || value === undefined || Number.isNaN(value)) return "none";
-  const text = value.toLocaleString("en-US", { minimumFractionDigits: digits, maximumFractionDigits: digits });
+  FORMATS[digits] ??= new Intl.NumberFormat("en-US", { minimumFractionDigits: digits, maximumFractionDigits: digits });
+  const text = FORMATS[digits].format(value);
   return /^-[0.,]*$/.test(text) ? text.slice(1) : text;
+}
+
+// Set the text of an element, if it is another than before: what does not change is not laid out again.
+export function write(element, text) {
+  if (element.textContent !== text) element.textContent = text;
 }
 
 export function counted(n, noun) {

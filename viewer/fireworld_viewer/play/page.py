@@ -19,7 +19,7 @@ from fireworld.records import Recording
 from fireworld_viewer.play.columns import Columns
 from fireworld_viewer.play.look import look
 from fireworld_viewer.play.run_columns import add_city, add_run
-from fireworld_viewer.story.steps import check_same_city, common_steps
+from fireworld_viewer.story.steps import common_steps, steps_of
 
 SCRIPTS: Final = (
     "colour", "numbers", "unpack", "run", "player", "view", "spots", "map", "pick",
@@ -58,6 +58,7 @@ def play_page(
     Raises:
         ViewError: a recording has no steps, or the cities differ.
     """
+    steps_of(recordings)
     titles = [one_line(one.header.title) for one in recordings]
     data = base64.b64encode(_data(recordings, names, damages, first)).decode()
     script, style = program(), _text("play.css")
@@ -118,7 +119,6 @@ def _data(
 
 def _add_steps(columns: Columns, first: Recording, second: Recording) -> None:
     """Add the steps of either run, and the row of each run with its state there."""
-    check_same_city(first.city, second.city)
     for column, numbers in zip(("steps", "rowA", "rowB"), common_steps(first.steps, second.steps), strict=True):
         columns.add(f"both.{column}", numbers)
 

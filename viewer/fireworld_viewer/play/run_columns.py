@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import Any, Final
 
 import numpy as np
@@ -64,7 +65,11 @@ def add_run(columns: Columns, recording: Recording, prefix: str) -> dict[str, An
                 values = numbers.sum(axis=1) if curve.summed else numbers
                 columns.add(f"{prefix}curve.{curve.field}", values, digits=curve.digits)
     columns.add(f"{prefix}steps", recording.steps)
-    return {**_facts(recording), **_add_decisions(columns, recording, prefix), **_add_events(columns, recording, prefix)}
+    return {
+        **_facts(recording),
+        **_add_decisions(columns, recording, prefix),
+        **_add_events(columns, recording, prefix),
+    }
 
 
 def _add_known(columns: Columns, name: str, numbers: NDArray[Any], digits: int) -> None:
@@ -75,17 +80,14 @@ def _add_known(columns: Columns, name: str, numbers: NDArray[Any], digits: int) 
 
 def _facts(recording: Recording) -> dict[str, Any]:
     """Return what identifies a run, and how it came out."""
-    header, last = recording.header, None
-    for last in recording:
-        pass
-    outcome = None if last is None else outcome_of(last, recording.city)
-    facts = [] if outcome is None else [[one.label, one.text(outcome)] for one in QUANTITIES]
+    header, (last,) = recording.header, deque(recording, maxlen=1)
+    outcome = outcome_of(last, recording.city)
     return {
         "scenario": one_line(header.scenario),
         "policy": one_line(header.policy),
         "seed": None if header.lacks("seed") else str(header.seed),
         "title": one_line(header.title),
-        "outcome": facts,
+        "outcome": [[one.label, one.text(outcome)] for one in QUANTITIES],
     }
 
 

@@ -1,6 +1,6 @@
 // What happens in the step: facts, what each brigade does and chose and why, and the events, in words.
 import { css, inkOn } from "./colour.js";
-import { shown } from "./numbers.js";
+import { shown, write } from "./numbers.js";
 
 const EVENTS_SHOWN = 60;
 const FACTS = [
@@ -64,8 +64,8 @@ export class StepWords {
   show(row, step) {
     const { run } = this;
     const last = run.steps.at(-1);
-    this.ended.textContent = step > last ? `ended at step ${last}` : "";
-    for (const { field, digits, value } of this.facts) value.textContent = shown(run.value(`curve.${field}`, row), digits);
+    write(this.ended, step > last ? `ended at step ${last}` : "");
+    for (const { field, digits, value } of this.facts) write(value, shown(run.value(`curve.${field}`, row), digits));
     this.rows?.forEach((one, k) => this.showBrigade(one, row, k));
     this.showEvents(step > last ? [] : run.eventsOf[row]);
   }
@@ -76,13 +76,13 @@ export class StepWords {
     const rgb = activity?.[1] ?? run.look.unknownBrigade;
     ball.style.background = css(rgb);
     ball.style.color = inkOn(rgb);
-    does.textContent = activity ? activity[0] : "";
+    write(does, activity ? activity[0] : "");
     const litres = run.value("brigades.tank_litres", row, k);
-    tank.textContent = Number.isNaN(litres) ? "" : `${shown(litres)} l`;
+    write(tank, Number.isNaN(litres) ? "" : `${shown(litres)} l`);
     const share = run.tankShare(row, k);
     gauge.hidden = Number.isNaN(share);
     fill.style.width = `${100 * (share || 0)}%`;
-    chose.textContent = run.words ? run.choiceWords(row, k) : "";
+    write(chose, run.words ? run.choiceWords(row, k) : "decisions: not recorded");
   }
 
   showEvents(events) {

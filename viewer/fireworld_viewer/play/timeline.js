@@ -1,6 +1,6 @@
 // The controls, the cursor, and lanes of marks above it: a lane for each kind of event that occurs.
 import { css, parsed, seenOn } from "./colour.js";
-import { counted } from "./numbers.js";
+import { counted, write } from "./numbers.js";
 import { SPEEDS } from "./player.js";
 
 const LANE = 14;
@@ -99,7 +99,7 @@ export class Timeline {
     const pen = this.lanes_.getContext("2d");
     pen.setTransform(dots, 0, 0, dots, 0, 0);
     this.lanes.forEach((lane, k) => this.drawLane(pen, lane, this.top + k * this.laneHeight));
-    if (this.runs.length > 1) this.write(pen, "A above, B below", 6);
+    if (this.runs.length > 1) this.write(pen, "A above B", 6);
     if (this.first) this.drawFirst(pen, height);
     const said = this.lanes.map(({ kind, counts }) => {
       const times = counts.map((one) => counted([...one.values()].reduce((a, b) => a + b, 0), "time"));
@@ -158,10 +158,10 @@ export class Timeline {
     const { player } = this;
     this.cursor_.value = String(player.place);
     this.cursor_.setAttribute("aria-valuetext", `step ${player.step} of ${player.steps.at(-1)}`);
-    this.play_.textContent = player.playing ? "❚❚ Pause" : "▶ Play";
+    write(this.play_, player.playing ? "❚❚ Pause" : "▶ Play");
     this.play_.setAttribute("aria-label", player.playing ? "Pause" : "Play");
     this.speed_.value = String(player.speed);
-    this.step_.textContent = `step ${player.step} of ${player.steps.at(-1)}`;
+    write(this.step_, `step ${player.step} of ${player.steps.at(-1)}`);
     this.link_.href = `#${player.step}`;
   }
 }
