@@ -69,7 +69,7 @@ export class CityMap {
     pen.stroke();
   }
 
-  // Add the outline of a building to the path.
+  // Add the outline of a building to a path.
   outline(pen, building) {
     const { city, view } = this;
     const [left, top] = [view.width / 2 - view.x * view.scale, view.height / 2 + view.y * view.scale];
@@ -83,7 +83,7 @@ export class CityMap {
     pen.closePath();
   }
 
-  // The buildings that can be seen.
+  // The buildings that can be seen; `edges` are their outlines. Both are worked out once for a view.
   inSight() {
     const { view } = this;
     if (this.seenAt === view.version) return this.seen;
@@ -93,6 +93,8 @@ export class CityMap {
     this.city.boxes.forEach(([w, s, e, n], k) => {
       if (e >= west && w <= east && n >= south && s <= north) found.push(k);
     });
+    this.edges = new Path2D();
+    for (const building of found) this.outline(this.edges, building);
     Object.assign(this, { seenAt: view.version, seen: found });
     return found;
   }
@@ -128,7 +130,9 @@ export class CityMap {
       for (const building of chosen) this.outline(pen, building);
       pen.stroke();
     };
-    edge(sight, theme.edge, Math.max(0.4, Math.min(1, view.scale * 0.3)));
+    pen.strokeStyle = theme.edge;
+    pen.lineWidth = Math.max(0.4, Math.min(1, view.scale * 0.3));
+    pen.stroke(this.edges);
     if (differs) {
       const color = css(seenOn(this.run.look.differs, theme.ground));
       const [numbers, codes] = [1, 2].map((much) => sight.filter((k) => differs[k] === much));

@@ -113,7 +113,7 @@ def _data(
         "first": first and {"step": first.step, "sentence": one_line(first.sentence)},
         "columns": columns.table,
     }
-    text = json.dumps(words, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+    text = json.dumps(words, separators=(",", ":"), allow_nan=False).encode()
     return zlib.compress(len(text).to_bytes(4, "little") + text + columns.content, _LEVEL)
 
 
