@@ -39,12 +39,14 @@ def test_columns_keep_the_digits_that_are_shown():
     falling = np.array([[5.04, -3.0], [4.96, 1e6], [np.nan, -0.04], [0.0, 7.25]])
     columns.add("falling", falling, digits=1)
     columns.add("whole", np.array([3, 300, -70000], "i4"))
+    columns.add("wide", np.arange(3e6).reshape(3, -1))  # in blocks
     columns.add("none", np.zeros((4, 0)))
     columns.add("huge", np.array([1e300, -np.inf]), digits=3)
-    found = Unpacked({"columns": columns.table}, columns.content)
+    found = Unpacked({"columns": columns.table}, b"".join(columns.parts))
     assert found.column("falling")[:2].tolist() == [[5.0, -3.0], [5.0, 1e6]]
     assert np.isnan(found.column("falling")[2, 0])
     assert found.column("whole").ravel().tolist() == [3, 300, -70000]
+    assert (found.column("wide") == np.arange(3e6).reshape(3, -1)).all()
     assert found.column("none").shape == (4, 0)
     assert found.column("huge")[0, 0] > 1e10, "what no page can show is cut off, not wrapped"
     assert np.isnan(found.column("huge")[1, 0])

@@ -136,9 +136,10 @@ export class CityMap {
     if (differs) {
       const color = css(seenOn(this.run.look.differs, theme.ground));
       const [numbers, codes] = [1, 2].map((much) => sight.filter((k) => differs[k] === much));
-      edge(numbers, color, 1.4);
-      edge(codes, theme.casing, 5);
-      edge(codes, color, 3);
+      const wide = Math.max(0.4, Math.min(1, view.scale / 1.6));
+      edge(numbers, color, 1.4 * wide);
+      edge(codes, theme.casing, 5 * wide);
+      edge(codes, color, 3 * wide);
     }
     if (kinds) {
       const chosen = sight.filter((k) => kinds.has(this.run.code(row, k)));

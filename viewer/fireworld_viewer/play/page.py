@@ -114,7 +114,9 @@ def _data(
         "columns": columns.table,
     }
     text = json.dumps(words, separators=(",", ":"), allow_nan=False).encode()
-    return zlib.compress(len(text).to_bytes(4, "little") + text + columns.content, _LEVEL)
+    packer = zlib.compressobj(_LEVEL)
+    packed = [packer.compress(part) for part in (len(text).to_bytes(4, "little"), text, *columns.parts)]
+    return b"".join([*packed, packer.flush()])
 
 
 def _add_steps(columns: Columns, first: Recording, second: Recording) -> None:

@@ -1,7 +1,7 @@
 // Which step is shown: the one cursor of maps, curves and words; it plays, and it is part of the page's address.
 
 export const SPEEDS = [1, 2, 5, 10, 20, 50];
-const LONG_SECONDS = 25;
+const LONG_SECONDS = 30;
 
 export class Player {
   constructor(steps) {

@@ -6,7 +6,6 @@ from collections import deque
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fireworld.errors import one_line
 from fireworld.outcome import QUANTITIES, outcome_of
@@ -56,8 +55,9 @@ def add_city(columns: Columns, city: CityRecord) -> dict[str, Any]:
 def add_run(columns: Columns, recording: Recording, prefix: str) -> dict[str, Any]:
     """Add the columns of a run, their names below a prefix, and return its words."""
     for name, digits in ENTITY_FIELDS.items():
-        if recorded(recording, name):
-            _add_known(columns, f"{prefix}{name}", series(recording, name), digits)
+        numbers = recording.column(name) if recorded(recording, name) else np.zeros((0, 0))
+        if numbers.shape[1]:  # positions of civilians, say, are in some logs only
+            columns.add(f"{prefix}{name}", numbers, digits=digits)
     for panel in PANELS:
         for curve in panel.curves:
             if recorded(recording, curve.field):
@@ -70,12 +70,6 @@ def add_run(columns: Columns, recording: Recording, prefix: str) -> dict[str, An
         **_add_decisions(columns, recording, prefix),
         **_add_events(columns, recording, prefix),
     }
-
-
-def _add_known(columns: Columns, name: str, numbers: NDArray[Any], digits: int) -> None:
-    """Add a column if it has entries; positions of civilians, say, are in some logs only."""
-    if numbers.shape[1]:
-        columns.add(name, numbers, digits=digits)
 
 
 def _facts(recording: Recording) -> dict[str, Any]:
