@@ -54,8 +54,9 @@ class Columns:
 
 def _whole(numbers: NDArray[Any], digits: int) -> NDArray[np.int64]:
     """Return numbers as whole ones of their last digit; 0 for what is none."""
-    scaled = np.nan_to_num(numbers.astype(np.float64), nan=0.0) * 10**digits
-    return np.rint(np.clip(scaled, -GREATEST, GREATEST)).astype(np.int64)
+    limit = GREATEST / 10**digits
+    near = np.clip(np.nan_to_num(numbers.astype(np.float64), nan=0.0), -limit, limit)
+    return np.rint(near * 10**digits).astype(np.int64)
 
 
 def _planes(whole: NDArray[np.int64]) -> list[bytes]:

@@ -62,9 +62,8 @@ export class Legend {
 
   // The codes of a field that occur in any run at any step.
   occurring(field) {
-    const found = new Set();
-    for (const run of this.runs) for (const code of run.column(field)?.whole ?? []) found.add(code);
-    return [...found].sort((a, b) => a - b);
+    const found = this.runs.flatMap((run) => run.column(field)?.occurring() ?? []);
+    return [...new Set(found)].sort((a, b) => a - b);
   }
 
   healths() {

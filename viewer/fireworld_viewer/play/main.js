@@ -192,7 +192,7 @@ class Page {
       const [one, two] = this.runs.map((run) => run.column(name));
       if (!one || !two) continue;
       for (let k = 0; k < found.length; k += 1) {
-        if (one.whole[a * one.width + k] !== two.whole[b * two.width + k]) found[k] = much;
+        if (one.wholeAt(a, k) !== two.wholeAt(b, k)) found[k] = much;
       }
     }
     return found;

@@ -33,27 +33,31 @@ export class Columns {
   }
 }
 
+// The numbers of each entry, a building say, lie one after another: row by row.
 export class Column {
   constructor([offset, rows, width, planes, digits, none], bytes) {
     Object.assign(this, { rows, width, digits, none, scale: 10 ** digits });
-    this.whole = planes < 4 ? new Int32Array(rows * width) : new Float64Array(rows * width);
     const size = rows * width;
-    for (let entry = 0; entry < width; entry += 1) {
-      let sum = 0;
-      for (let row = 0; row < rows; row += 1) {
-        let folded = 0;
-        for (let plane = planes - 1; plane >= 0; plane -= 1) {
-          folded = folded * 256 + bytes[offset + plane * size + entry * rows + row];
-        }
-        sum += folded % 2 ? -(folded + 1) / 2 : folded / 2;
-        this.whole[row * width + entry] = sum;
-      }
+    this.whole = planes < 4 ? new Int32Array(size) : new Float64Array(size);
+    const [low, high] = [0, 1].map((plane) => bytes.subarray(offset + plane * size, offset + (plane + 1) * size));
+    let sum = 0;
+    for (let k = 0; k < size; k += 1) {
+      if (k % rows === 0) sum = 0;
+      let folded = planes > 1 ? low[k] + 256 * high[k] : low[k];
+      for (let plane = 2; plane < planes; plane += 1) folded += bytes[offset + plane * size + k] * 256 ** plane;
+      if (folded) sum += folded % 2 ? -(folded + 1) / 2 : folded / 2;
+      this.whole[k] = sum;
     }
+  }
+
+  // A number as a whole one of its last digit.
+  wholeAt(row, entry = 0) {
+    return this.whole[entry * this.rows + row];
   }
 
   // A number; NaN where there is none.
   at(row, entry = 0) {
-    const value = this.whole[row * this.width + entry];
+    const value = this.wholeAt(row, entry);
     return value === this.none ? NaN : value / this.scale;
   }
 
@@ -62,8 +66,10 @@ export class Column {
     return Array.from({ length: this.rows }, (_, row) => this.at(row, entry));
   }
 
-  // The numbers of one row.
-  row(row) {
-    return Array.from({ length: this.width }, (_, entry) => this.at(row, entry));
+  // The different whole numbers that there are, rising.
+  occurring() {
+    const found = new Set();
+    for (let k = 0; k < this.whole.length; k += 1) if (k === 0 || this.whole[k] !== this.whole[k - 1]) found.add(this.whole[k]);
+    return [...found].sort((a, b) => a - b);
   }
 }

@@ -120,8 +120,7 @@ export function boxOfEvents(runs, city) {
   };
   const burns = new Set();
   for (const run of runs) {
-    const codes = run.codes;
-    if (codes) codes.whole.forEach((code, k) => code > 0 && burns.add(k % codes.width));
+    run.codes?.whole.forEach((code, k) => code > 0 && burns.add(Math.floor(k / run.codes.rows)));
     for (let row = 0; row < run.steps.length; row += 1) {
       for (let brigade = 0; brigade < run.nBrigades; brigade += 1) {
         const [x, y] = run.brigadeAt(row, brigade);
