@@ -1,6 +1,6 @@
 // The legend: only what occurs in the runs; a click on a state of buildings outlines those that are in it.
-import { css, mixed } from "./colour.js";
-import { buildingColors, cross, drawBall } from "./map.js";
+import { css } from "./colour.js";
+import { cross, drawBall, shadeFill } from "./map.js";
 
 const SIZE = 20;
 
@@ -14,7 +14,6 @@ export class Legend {
   build() {
     const [run] = this.runs;
     const { look, city } = run;
-    const shades = buildingColors(look);
     const list = document.createElement("ul");
     const item = (text, draw, code = null) => {
       const line = document.createElement("li");
@@ -30,9 +29,9 @@ export class Legend {
       list.append(line);
     };
     for (const code of this.occurring("buildings.fieryness")) {
-      item(look.codes[code]?.[0] ?? `code ${code}`, (pen) => box(pen, (shades[code] ?? shades[0])[0], this.theme), code);
+      item(look.codes[code]?.[0] ?? `code ${code}`, (pen) => box(pen, css((look.codes[code] ?? look.codes[0])[1]), this.theme), code);
     }
-    if (this.runs.some((one) => one.column("buildings.temperature"))) item("the hotter, the darker", (pen) => heat(pen, look, this.theme));
+    if (this.runs.some((one) => one.column("buildings.temperature"))) item("the hotter, the darker its middle", (pen) => heat(pen, look, this.theme));
     if (city.refuge_building.length) item("refuge", (pen) => box(pen, css(look.refuge), this.theme, "R"));
     if (city.hydrant_x_m.length) item("hydrant", (pen) => box(pen, css(look.hydrant), this.theme, "", 8));
     this.people(item, look);
@@ -108,12 +107,11 @@ function box(pen, fill, theme, letter = "", size = 14, [edge, width] = [theme.ed
 }
 
 function heat(pen, look, theme) {
-  [0, 0.14, 0.28].forEach((dark, k) => {
-    pen.fillStyle = css(mixed(look.codes[2][1], [0, 0, 0], dark));
-    pen.fillRect(1 + 6 * k, 3, 6, 14);
+  box(pen, css(look.codes[2][1]), theme, "", 16);
+  [1, 3, 5].forEach((shade, k) => {
+    pen.fillStyle = shadeFill(shade);
+    pen.fillRect(4 + 4 * k, 5, 4, 10);
   });
-  pen.strokeStyle = theme.edge;
-  pen.strokeRect(1, 3, 18, 14);
 }
 
 function tank(pen, look) {

@@ -1,25 +1,26 @@
 // The map of a run on a canvas: streets and hydrants are drawn once for a view, the rest at each step.
-import { css, inkOn, mixed, seenOn } from "./colour.js";
+import { css, inkOn, seenOn } from "./colour.js";
 import { BRIGADE_RADIUS, CIVILIAN_RADIUS, brigadeSpots, civilianSpots } from "./spots.js";
 
 const SHADES = 6;
-const DARKEST = 0.28;
+const DARKEST = 0.6;
+const CORE = 0.55;
 const STREET_M = 4;
 const LENGTHS_M = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000];
 
-// Colors of buildings, [code][shade of heat]: the hotter, the darker.
-export function buildingColors(look) {
-  return look.codes.map(([, rgb]) => Array.from({ length: SHADES }, (_, k) => css(mixed(rgb, [0, 0, 0], (DARKEST * k) / (SHADES - 1)))));
-}
-
+// How dark the middle of a building is, by its heat: its edge keeps the color of its code, which every eye can tell.
 export function shadeOf(temperature, look) {
   const share = Math.sqrt(Math.max(0, Math.min(1, temperature / look.heatMax)));
   return Number.isNaN(share) ? 0 : Math.round(share * (SHADES - 1));
 }
 
+export function shadeFill(shade) {
+  return `rgba(0, 0, 0, ${(DARKEST * shade) / (SHADES - 1)})`;
+}
+
 export class CityMap {
   constructor(canvas, run, view, theme) {
-    Object.assign(this, { canvas, run, view, theme, city: run.city, colors: buildingColors(run.look) });
+    Object.assign(this, { canvas, run, view, theme, city: run.city });
     this.ground = document.createElement("canvas");
     this.drawnFor = "";
   }
@@ -69,14 +70,15 @@ export class CityMap {
     pen.stroke();
   }
 
-  // Add the outline of a building to a path.
-  outline(pen, building) {
+  // Add the outline of a building to a path, or its middle: the same, smaller.
+  outline(pen, building, size = 1) {
     const { city, view } = this;
     const [left, top] = [view.width / 2 - view.x * view.scale, view.height / 2 + view.y * view.scale];
+    const [x0, y0] = [city.center_x_m[building] * (1 - size), city.center_y_m[building] * (1 - size)];
     const end = city.outline_ptr[building + 1];
     for (let k = city.outline_ptr[building]; k < end; k += 1) {
-      const x = city.outline_x_m[k] * view.scale + left;
-      const y = top - city.outline_y_m[k] * view.scale;
+      const x = (x0 + city.outline_x_m[k] * size) * view.scale + left;
+      const y = top - (y0 + city.outline_y_m[k] * size) * view.scale;
       if (k === city.outline_ptr[building]) pen.moveTo(x, y);
       else pen.lineTo(x, y);
     }
@@ -100,28 +102,34 @@ export class CityMap {
   }
 
   fill(row, building) {
-    const { run, city, colors, look = run.look } = this;
+    const { run, city } = this;
     const code = run.code(row, building);
-    if (code === 0 && city.refuges.has(building)) return css(look.refuge);
-    const temperature = run.value("buildings.temperature", row, building);
-    return (colors[code] ?? colors[0])[shadeOf(temperature, look)];
+    if (code === 0 && city.refuges.has(building)) return css(run.look.refuge);
+    return css((run.look.codes[code] ?? run.look.codes[0])[1]);
   }
 
-  drawBuildings(pen, { row, kinds, differs }) {
-    const { city, view, theme } = this;
-    const sight = this.inSight();
+  // Fill buildings, those of one color at once.
+  paint(pen, buildings, fillOf, size) {
     const byFill = new Map();
-    for (const building of sight) {
-      const fill = this.fill(row, building);
+    for (const building of buildings) {
+      const fill = fillOf(building);
       if (!byFill.has(fill)) byFill.set(fill, []);
       byFill.get(fill).push(building);
     }
-    for (const [fill, buildings] of byFill) {
+    for (const [fill, those] of byFill) {
       pen.fillStyle = fill;
       pen.beginPath();
-      for (const building of buildings) this.outline(pen, building);
+      for (const building of those) this.outline(pen, building, size);
       pen.fill();
     }
+  }
+
+  drawBuildings(pen, { row, kinds, differs }) {
+    const { run, city, view, theme } = this;
+    const sight = this.inSight();
+    this.paint(pen, sight, (building) => this.fill(row, building));
+    const heat = (building) => shadeOf(run.value("buildings.temperature", row, building), run.look);
+    this.paint(pen, sight.filter((one) => heat(one) > 0), (building) => shadeFill(heat(building)), CORE);
     const edge = (chosen, color, width) => {
       if (!chosen.length) return;
       pen.strokeStyle = color;
@@ -134,7 +142,7 @@ export class CityMap {
     pen.lineWidth = Math.max(0.4, Math.min(1, view.scale * 0.3));
     pen.stroke(this.edges);
     if (differs) {
-      const color = css(seenOn(this.run.look.differs, theme.ground));
+      const color = css(seenOn(run.look.differs, theme.ground));
       const [numbers, codes] = [1, 2].map((much) => sight.filter((k) => differs[k] === much));
       const wide = Math.max(0.4, Math.min(1, view.scale / 1.6));
       edge(numbers, color, 1.4 * wide);
@@ -142,7 +150,7 @@ export class CityMap {
       edge(codes, color, 3 * wide);
     }
     if (kinds) {
-      const chosen = sight.filter((k) => kinds.has(this.run.code(row, k)));
+      const chosen = sight.filter((k) => kinds.has(run.code(row, k)));
       edge(chosen, theme.casing, 4.5);
       edge(chosen, theme.ink, 2);
     }

@@ -126,7 +126,7 @@ def _add_steps(columns: Columns, first: Recording, second: Recording) -> None:
 
 
 def _hash(text: str) -> str:
-    """Return what a browser is told of a text in the page that it may execute or apply: no other is."""
+    """Return how the policy of the page names a text in it that the browser may execute or apply; it does so with no other."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
