@@ -57,7 +57,8 @@ export class Chosen {
       if (!shownRuns.length) continue;
       const panel = new Panel(label, shownRuns.map((run) => ({
         label: "", letter: this.runs.length > 1 ? run.letter : "", rgb: COLOR_OF[field]?.(run.look) ?? null, digits,
-        second: run.index === 1, steps: run.steps, numbers: run.column(field).over(thing.index).map((one) => one * factor),
+        second: run.index === 1, steps: run.steps,
+        numbers: run.column(field).over(thing.index).map((one) => one * factor),
       })), this.player, this.theme, { height: 96 });
       curves.append(panel.element);
       this.panels.push(panel);

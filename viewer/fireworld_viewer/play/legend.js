@@ -1,8 +1,10 @@
 // The legend: only what occurs in the runs; a click on a state of buildings outlines those that are in it.
-import { css } from "./colour.js";
-import { cross, drawBall, shadeFill } from "./map.js";
+import { css, seenOn } from "./colour.js";
+import { HEALTH, drawBall, drawJet, drawPerson, drawTank, drawWay } from "./glyphs.js";
+import { shadeFill } from "./map.js";
 
 const SIZE = 20;
+const LINE = [[2, 16], [18, 4]];
 
 export class Legend {
   constructor(runs, theme, onChoice) {
@@ -20,7 +22,8 @@ export class Legend {
       const swatch = this.swatch(draw);
       if (code === null) line.append(swatch, text);
       else {
-        const button = Object.assign(document.createElement("button"), { type: "button", title: "outline these on the map" });
+        const title = "outline these on the map";
+        const button = Object.assign(document.createElement("button"), { type: "button", title });
         button.setAttribute("aria-pressed", String(this.kinds.has(code)));
         button.append(swatch, text);
         button.addEventListener("click", () => this.toggle(code, button));
@@ -29,15 +32,19 @@ export class Legend {
       list.append(line);
     };
     for (const code of this.occurring("buildings.fieryness")) {
-      item(look.codes[code]?.[0] ?? `code ${code}`, (pen) => box(pen, css((look.codes[code] ?? look.codes[0])[1]), this.theme), code);
+      const [name, rgb] = look.codes[code] ?? [`code ${code}`, look.codes[0][1]];
+      item(name, (pen) => box(pen, css(rgb), this.theme), code);
     }
-    if (this.runs.some((one) => one.column("buildings.temperature"))) item("the hotter, the darker its middle", (pen) => heat(pen, look, this.theme));
+    if (this.runs.some((one) => one.column("buildings.temperature"))) {
+      item("the hotter, the darker its middle", (pen) => heat(pen, look, this.theme));
+    }
     if (city.refuge_building.length) item("refuge", (pen) => box(pen, css(look.refuge), this.theme, "R"));
     if (city.hydrant_x_m.length) item("hydrant", (pen) => box(pen, css(look.hydrant), this.theme, "", 8));
     this.people(item, look);
     if (this.runs.length > 1) {
-      item("differs in state", (pen) => box(pen, css(this.theme.ground), this.theme, "", 14, [css(look.differs), 3]));
-      item("differs in a number", (pen) => box(pen, css(this.theme.ground), this.theme, "", 14, [css(look.differs), 1.4]));
+      const [inside, edge] = [css(this.theme.ground), css(seenOn(look.differs, this.theme.ground))];
+      item("differs in state", (pen) => box(pen, inside, this.theme, "", 14, [edge, 3]));
+      item("differs in a number", (pen) => box(pen, inside, this.theme, "", 14, [edge, 1.4]));
     }
     this.element.replaceChildren(Object.assign(document.createElement("h2"), { textContent: "Legend" }), list);
   }
@@ -48,14 +55,16 @@ export class Legend {
       const [name, rgb] = look.activities[code] ?? [`activity ${code}`, look.unknownBrigade];
       item(`brigade, ${name}`, (pen) => drawBall(pen, SIZE / 2, SIZE / 2, 8, rgb, ""));
     }
-    if (!activities.length && this.runs[0].nBrigades) item("brigade", (pen) => drawBall(pen, SIZE / 2, SIZE / 2, 8, look.unknownBrigade, ""));
-    if (this.runs.some((run) => run.nBrigades && run.city.brigade_tank_litres.some((full) => full > 0))) {
-      item("its tank", (pen) => tank(pen, look));
+    if (!activities.length && this.runs[0].nBrigades) {
+      item("brigade", (pen) => drawBall(pen, SIZE / 2, SIZE / 2, 8, look.unknownBrigade, ""));
     }
-    if (activities.includes(2)) item("water, to its target", (pen) => jet(pen, look, this.theme));
-    if (activities.includes(1)) item("driving, to its target", (pen) => way(pen, this.theme));
+    if (this.runs.some((run) => run.nBrigades && run.city.brigade_tank_litres.some((full) => full > 0))) {
+      item("its tank", (pen) => drawTank(pen, 7, 1, [6, 18], 0.6, look));
+    }
+    if (activities.includes(2)) item("water, to its target", (pen) => drawJet(pen, ...LINE, look, this.theme));
+    if (activities.includes(1)) item("driving, to its target", (pen) => drawWay(pen, ...LINE, this.theme));
     for (const health of this.healths()) {
-      item(`civilian, ${["well", "hurt", "dying", "dead"][health]}`, (pen) => person(pen, look, health));
+      item(`civilian, ${HEALTH[health]}`, (pen) => drawPerson(pen, SIZE / 2, SIZE / 2, look, health));
     }
   }
 
@@ -112,50 +121,4 @@ function heat(pen, look, theme) {
     pen.fillStyle = shadeFill(shade);
     pen.fillRect(4 + 4 * k, 5, 4, 10);
   });
-}
-
-function tank(pen, look) {
-  pen.fillStyle = "#fff";
-  pen.fillRect(7, 1, 6, 18);
-  pen.fillStyle = css(look.water);
-  pen.fillRect(7, 8, 6, 11);
-  pen.strokeStyle = "#000";
-  pen.strokeRect(7, 1, 6, 18);
-}
-
-function jet(pen, look, theme) {
-  for (const [color, width] of [[theme.jetEdge, 5], [css(look.water), 3]]) {
-    pen.strokeStyle = color;
-    pen.lineWidth = width;
-    pen.beginPath();
-    pen.moveTo(2, 16);
-    pen.lineTo(18, 4);
-    pen.stroke();
-  }
-}
-
-function way(pen, theme) {
-  pen.strokeStyle = theme.ink;
-  pen.lineWidth = 1.3;
-  pen.setLineDash([4, 3]);
-  pen.beginPath();
-  pen.moveTo(2, 16);
-  pen.lineTo(18, 4);
-  pen.stroke();
-}
-
-function person(pen, look, health) {
-  const middle = SIZE / 2;
-  pen.beginPath();
-  if (health === 3) cross(pen, middle, middle, 5);
-  else pen.arc(middle, middle, 5, 0, 2 * Math.PI);
-  pen.strokeStyle = health === 3 ? "#fff" : "#000";
-  pen.lineWidth = health === 3 ? 5 : 1.2;
-  pen.stroke();
-  pen.fillStyle = css(look.health[health]);
-  if (health === 3) {
-    pen.strokeStyle = pen.fillStyle;
-    pen.lineWidth = 2.4;
-    pen.stroke();
-  } else pen.fill();
 }

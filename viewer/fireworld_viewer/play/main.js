@@ -49,7 +49,8 @@ class Page {
     if (!this.alone) {
       const { first } = this.words;
       const text = first ? `first difference: ${first.sentence}` : "no difference was found";
-      byId("outcome").append(Object.assign(document.createElement("p"), { textContent: text, className: "difference" }));
+      const line = Object.assign(document.createElement("p"), { textContent: text, className: "difference" });
+      byId("outcome").append(line);
     }
     byId("credit").textContent = this.city.attribution ? `Map: ${this.city.attribution}` : "";
     byId("credit").hidden = !this.city.attribution;
@@ -79,7 +80,8 @@ class Page {
       ["+", "Zoom in", () => this.view.zoom(1.5)], ["−", "Zoom out", () => this.view.zoom(1 / 1.5)],
       ["⤢", "Show all that happens", () => this.view.fit()],
     ]) {
-      const button = Object.assign(document.createElement("button"), { type: "button", textContent: text, title: label });
+      const button = document.createElement("button");
+      Object.assign(button, { type: "button", textContent: text, title: label });
       button.setAttribute("aria-label", label);
       button.addEventListener("click", act);
       buttons.append(button);
@@ -116,7 +118,8 @@ class Page {
     const drawn = curves.flatMap((curve) => this.runs.filter((run) => run.column(`curve.${curve.field}`)).map((run) => {
       const column = run.column(`curve.${curve.field}`);
       const letter = this.alone ? "" : run.letter;
-      return { ...curve, letter, digits: column.digits, second: run.index === 1, steps: run.steps, numbers: column.over() };
+      const { digits } = column;
+      return { ...curve, letter, digits, second: run.index === 1, steps: run.steps, numbers: column.over() };
     }));
     if (!drawn.length) return null;
     const panel = new Panel(title, drawn, this.player, this.theme, { fromZero });
@@ -204,7 +207,9 @@ class Page {
 
   summaryOf(run) {
     const row = this.rowOf(run);
-    const facts = [["score", "score"], ["n_burning", "burning"], ["n_burnt_out", "burnt out"], ["n_civilians_alive", "civilians alive"]];
+    const facts = Object.entries({
+      score: "score", n_burning: "burning", n_burnt_out: "burnt out", n_civilians_alive: "civilians alive",
+    });
     const parts = facts.map(([field, label]) => [run.value(`curve.score.${field}`, row), label])
       .filter(([value]) => !Number.isNaN(value)).map(([value, label]) => `${label} ${value}`);
     return [`step ${this.player.step}`, ...parts].join(", ");

@@ -1,5 +1,6 @@
 // The map of a run on a canvas: streets and hydrants are drawn once for a view, the rest at each step.
 import { css, inkOn, seenOn } from "./colour.js";
+import { drawBall, drawJet, drawPerson, drawTank, drawWay } from "./glyphs.js";
 import { BRIGADE_RADIUS, CIVILIAN_RADIUS, brigadeSpots, civilianSpots } from "./spots.js";
 
 const SHADES = 6;
@@ -185,27 +186,15 @@ export class CityMap {
   // Jets of water to what is sprayed, dashed lines to where a brigade drives, a ring around each target.
   drawWays(pen, row, spots) {
     const { run, city, view, theme } = this;
-    const line = (from, to, color, width, dash = []) => {
-      pen.setLineDash(dash);
-      pen.strokeStyle = color;
-      pen.lineWidth = width;
-      pen.beginPath();
-      pen.moveTo(...from);
-      pen.lineTo(...to);
-      pen.stroke();
-      pen.setLineDash([]);
-    };
     for (let k = 0; k < run.nBrigades; k += 1) {
       const target = run.target(row, k);
       if (target < 0) continue;
       const at = view.toScreen(city.center_x_m[target], city.center_y_m[target]);
       const name = run.activity(row, k)?.[0];
       if (name === "spraying") {
-        line(spots[k], at, theme.jetEdge, 5);
-        line(spots[k], at, css(run.look.water), 3);
+        drawJet(pen, spots[k], at, run.look, theme);
       } else if (name === "driving") {
-        line(spots[k], at, theme.casing, 3);
-        line(spots[k], at, theme.ink, 1.2, [4, 4]);
+        drawWay(pen, spots[k], at, theme);
       } else continue;
       this.ring(pen, at);
     }
@@ -223,21 +212,7 @@ export class CityMap {
 
   drawCivilians(pen, row) {
     const { run, view } = this;
-    civilianSpots(run, row, view).forEach(([left, top], k) => {
-      const health = run.health(row, k);
-      pen.beginPath();
-      if (health === 3) cross(pen, left, top, CIVILIAN_RADIUS);
-      else pen.arc(left, top, CIVILIAN_RADIUS, 0, 2 * Math.PI);
-      pen.strokeStyle = health === 3 ? "#fff" : "#000";
-      pen.lineWidth = health === 3 ? 5 : 1.2;
-      pen.stroke();
-      pen.fillStyle = css(run.look.health[health]);
-      if (health === 3) {
-        pen.strokeStyle = pen.fillStyle;
-        pen.lineWidth = 2.4;
-        pen.stroke();
-      } else pen.fill();
-    });
+    civilianSpots(run, row, view).forEach(([left, top], k) => drawPerson(pen, left, top, run.look, run.health(row, k)));
   }
 
   drawBrigades(pen, row, spots) {
@@ -247,14 +222,7 @@ export class CityMap {
       drawBall(pen, left, top, BRIGADE_RADIUS, rgb, String(k));
       const share = run.tankShare(row, k);
       if (Number.isNaN(share)) return;
-      const [x, y, wide, high] = [left + BRIGADE_RADIUS + 2, top - 9, 5, 18];
-      pen.fillStyle = "#fff";
-      pen.fillRect(x, y, wide, high);
-      pen.fillStyle = css(run.look.water);
-      pen.fillRect(x, y + high * (1 - share), wide, high * share);
-      pen.strokeStyle = "#000";
-      pen.lineWidth = 0.9;
-      pen.strokeRect(x, y, wide, high);
+      drawTank(pen, left + BRIGADE_RADIUS + 2, top - 9, [5, 18], share, run.look);
     });
   }
 
@@ -302,27 +270,4 @@ export class CityMap {
     pen.fillStyle = theme.ink;
     pen.fillText(text, x, y - 8);
   }
-}
-
-export function cross(pen, left, top, size) {
-  pen.moveTo(left - size, top - size);
-  pen.lineTo(left + size, top + size);
-  pen.moveTo(left + size, top - size);
-  pen.lineTo(left - size, top + size);
-}
-
-// A ball with a number in it.
-export function drawBall(pen, left, top, radius, rgb, number) {
-  pen.beginPath();
-  pen.arc(left, top, radius, 0, 2 * Math.PI);
-  pen.fillStyle = css(rgb);
-  pen.fill();
-  pen.strokeStyle = "#000";
-  pen.lineWidth = 1.2;
-  pen.stroke();
-  pen.font = `bold ${number.length > 2 ? 9 : 11}px system-ui, sans-serif`;
-  pen.textAlign = "center";
-  pen.textBaseline = "middle";
-  pen.fillStyle = inkOn(rgb);
-  pen.fillText(number, left, top + 0.5);
 }

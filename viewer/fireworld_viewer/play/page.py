@@ -22,7 +22,7 @@ from fireworld_viewer.play.run_columns import add_city, add_run
 from fireworld_viewer.story.steps import common_steps, steps_of
 
 SCRIPTS: Final = (
-    "colour", "numbers", "unpack", "run", "player", "view", "spots", "map", "pick",
+    "colour", "numbers", "unpack", "run", "player", "view", "spots", "glyphs", "map", "pick",
     "curves", "timeline", "team", "chosen", "legend", "keys", "main",
 )  # fmt: skip
 """The parts of the program, each after those that it uses."""
@@ -126,7 +126,7 @@ def _add_steps(columns: Columns, first: Recording, second: Recording) -> None:
 
 
 def _hash(text: str) -> str:
-    """Return how the policy of the page names a text in it that the browser may execute or apply; it does so with no other."""
+    """Return how the policy of the page names a text that the browser may execute or apply; it may no other."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 

@@ -1,4 +1,5 @@
 // What lies at a place of a map, and its values as words.
+import { HEALTH } from "./glyphs.js";
 import { NOT_RECORDED, shown } from "./numbers.js";
 import { BRIGADE_RADIUS, CIVILIAN_RADIUS, brigadeSpots, civilianSpots } from "./spots.js";
 
@@ -78,7 +79,7 @@ function ofCivilian(run, row, index) {
   const building = city.civilian_building[index];
   const buried = run.value("civilians.buriedness", row, index);
   return [
-    ["is", ["well", "hurt", "dying", "dead"][run.health(row, index)]],
+    ["is", HEALTH[run.health(row, index)]],
     ...measured(run, row, "civilian", index),
     ["at the start", shown(city.civilian_hp[index])],
     ...(Number.isNaN(buried) ? [] : [["buried", shown(buried)]]),

@@ -13,7 +13,8 @@ function sideBySide(places, [wide, high]) {
   for (const [left, top] of places) {
     let at = [left, top];
     for (let tries = 0; tries < 4 * places.length; tries += 1) {
-      const covers = placed.filter((one) => Math.abs(one[0] - at[0]) < wide - 0.1 && Math.abs(one[1] - at[1]) < high - 0.1);
+      const [x, y] = at;
+      const covers = placed.filter((one) => Math.abs(one[0] - x) < wide - 0.1 && Math.abs(one[1] - y) < high - 0.1);
       if (!covers.length) break;
       at = [Math.max(...covers.map((one) => one[0])) + wide, at[1]];
       if (at[0] > left + (ABREAST - 0.5) * wide) at = [left, at[1] + high];

@@ -10,9 +10,9 @@ const THUMB = 8;
 export class Timeline {
   constructor(runs, player, first, theme) {
     Object.assign(this, { runs, player, first, theme });
-    for (const id of ["first", "back", "play", "next", "last", "speed", "step", "link", "lanes", "cursor", "difference"]) {
-      this[`${id}_`] = document.getElementById(id);
-    }
+    for (const id of [
+      "first", "back", "play", "next", "last", "speed", "step", "link", "lanes", "cursor", "difference",
+    ]) this[`${id}_`] = document.getElementById(id);
     this.lanes = this.countLanes();
     this.listen();
     player.onChange(() => this.show());
@@ -63,10 +63,11 @@ export class Timeline {
 
   // Go to the mark next to a click in the lanes, if one is near.
   goTo(event) {
-    const left = event.clientX - this.lanes_.getBoundingClientRect().left;
+    const box = this.lanes_.getBoundingClientRect();
+    const [left, top] = [event.clientX - box.left, event.clientY - box.top];
     if (left < this.label) return;
     const place = ((left - this.from) / (this.to - this.from)) * this.player.last;
-    const lane = this.lanes[Math.floor((event.clientY - this.lanes_.getBoundingClientRect().top - this.top) / this.laneHeight)];
+    const lane = this.lanes[Math.floor((top - this.top) / this.laneHeight)];
     const near = lane ? lane.counts.flatMap((counts) => [...counts.keys()].map((step) => this.placeOf(step))) : [];
     const best = near.reduce((a, b) => (Math.abs(b - place) < Math.abs(a - place) ? b : a), Infinity);
     const pixels = (Math.abs(best - place) / Math.max(1, this.player.last)) * (this.to - this.from);

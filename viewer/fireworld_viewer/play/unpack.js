@@ -2,7 +2,7 @@
 
 export async function unpack(base64) {
   if (typeof DecompressionStream === "undefined") {
-    throw new Error("This browser is too old to unpack the run: it has no DecompressionStream. Any of 2023 or later has.");
+    throw new Error("This browser is too old to unpack the run; any of 2023 or later can.");
   }
   const text = atob(base64);
   const packed = new Uint8Array(text.length);
@@ -69,7 +69,8 @@ export class Column {
   // The different whole numbers that there are, rising.
   occurring() {
     const found = new Set();
-    for (let k = 0; k < this.whole.length; k += 1) if (k === 0 || this.whole[k] !== this.whole[k - 1]) found.add(this.whole[k]);
+    const { whole } = this;
+    for (let k = 0; k < whole.length; k += 1) if (k === 0 || whole[k] !== whole[k - 1]) found.add(whole[k]);
     return [...found].sort((a, b) => a - b);
   }
 }
