@@ -41,6 +41,7 @@ export class Chosen {
       this.build(thing);
     }
     this.onChoice();
+    if (thing) this.values_.scrollIntoView({ block: "nearest" });
   }
 
   build(thing) {
