@@ -41,7 +41,7 @@ export class Chosen {
       this.build(thing);
     }
     this.onChoice();
-    if (thing) this.values_.scrollIntoView({ block: "nearest" });
+    if (thing) this.table.scrollIntoView({ block: "nearest" });
   }
 
   build(thing) {
