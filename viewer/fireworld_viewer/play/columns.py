@@ -56,7 +56,8 @@ def _whole(numbers: NDArray[Any], digits: int) -> NDArray[np.int64]:
     """Return numbers as whole ones of their last digit; 0 for what is none."""
     limit = GREATEST / 10**digits
     near = np.clip(np.nan_to_num(numbers.astype(np.float64), nan=0.0), -limit, limit)
-    return np.rint(near * 10**digits).astype(np.int64)
+    whole: NDArray[np.int64] = np.rint(near * 10**digits).astype(np.int64)
+    return whole
 
 
 def _planes(whole: NDArray[np.int64]) -> list[bytes]:
