@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from fireworld.recording.fork import fork as fork
     from fireworld.recording.official_log.imported import Imported as Imported
     from fireworld.recording.official_log.importer import import_log as import_log
+    from fireworld.recording.pages.play import play as play
     from fireworld.recording.record import run as run
     from fireworld.recording.run import Run as Run
     from fireworld.recording.run import open_log as open_log
@@ -115,6 +116,7 @@ _ROOMS = {
     "open_episode": "recording.episode",
     "open_log": "recording.run",
     "open_training": "training.log.reader",
+    "play": "recording.pages.play",
     "policies": "policy.names",
     "recover": "recording.export",
     "replay_episode": "training.log.replay",

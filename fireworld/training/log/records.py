@@ -256,6 +256,8 @@ def _fits(tried: Tried) -> bool:
     n_weights = len(tried.mean)
     if not n_weights or n_weights != len(tried.spread) or len(tried.weights) % n_weights:
         return False
+    if len(tried.seed) != len(tried.fire):
+        return False
     return len(tried.weights) // n_weights * len(tried.fire) == len(tried.scores)
 
 
