@@ -41,6 +41,22 @@ def print_table(
     Console(highlight=False, markup=False).print(table)
 
 
+def print_lines(lines: Iterable[str]) -> None:
+    """Print lines, broken between words where the terminal ends; what continues a line stands further in."""
+    import shutil
+    import textwrap
+
+    import click
+
+    width = max(shutil.get_terminal_size().columns, 40)
+    for line in lines:
+        further = " " * (len(line) - len(line.lstrip()) + 2)
+        parts = textwrap.wrap(
+            line, width, subsequent_indent=further, break_long_words=False, break_on_hyphens=False
+        ) if len(line) > width else [line.rstrip()]  # fmt: skip
+        click.echo("\n".join(parts))
+
+
 def print_blocks(blocks: Iterable[Block]) -> None:
     """Print what an object shows of itself: lines and tables."""
     import click
