@@ -4,42 +4,51 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 from urllib.parse import quote
 
-from fireworld.findings import VERDICTS, Finding
+from fireworld.findings import VERDICTS, Finding, Verdict
 
 SHOWN: Final = 20
 """Findings that are shown in full; of more the headline."""
 LINES_SHOWN: Final = 12
 """Lines on what changed; of more their number."""
-_WORDS: Final = {"same": "the same", "different": "different", "cannot": "cannot tell"}
+WORDS: Final[Mapping[Verdict, str]] = {"same": "the same", "different": "different", "cannot": "could not be checked"}
 _SPECIAL: Final = re.compile(r"([\\`*_{}\[\]<>#|~&$])")
 
 
-def markdown_page(title: str, findings: Sequence[Finding], *, beside: Path | None = None) -> str:
-    """Write findings as Markdown; those that are not the same come one by one, with the worst first.
+def markdown_page(
+    title: str, findings: Sequence[Finding], *, beside: Path | None = None, words: Mapping[Verdict, str] = WORDS
+) -> str:
+    """Write findings as Markdown, the worst first; of what is the same only what has a table to show.
 
     Args:
         title: what was checked.
         findings: what was found.
         beside: the folder of the file, from which links and pictures are named; None: the current one.
+        words: for the verdicts.
     """
-    bad = [one for verdict in VERDICTS[:-1] for one in findings if one.verdict == verdict]
-    counts = [(sum(one.verdict == verdict for one in findings), _WORDS[verdict]) for verdict in VERDICTS]
-    told = ", ".join(f"{n} {words}" for n, words in counts if n)
+    ordered = [one for verdict in VERDICTS for one in findings if one.verdict == verdict]
+    shown = [one for one in ordered if one.verdict != "same" or one.rows]
+    counts = [(sum(one.verdict == verdict for one in findings), words[verdict]) for verdict in VERDICTS]
+    told = ", ".join(f"{n} {word}" for n, word in counts if n)
     parts = [f"## {escaped(title)}: {told or 'nothing was checked'}"]
-    for one in bad[:SHOWN]:
+    for one in shown[:SHOWN]:
         parts += _section(one, beside or Path())
-    parts += [f"- {escaped(one.name)}: {escaped(one.headline)}" for one in bad[SHOWN:]]
+    parts += [f"- {escaped(one.name)}: {escaped(one.headline)}" for one in shown[SHOWN:]]
     return "\n\n".join(parts) + "\n"
 
 
 def escaped(text: str) -> str:
     """Return text that Markdown shows as it is, on one line, and in which nobody is mentioned."""
     return _SPECIAL.sub(r"\\\1", " ".join(text.split())).replace("@", "&#64;")
+
+
+def files_beside(page: Path) -> Path:
+    """Return the folder of the pictures and pages that a Markdown file shows."""
+    return page.with_name(f"{page.stem}-files")
 
 
 def _section(finding: Finding, beside: Path) -> Iterator[str]:

@@ -89,14 +89,14 @@ def _tell(terminalreporter: pytest.TerminalReporter, found: Sequence[Mapping[str
     if not (summary or annotate):
         return
     from fireworld.annotations import annotation_lines
-    from fireworld.files import write_file
+    from fireworld.files import make_folder, write_file
     from fireworld.findings import Finding
     from fireworld.markdown import markdown_page
 
     findings = [Finding(**one) for one in found]
     if summary:
         path = Path(summary)
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         write_file(path, markdown_page("recordings of tests", findings, beside=path.parent))
     if annotate:
         for line in annotation_lines(findings):
@@ -334,7 +334,9 @@ def _keep_folder(request: pytest.FixtureRequest) -> Path | None:
     keep, summary = request.config.getoption(KEEP), request.config.getoption(SUMMARY)
     if not keep and not summary:
         return None
-    base = Path(keep) if keep else Path(summary).with_name(f"{Path(summary).stem}-files")
+    from fireworld.markdown import files_beside
+
+    base = Path(keep) if keep else files_beside(Path(summary))
     root = request.config.rootpath
     below = request.path.parent.relative_to(root) if request.path.is_relative_to(root) else Path()
     start: Path = request.config.invocation_params.dir

@@ -15,7 +15,7 @@ from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.options import seed_option, steps_option
 from fireworld.cli.progress import BAR, COUNT, DESCRIPTION, LEFT, bar
 from fireworld.cli.tables import print_lines, print_table
-from fireworld.cli.telling import check_telling, files_beside, tell, telling_options
+from fireworld.cli.telling import check_telling, print_annotations, telling_options
 from fireworld.errors import one_line
 
 if TYPE_CHECKING:
@@ -91,6 +91,7 @@ def check(
     check_telling(annotate=annotate, as_json=as_json)
     announce_compilation()
     from fireworld.files import check_outputs, write_file
+    from fireworld.markdown import files_beside, markdown_page
     from fireworld.recording.golden.check import check_goldens, goldens_junit
     from fireworld.recording.golden.find import find_goldens
 
@@ -105,11 +106,15 @@ def check(
         results = [replace(result, fresh=None) for result in checks]  # of many long runs not all are held at a time
     if junit is not None:
         write_file(junit, goldens_junit(results))
+    if summary is not None:
+        findings = [result.finding() for result in results]
+        write_file(summary, markdown_page("golden check", findings, beside=summary.parent))
     if as_json:
         click.echo(json.dumps([result.to_dict() for result in results], indent=2))
     else:
         _show(results)
-    tell([result.finding() for result in results], "golden check", summary=summary, annotate=annotate)
+    if annotate:
+        print_annotations([result.finding() for result in results])
     context.exit(max(EXIT_CODES[result.result] for result in results))
 
 

@@ -32,35 +32,14 @@ def check_telling(*, annotate: str | None, as_json: bool) -> None:
         raise click.UsageError("--annotate and --json exclude each other.")
 
 
-def tell(
-    findings: Sequence[Finding],
-    title: str,
-    *,
-    summary: Path | None,
-    annotate: str | None,
-    cannot: str = "error",
-) -> None:
-    """Write the summary and print the annotations, if they were asked for.
+def print_annotations(findings: Sequence[Finding], *, cannot: str = "error") -> None:
+    """Print annotations, if there is something to say.
 
     Args:
         findings: what was found.
-        title: of the summary.
-        summary: the file; whether it may be written has been checked.
-        annotate: for which server, or None.
         cannot: level of annotations of what cannot be told.
     """
-    if summary is not None:
-        from fireworld.files import write_file
-        from fireworld.markdown import markdown_page
+    from fireworld.annotations import annotation_lines
 
-        write_file(summary, markdown_page(title, findings, beside=summary.parent))
-    if annotate:
-        from fireworld.annotations import annotation_lines
-
-        for line in annotation_lines(findings, cannot=cannot):
-            click.echo(line)
-
-
-def files_beside(summary: Path) -> Path:
-    """Return the folder of a summary's pictures and pages."""
-    return summary.with_name(f"{summary.stem}-files")
+    for line in annotation_lines(findings, cannot=cannot):
+        click.echo(line)

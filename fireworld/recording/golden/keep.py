@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from fireworld_recorder.reader import open_log
 
 from fireworld.errors import ViewError
-from fireworld.files import write_file
+from fireworld.files import make_folder, write_file
 from fireworld.recording.difference import diff
-from fireworld.recording.golden.store import is_digest, make_folder, recording_path, store_recording
+from fireworld.recording.golden.store import is_digest, recording_path, store_recording
 from fireworld.recording.pages.pictures import map_png, render_picture
 from fireworld.recording.pages.play import play
 from fireworld.recording.run import Run

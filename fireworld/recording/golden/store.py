@@ -8,7 +8,7 @@ from typing import Final
 from fireworld_recorder.reader import open_log
 from fireworld_recorder.writer import LogWriter
 
-from fireworld.errors import LogError, OutputError, expected
+from fireworld.errors import LogError, expected
 from fireworld.files import read_text_file, write_file
 from fireworld.recording.golden.digest import DIGEST_SUFFIX, write_digest
 from fireworld.recording.golden.text import golden_text
@@ -96,11 +96,3 @@ def store_text(path: Path) -> bool:
         return False
     write_file(beside, content)
     return True
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder, if it is not there (OutputError)."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be made: {error.strerror or error}") from None

@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 import msgspec
 
 from fireworld.errors import FireworldError, LogError, OutputError, expected
-from fireworld.files import read_text_file, write_file
+from fireworld.files import make_folder, read_text_file, write_file
 from fireworld.interrupt import gentle_interrupt
 from fireworld.recording.golden.again import run_again
 from fireworld.recording.golden.check import GoldenResult, check_goldens, compare_golden
@@ -21,7 +21,6 @@ from fireworld.recording.golden.store import (
     SUFFIX,
     digest_path,
     is_digest,
-    make_folder,
     recording_path,
     store_golden,
     store_text,

@@ -425,7 +425,7 @@ def test_keep_summary_and_annotations(project, words):
     assert {path.name for path in (new / "inner").iterdir()} == {f"test_inner-test_policy{end}" for end in ends}
     summary = (new / "summary.md").read_text()
     assert summary.startswith(
-        "## recordings of tests: 1 cannot tell, 2 different\n\n### test\\_broken.py::test\\_broken\n"
+        "## recordings of tests: 1 could not be checked, 2 different\n\n### test\\_broken.py::test\\_broken\n"
     )
     assert "**changed: policy: mine:Policy, digest " in summary
     assert "](inner/test_inner-test_policy.html)" in summary
