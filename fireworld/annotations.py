@@ -18,7 +18,7 @@ def annotation_lines(findings: Iterable[Finding], *, cannot: str = "error") -> l
 
     Args:
         findings: what was found.
-        cannot: level of what can be told neither way: error, warning or notice.
+        cannot: level of what is neither the same nor different: error, warning or notice.
     """
     levels = {"different": "error", "cannot": cannot}
     return [_command(one, levels[one.verdict]) for one in findings if one.verdict != "same"]

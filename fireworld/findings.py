@@ -1,4 +1,4 @@
-"""What a check found, in the form in which it is told to people on a CI server: in Markdown and as annotations."""
+"""What a check found, as CI servers show it: in Markdown and as annotations."""
 
 from __future__ import annotations
 

@@ -33,8 +33,8 @@ def markdown_page(
     ordered = [one for verdict in VERDICTS for one in findings if one.verdict == verdict]
     shown = [one for one in ordered if one.verdict != "same" or one.rows]
     counts = [(sum(one.verdict == verdict for one in findings), words[verdict]) for verdict in VERDICTS]
-    told = ", ".join(f"{n} {word}" for n, word in counts if n)
-    parts = [f"## {escaped(title)}: {told or 'nothing was checked'}"]
+    counted = ", ".join(f"{n} {word}" for n, word in counts if n)
+    parts = [f"## {escaped(title)}: {counted or 'nothing was checked'}"]
     for one in shown[:SHOWN]:
         parts += _section(one, beside or Path())
     parts += [f"- {escaped(one.name)}: {escaped(one.headline)}" for one in shown[SHOWN:]]

@@ -14,7 +14,7 @@ from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.installed import check_matplotlib
 from fireworld.cli.options import SEED_MAX
 from fireworld.cli.progress import BAR, COUNT, DESCRIPTION, LEFT, bars
-from fireworld.cli.telling import check_telling, print_annotations, telling_options
+from fireworld.cli.reporting import check_reporting, print_annotations, reporting_options
 from fireworld.outcome import METRICS
 
 TESTS: Final = "test-1,test-2,test-3"
@@ -50,7 +50,7 @@ EXIT_CODES: Final = {"not worse": 0, "worse": 1, "cannot tell": 3}
 )
 @click.option("--junit", metavar="FILE.xml", type=click.Path(path_type=Path), help="Write a JUnit report.")
 @click.option("--plot", metavar="FILE.png", type=click.Path(path_type=Path), help="Draw every paired difference.")
-@telling_options
+@reporting_options
 @click.option("--force", is_flag=True, help="Replace existing files.")
 @click.option("--json", "as_json", is_flag=True, help="Write JSON.")
 @click.pass_context
@@ -92,7 +92,7 @@ def command(
     zero, and reaches below -margin), 3 cannot tell; 2 could not compare; 130 interrupted (--results keeps every run
     that is done).
     """
-    check_telling(annotate=annotate, as_json=as_json)
+    check_reporting(annotate=annotate, as_json=as_json)
     if not (gate or junit or summary or annotate) and (margin is not None or gate_metric is not None):
         raise click.UsageError("--margin and --gate-metric go with --gate, --junit, --summary or --annotate.")
     if force and not (junit or plot or summary):

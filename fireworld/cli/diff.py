@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, NoReturn
 import click
 
 from fireworld.cli.installed import check_matplotlib
+from fireworld.cli.reporting import check_reporting, print_annotations, reporting_options
 from fireworld.cli.tables import print_blocks
-from fireworld.cli.telling import check_telling, print_annotations, telling_options
 
 if TYPE_CHECKING:
     from fireworld_recorder.diff import RunComparison
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 @click.option("--json", "as_json", is_flag=True, help="Write JSON.")
 @click.option("--junit", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML for a CI server.")
 @click.option("--html", metavar="FILE", type=click.Path(path_type=Path), help="Write a page with maps and curves.")
-@telling_options
+@reporting_options
 @click.option("--force", is_flag=True, help="Replace existing files.")
 @click.pass_context
 def command(
@@ -87,7 +87,7 @@ def command(
     from fireworld.recording.difference import diff
     from fireworld.recording.inputs import is_training
 
-    check_telling(annotate=annotate, as_json=as_json)
+    check_reporting(annotate=annotate, as_json=as_json)
     outputs = [path for path in (junit, html, summary) if path is not None]
     if force and not outputs:
         raise click.UsageError("--force goes with --junit, --html or --summary.")

@@ -14,8 +14,8 @@ from fireworld.cli import USER_ERROR
 from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.options import seed_option, steps_option
 from fireworld.cli.progress import BAR, COUNT, DESCRIPTION, LEFT, bar
+from fireworld.cli.reporting import check_reporting, print_annotations, reporting_options
 from fireworld.cli.tables import print_lines, print_table
-from fireworld.cli.telling import check_telling, print_annotations, telling_options
 from fireworld.errors import one_line
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def command() -> None:
 @click.option("--json", "as_json", is_flag=True, help="Write JSON.")
 @click.option("--junit", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML for a CI server.")
 @click.option("--keep", metavar="KEEP", type=_DIRECTORY, help="Keep what differs in KEEP: recording, pages, picture.")
-@telling_options
+@reporting_options
 @click.option("--force", is_flag=True, help="Replace existing files of --junit, --keep and --summary.")
 @click.pass_context
 def check(
@@ -88,7 +88,7 @@ def check(
 
     Exit code: 0 all the same, 1 one is different, 2 one cannot be run or compared, or there is none.
     """
-    check_telling(annotate=annotate, as_json=as_json)
+    check_reporting(annotate=annotate, as_json=as_json)
     announce_compilation()
     from fireworld.files import check_outputs, write_file
     from fireworld.markdown import files_beside, markdown_page

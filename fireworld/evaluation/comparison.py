@@ -176,7 +176,7 @@ class Comparison:
         }
 
     def findings(self, pictures: Mapping[str, str] | None = None) -> list[Finding]:
-        """Return the comparison with each policy as it is told on a CI server, with pictures by policy."""
+        """Return the comparison with each policy for the pages of a CI server, with pictures by policy."""
         return [_finding(one, (pictures or {}).get(one.policies[1].name, "")) for one in self.each]
 
     def summary(self, pictures: Mapping[str, str] | None = None, *, beside: Path | None = None) -> str:

@@ -128,7 +128,7 @@ class Difference:
         return known
 
     def finding(self, *, links: Mapping[str, str] | None = None, picture: str = "") -> Finding:
-        """Return the comparison as it is told on a CI server, with links and a picture that are there already."""
+        """Return the comparison for the pages of a CI server, with links and a picture that are there already."""
         from fireworld.findings import Finding
         from fireworld.recording.difference_text import totals_rows, verdict
 

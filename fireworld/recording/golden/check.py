@@ -150,7 +150,7 @@ class GoldenResult:
         }
 
     def finding(self, *, name: str = "", file: str = "", line: int = 1) -> Finding:
-        """Return the result as it is told on a CI server.
+        """Return the result for the pages of a CI server.
 
         Args:
             name: what is said to be checked; the golden if left out.

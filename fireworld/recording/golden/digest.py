@@ -32,7 +32,7 @@ from fireworld.simulation.placement import SCENARIO_ATTACHMENT
 DIGEST_SUFFIX: Final = ".digest"
 FORMAT: Final = "fireworld-golden-digest/1"
 CODE_LETTERS: Final = 2
-"""Of the code of a topic in a step: 12 bits, which tell where runs begin to differ; the digest tells that they do."""
+"""Of the code of a topic in a step: 12 bits, to find where runs begin to differ; that they do is known by the digest."""
 _TOPICS: Final = [topic.topic for topic in STEP_TOPICS]
 _LETTERS: Final = (*LETTERS,)
 
@@ -169,7 +169,7 @@ def _difference(topic: str, kept: str, record: StepRecord, city: CityRecord) -> 
 
 
 def _without_a_step(n_kept: int, n_now: int) -> FirstDifference:
-    """Report what no step tells: how many there are, or something of which no code is kept."""
+    """Report what is found in no step: how many there are, or something of which no code is kept."""
     if n_kept != n_now:
         return FirstDifference(
             min(n_kept, n_now), "length", "", "", None, None, n_kept, n_now,

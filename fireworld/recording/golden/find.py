@@ -101,7 +101,7 @@ def _is_unused(path: Path, *, ran: Collection[Path], whole: bool) -> bool:
 
 
 def matcher(expression: str) -> Matches:
-    """Return what tells whether a name matches an expression; case does not matter (OutputError: no such syntax)."""
+    """Return a test of names by an expression; case does not matter (OutputError: no such syntax)."""
     tokens = re.findall(r"[()]|[^\s()]+", expression)
     rest = iter([*tokens, ""])
     state = _Reader(rest, next(rest), expression)

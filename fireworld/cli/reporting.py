@@ -1,4 +1,4 @@
-"""What commands tell CI servers of what they found: a summary in Markdown, and annotations."""
+"""What commands write for CI servers: a summary in Markdown, and annotations."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 
-def telling_options(command: Command) -> Command:
+def reporting_options(command: Command) -> Command:
     """Add --summary and --annotate to a command."""
     summary = click.option(
         "--summary", metavar="FILE.md", type=click.Path(path_type=Path, dir_okay=False),
@@ -26,7 +26,7 @@ def telling_options(command: Command) -> Command:
     return summary(annotate(command))
 
 
-def check_telling(*, annotate: str | None, as_json: bool) -> None:
+def check_reporting(*, annotate: str | None, as_json: bool) -> None:
     """Check that annotations do not get into JSON."""
     if annotate and as_json:
         raise click.UsageError("--annotate and --json exclude each other.")
@@ -37,7 +37,7 @@ def print_annotations(findings: Sequence[Finding], *, cannot: str = "error") -> 
 
     Args:
         findings: what was found.
-        cannot: level of annotations of what cannot be told.
+        cannot: level of annotations of what is neither the same nor different.
     """
     from fireworld.annotations import annotation_lines
 
