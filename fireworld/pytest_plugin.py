@@ -35,6 +35,7 @@ NAME_MAX: Final = 150
 _FOUND: Final = "fireworld_findings"
 """What a report holds of recordings compared; reports bring it here from all workers."""
 _findings_key: Final = pytest.StashKey[list[dict[str, Any]]]()
+_collected_key: Final = pytest.StashKey[set[str]]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -50,6 +51,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         FOLDER_INI, "Folder of a test's golden recordings, from the folder of its file.", default="recordings"
     )
     parser.addini(DIGEST_INI, "Keep digests of some kB instead of recordings.", type="bool", default=False)
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Keep which tests are going to run: a run that is broken off says nothing of what others use."""
+    session.config.stash[_collected_key] = {item.nodeid for item in session.items}
 
 
 @pytest.hookimpl(hookwrapper=True)
@@ -112,6 +118,8 @@ def _is_selection(terminalreporter: pytest.TerminalReporter) -> bool:
     some = any("::" in str(word) for word in config.invocation_params.args)
     some = some or bool(config.getoption("keyword") or config.getoption("markexpr") or config.getoption("maxfail"))
     some = some or bool(config.getoption("numprocesses", None))
+    ran = {report.nodeid for several in stats.values() for report in several if hasattr(report, "nodeid")}
+    some = some or not config.stash.get(_collected_key, set()) <= ran
     return some or any(stats.get(key) for key in ("deselected", "skipped", "failed", "error", "xfailed"))
 
 

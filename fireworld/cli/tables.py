@@ -27,18 +27,21 @@ def print_table(
         rows: cells.
         left: places of the columns that are set to the left; the others are set to the right.
         whole: places of the columns whose cells stay on one line as long as possible.
-        narrow: with little space between the columns.
+        narrow: with little space between the columns, as there is in any case where the terminal is too narrow.
     """
     from rich import box
     from rich.console import Console
     from rich.table import Table
 
+    console = Console(highlight=False, markup=False)
+    widths = [max(map(len, column)) + 3 for column in zip(head, *rows, strict=True)]
+    narrow = narrow or sum(widths) - 3 > console.width
     table = Table(box=box.SIMPLE, show_edge=False, pad_edge=False, padding=(0, 0 if narrow else 1))
     for place, name in enumerate(head):
         table.add_column(name, justify="left" if place in left else "right", no_wrap=place in whole, overflow="fold")
     for row in rows:
         table.add_row(*row)
-    Console(highlight=False, markup=False).print(table)
+    console.print(table)
 
 
 def print_lines(lines: Iterable[str]) -> None:

@@ -116,14 +116,15 @@ class GoldenResult:
 
     @property
     def cells(self) -> tuple[str, str, str, str]:
-        """What was run by what policy, or trained in by what method, seed and length; "-" if the golden is not read."""
+        """What was run by what policy, or trained in by what method, seed and last step; "-" if it cannot be read."""
         header, difference = self.header, self.difference
         if isinstance(header, TrainingHeader):
             length = f"{difference.n_parts} {header.unit}s" if isinstance(difference, TrainingDifference) else "-"
             return header.curriculum, header.method, str(header.seed), length
         if header is None:
             return "-", "-", "-", "-"
-        length = str(difference.totals[0].n_steps) if isinstance(difference, RunComparison) else "-"
+        outcome = difference.totals[0].outcome if isinstance(difference, RunComparison) else None
+        length = str(outcome.steps) if outcome is not None else "-"
         return header.scenario, header.policy, str(header.seed), length
 
     def to_dict(self) -> dict[str, Any]:

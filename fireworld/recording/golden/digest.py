@@ -32,7 +32,7 @@ from fireworld.simulation.placement import SCENARIO_ATTACHMENT
 DIGEST_SUFFIX: Final = ".digest"
 FORMAT: Final = "fireworld-golden-digest/1"
 CODE_LETTERS: Final = 2
-"""Of the code of a topic in a step: 12 bits, to find where runs begin to differ; that they do is known by the digest."""
+"""Of the code of a topic in a step: 12 bits, to find where runs begin to differ; the digest says whether they do."""
 _TOPICS: Final = [topic.topic for topic in STEP_TOPICS]
 _LETTERS: Final = (*LETTERS,)
 

@@ -395,6 +395,18 @@ def test_a_file_that_uses_none_any_more(project):
     run(project, outcome={"passed": 1}).fnmatch_lines(["recordings/test_mine-test_policy.mcap"])
 
 
+def test_a_run_that_is_broken_off_removes_nothing(project):
+    project.makepyfile(test_mine=ONE + "\n\n" + ONE.replace("test_policy", "test_then"))
+    run(project, UPDATE, outcome={"passed": 2})
+    before = names_in(project)
+    broken = 'import pytest\ndef test_ends():\n    pytest.exit("enough", returncode=0)\n'
+    project.makepyfile(test_mine=ONE + broken + ONE.replace("test_policy", "test_then"))
+    result = project.runpytest_inprocess(UPDATE)
+    assert result.ret == 0
+    result.stdout.no_fnmatch_line("*no test uses*")
+    assert names_in(project) == before
+
+
 def test_update_keeps_a_recording_of_before_tests_were_named(project):
     project.makepyfile(test_mine=ONE)
     (project.path / "recordings").mkdir()
