@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Collection, Generator, Mapping, Sequence
+from collections.abc import Collection, Generator, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -86,10 +86,29 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.write_sep("=", f"fireworld: {len(unused)} recordings that no test uses; {UPDATE} removes them")
     for path in unused:
         terminalreporter.write_line(_shown(path))
-    _tell(terminalreporter, [found for report in reports for found in getattr(report, _FOUND, ())])
+    found = [found for report in reports for found in getattr(report, _FOUND, ())]
+    _report(
+        terminalreporter,
+        [*found, *_other_failures(terminalreporter, {one["name"] for one in found if one["verdict"] != "same"})],
+    )
 
 
-def _tell(terminalreporter: pytest.TerminalReporter, found: Sequence[Mapping[str, Any]]) -> None:
+def _other_failures(terminalreporter: pytest.TerminalReporter, known: Collection[str]) -> Iterator[dict[str, Any]]:
+    """Yield what else failed: tests that expect more than a recording, and files that cannot be collected."""
+    stats = terminalreporter.stats
+    for report in [*stats.get("error", ()), *stats.get("failed", ())]:
+        if report.nodeid in known:
+            continue
+        crash = getattr(report.longrepr, "reprcrash", None)
+        text = crash.message if crash is not None else report.longreprtext
+        lines = [line for line in text.splitlines() if line.strip()] or ["failed"]
+        file, line, _ = getattr(report, "location", None) or (report.nodeid, 0, "")
+        place = _shown(terminalreporter.config.rootpath / file)
+        headline = lines[0] if crash is not None else lines[-1].removeprefix("E").strip()
+        yield {"name": report.nodeid, "verdict": "cannot", "headline": headline, "file": place, "line": (line or 0) + 1}
+
+
+def _report(terminalreporter: pytest.TerminalReporter, found: Sequence[Mapping[str, Any]]) -> None:
     """Write the summary and the annotations, if they were asked for."""
     summary, annotate = (terminalreporter.config.getoption(name) for name in (SUMMARY, ANNOTATE))
     if not (summary or annotate):
@@ -97,13 +116,14 @@ def _tell(terminalreporter: pytest.TerminalReporter, found: Sequence[Mapping[str
     from fireworld.annotations import annotation_lines
     from fireworld.files import make_folder, write_file
     from fireworld.findings import Finding
-    from fireworld.markdown import markdown_page
+    from fireworld.markdown import WORDS, markdown_page
 
     findings = [Finding(**one) for one in found]
     if summary:
         path = Path(summary)
         make_folder(path.parent)
-        write_file(path, markdown_page("recordings of tests", findings, beside=path.parent))
+        words = {**WORDS, "cannot": "failed otherwise"}
+        write_file(path, markdown_page("recordings of tests", findings, beside=path.parent, words=words))
     if annotate:
         for line in annotation_lines(findings):
             terminalreporter.write_line(line)

@@ -437,7 +437,7 @@ def test_keep_summary_and_annotations(project, words):
     assert {path.name for path in (new / "inner").iterdir()} == {f"test_inner-test_policy{end}" for end in ends}
     summary = (new / "summary.md").read_text()
     assert summary.startswith(
-        "## recordings of tests: 1 could not be checked, 2 different\n\n### test\\_broken.py::test\\_broken\n"
+        "## recordings of tests: 1 failed otherwise, 2 different\n\n### test\\_broken.py::test\\_broken\n"
     )
     assert "**changed: policy: mine:Policy, digest " in summary
     assert "](inner/test_inner-test_policy.html)" in summary
@@ -459,3 +459,17 @@ def test_nothing_to_say(project):
     out.no_fnmatch_line("::*")
     assert (project.path / "s.md").read_text() == "## recordings of tests: 1 the same\n"
     assert not (project.path / "s-files").exists()
+
+
+def test_what_else_failed_is_in_the_summary(project):
+    project.makepyfile(test_mine=ONE + "    assert 1 == 2, 'no'\n", test_gone="import no_such_module")
+    project.runpytest_inprocess(UPDATE, "--continue-on-collection-errors")
+    words = ("--fireworld-summary=s.md", "--fireworld-annotate=github", "--continue-on-collection-errors")
+    result = project.runpytest_inprocess(*words)
+    result.assert_outcomes(failed=1, errors=1)
+    lines = [line for line in result.outlines if line.startswith("::")]
+    assert lines == [
+        "::error file=test_gone.py,line=1,title=test_gone.py::ModuleNotFoundError: No module named 'no_such_module'",
+        "::error file=test_mine.py,line=2,title=test_mine.py%3A%3Atest_policy::AssertionError: no",
+    ]
+    assert (project.path / "s.md").read_text().startswith("## recordings of tests: 2 failed otherwise, 1 the same\n")
