@@ -470,6 +470,6 @@ def test_what_else_failed_is_in_the_summary(project):
     lines = [line for line in result.outlines if line.startswith("::")]
     assert lines == [
         "::error file=test_gone.py,line=1,title=test_gone.py::ModuleNotFoundError: No module named 'no_such_module'",
-        "::error file=test_mine.py,line=2,title=test_mine.py%3A%3Atest_policy::AssertionError: no",
+        "::error file=test_mine.py,line=1,title=test_mine.py%3A%3Atest_policy::AssertionError: no",
     ]
     assert (project.path / "s.md").read_text().startswith("## recordings of tests: 2 failed otherwise, 1 the same\n")
