@@ -360,6 +360,25 @@ BY_TABLE, BY_RANK = 0, 1
 """Where a choice's values come from; places in `Seen.valued`."""
 
 
+class Ranks(NamedTuple):
+    """What the brigades that value targets make of the burning buildings in a step, in the order of `SiteState.member`.
+
+    n buildings, b brigades. It begins anew with every step: `fireworld.kernels.ranks.line_up`.
+    """
+
+    x: Float64  # (n,), mm
+    y: Float64
+    needed: Float64  # (n,), brigades that would put it out in one step
+    worth: Float64  # (n,), weighted sum of what all see alike of it
+    n_here: Float64  # (n,), brigades that go for it
+    nearness: Float64x2  # (b, n), how near it is to what each brigade goes for, 0 to 1
+    near_before: Float64  # (n,), that of the brigades before the one that chooses, added up
+    near: Float64  # (n,), that of all others
+    value: Float64  # (n,), of the brigade that chooses
+    position: Int32  # (n,), by building: where it stands
+    weighed: Int32  # (n,), the ranking of `worth`, -1 none
+
+
 class Scratch(NamedTuple):
     """What the steps of an episode write on; b brigades."""
 
@@ -367,8 +386,9 @@ class Scratch(NamedTuple):
     action_before: Int32  # (b,)
     target_before: Int32  # (b,)
     values: Float64  # (5,)
-    described: Float64x2  # (n, 7); no rows where nobody ranks
+    described: Float64x2  # (n, 7); no rows where nobody ranks or sees them
     described_at: Int64  # (n,), -1 at first
+    ranks: Ranks  # of n buildings, 0 where nobody ranks
     seen: Float64  # (17,)
     work: Float64x2  # (2, w), w as `widest` says of the policy's network
 

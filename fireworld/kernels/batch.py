@@ -34,7 +34,7 @@ from fireworld.kernels.fire import is_over
 from fireworld.kernels.jit import inlined, kernel
 from fireworld.kernels.observation import N_ACTIONS, can_choose, find_target, observe, site_place
 from fireworld.kernels.ranking import N_TARGET_FEATURES, OWN_TARGET, describe_building, see_target
-from fireworld.kernels.step import begin_step, finish_step, opened_episode
+from fireworld.kernels.step import begin_step, finish_step, opened_episode, sight_of
 
 
 class View(NamedTuple):
@@ -215,7 +215,7 @@ def show_brigade(brigade: int, i: int, episode: Episode, batch: Batch) -> None:
 @inlined
 def show_target(action: int, brigade: int, has_site: bool, i: int, episode: Episode, view: View) -> None:
     """Write the features of the building that an action names for a brigade; MODEL 7."""
-    city, world, constants, scratch = episode.city, episode.world, episode.constants, episode.scratch
+    city, world, scratch = episode.city, episode.world, episode.scratch
     shown = view.targets[i, brigade, action]
     if not has_site:
         shown[:] = 0.0
@@ -225,16 +225,7 @@ def show_target(action: int, brigade: int, has_site: bool, i: int, episode: Epis
         find_target(brigade, action, world.brigades, city.buildings, world.fire, city.geometry, world.sites),
         episode.clock[STEP] + 1,
         world.brigades.target,
-        scratch.described,
-        scratch.described_at,
-        world.brigades,
-        city.buildings,
-        city.links,
-        city.geometry,
-        world.fire,
-        world.sites,
-        constants.fire,
-        constants.brigades,
+        sight_of(episode),
         scratch.seen,
     )
     for k in range(N_TARGET_FEATURES):

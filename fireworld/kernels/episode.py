@@ -31,9 +31,10 @@ from fireworld.kernels.learning import (
     update,
 )
 from fireworld.kernels.observation import N_ACTIONS, can_choose, find_target, observe
-from fireworld.kernels.ranking import OWN_TARGET, rank
+from fireworld.kernels.ranking import OWN_TARGET
+from fireworld.kernels.ranks import hear, line_up, rank_targets
 from fireworld.kernels.sites import find_sites
-from fireworld.kernels.step import finish_step, opened_episode
+from fireworld.kernels.step import finish_step, opened_episode, sight_of
 
 
 @inner
@@ -60,9 +61,10 @@ def run_steps(episode: Episode) -> None:  # noqa: C901, PLR0912, PLR0915 - to ha
     buildings, geometry = city.buildings, city.geometry
     n_brigades = len(brigades.action)
     features, before, known_before = scratch.features, scratch.action_before, scratch.target_before
-    values, described, described_at = scratch.values, scratch.described, scratch.described_at
-    learning, noting = learner.learning[0] != 0, len(seen.state) > 0
-    described_at[:] = -1
+    values, ranks = scratch.values, scratch.ranks
+    learning, noting, ranking = learner.learning[0] != 0, len(seen.state) > 0, len(ranks.value) > 0
+    sight = sight_of(episode)
+    scratch.described_at[:] = -1
     if learning:
         forget(learner)
     for step in range(clock[STEP] + 1, last_step + 2):
@@ -78,6 +80,8 @@ def run_steps(episode: Episode) -> None:  # noqa: C901, PLR0912, PLR0915 - to ha
         shown, known = (brigades.action, brigades.target) if in_turn else (before, known_before)
         if noting:
             seen.valued[:] = 0
+        if ranking:
+            line_up(known, geometry, sites, ranks)
         for brigade in range(n_brigades):
             action, target, choice = -1, -1, NO_CHOICE
             if noting:
@@ -105,23 +109,17 @@ def run_steps(episode: Episode) -> None:  # noqa: C901, PLR0912, PLR0915 - to ha
                 elif policy.kind[brigade] in (RANK_NAMED, RANK_ALL):
                     own, choice = policy.kind[brigade] == RANK_ALL, GREEDY
                     weights = policy.rankings[policy.table_of[brigade]]
-                    action, target = rank(
+                    action, target = rank_targets(
                         brigade,
                         own,
+                        noting,
+                        policy.table_of[brigade],
                         step,
                         known,
                         weights,
                         policy.network,
-                        described,
-                        described_at,
-                        brigades,
-                        buildings,
-                        city.links,
-                        geometry,
-                        fire,
-                        sites,
-                        constants.fire,
-                        constants.brigades,
+                        sight,
+                        ranks,
                         scratch.seen,
                         scratch.work,
                         values,
@@ -144,6 +142,8 @@ def run_steps(episode: Episode) -> None:  # noqa: C901, PLR0912, PLR0915 - to ha
                     target = find_target(brigade, action, brigades, buildings, fire, geometry, sites)
             brigades.action[brigade] = action
             brigades.target[brigade] = target
+            if ranking:
+                hear(brigade, known_before[brigade], known[brigade], geometry, sites, ranks)
             if noting:
                 seen.choice[brigade], seen.explored[brigade] = choice, choice == EXPLORED
         if step > last_step:

@@ -6,8 +6,8 @@ from fireworld.kernels.arrays import SEED, STEP, Array, Episode
 from fireworld.kernels.choice import RANK_ALL, RANK_NAMED, choose, keeps_choice
 from fireworld.kernels.jit import inlined, kernel
 from fireworld.kernels.observation import can_choose, find_target, observe
-from fireworld.kernels.ranking import rank
-from fireworld.kernels.step import opened_episode
+from fireworld.kernels.ranks import rank
+from fireworld.kernels.step import opened_episode, sight_of
 
 
 @kernel
@@ -45,16 +45,8 @@ def decide(brigade: int, before: Array, target_before: Array, episode: Episode) 
                 known,
                 policy.rankings[policy.table_of[brigade]],
                 policy.network,
-                scratch.described,
-                scratch.described_at,
-                brigades,
-                city.buildings,
-                city.links,
-                city.geometry,
-                world.fire,
-                sites,
-                constants.fire,
-                constants.brigades,
+                sight_of(episode),
+                scratch.ranks,
                 scratch.seen,
                 scratch.work,
                 scratch.values,

@@ -23,6 +23,7 @@ from fireworld.kernels.fire import advance_fire, draw_burn_rates, light
 from fireworld.kernels.health import harm
 from fireworld.kernels.jit import inlined, inner, kernel
 from fireworld.kernels.outcome import assess
+from fireworld.kernels.ranking import Sight
 from fireworld.kernels.sites import find_sites
 
 FIRST_CIVILIAN = np.int64(0)
@@ -49,6 +50,24 @@ def finish(row: Array) -> None:
     """Carry out what the brigades decided in the step of the clock."""
     episode = opened_episode(row)
     finish_step(episode.city, episode.world, episode.constants, episode.clock[SEED], episode.clock[STEP])
+
+
+@inlined
+def sight_of(episode: Episode) -> Sight:
+    """Return what the brigades of an episode look at when they value targets."""
+    city, world, constants, scratch = episode.city, episode.world, episode.constants, episode.scratch
+    return Sight(
+        city.buildings,
+        city.links,
+        city.geometry,
+        world.fire,
+        world.brigades,
+        world.sites,
+        constants.fire,
+        constants.brigades,
+        scratch.described,
+        scratch.described_at,
+    )
 
 
 @inlined

@@ -15,6 +15,7 @@ from fireworld.kernels.choice import RANK_ALL, RANK_NAMED
 from fireworld.kernels.network import widest
 from fireworld.kernels.observation import N_ACTIONS, N_FEATURES
 from fireworld.kernels.ranking import N_OF_BUILDING, N_WEIGHTS
+from fireworld.kernels.ranks import fresh_ranks
 from fireworld.simulation.state import NO_LEARNER
 
 
@@ -66,17 +67,17 @@ def bind(
         seen: where it is noted what the brigades see and choose; None: nowhere.
         describes: there is room for the features of buildings, even if the team does not rank them.
     """
-    ranks = describes or bool(np.isin(policy.kind, (RANK_NAMED, RANK_ALL)).any())
-    scratch, clock = fresh_scratch(policy, n_buildings if ranks else 0), np.zeros(3, dtype=np.int64)
+    scratch, clock = fresh_scratch(policy, n_buildings, describes=describes), np.zeros(3, dtype=np.int64)
     noted = NOTHING_SEEN if seen is None else seen
     rows = [address_row(group) for group in (policy, learner, noted, scratch)]
     clock_row = clock.__array_interface__["data"][0], len(clock)
     return Bound(policy, learner, noted, scratch, clock, np.concatenate((city_row, state_row, *rows, clock_row)))
 
 
-def fresh_scratch(policy: PolicyArrays, n_described: int) -> Scratch:
-    """Return what the steps of a team write on; `n_described`: buildings of the city if it ranks them, else 0."""
-    n_brigades = len(policy.kind)
+def fresh_scratch(policy: PolicyArrays, n_buildings: int, *, describes: bool) -> Scratch:
+    """Return what the steps of a team write on; arguments as of `bind`."""
+    n_brigades, ranks = len(policy.kind), bool(np.isin(policy.kind, (RANK_NAMED, RANK_ALL)).any())
+    n_described = n_buildings if describes or ranks else 0
     return Scratch(
         features=np.zeros(N_FEATURES, dtype=np.int64),
         action_before=np.zeros(n_brigades, dtype=np.int32),
@@ -84,6 +85,7 @@ def fresh_scratch(policy: PolicyArrays, n_described: int) -> Scratch:
         values=np.zeros(N_ACTIONS + 1),
         described=np.zeros((n_described, N_OF_BUILDING)),
         described_at=np.full(n_described, -1),
+        ranks=fresh_ranks(n_brigades, n_buildings if ranks else 0),
         seen=np.zeros(N_WEIGHTS),
         work=np.zeros((2, widest(policy.network))),
     )
