@@ -27,7 +27,11 @@ _SCALARS: Final = {float: types.float64, int: types.int64, bool: types.boolean}
 def fields_of(kind: Any) -> tuple[tuple[str, Any], ...]:
     """Return the fields of a named tuple: of each its name, and its class, or `(dtype, axes)`."""
     hints = get_type_hints(kind, include_extras=True)
-    return tuple((name, getattr(hints[name], "__metadata__", hints[name])) for name in kind._fields)
+    found = []
+    for name in kind._fields:
+        dtype, *axes = getattr(hints[name], "__metadata__", (None,))
+        found.append((name, (np.dtype(dtype), *axes) if axes else hints[name]))
+    return tuple(found)
 
 
 def address_row(group: Any) -> Array:
@@ -47,7 +51,11 @@ def _append(group: Any, row: list[int]) -> None:
     for (name, kind), value in zip(fields_of(group.__class__), group, strict=True):
         if isinstance(kind, tuple):
             dtype, n_axes = kind
-            if value.dtype != dtype or value.ndim != n_axes or not value.flags.c_contiguous:
+            if (
+                (value.dtype is not dtype and value.dtype != dtype)
+                or value.ndim != n_axes
+                or not value.flags.c_contiguous
+            ):
                 wanted = f"contiguous {np.dtype(dtype).name} of {n_axes} axes"
                 raise TypeError(f"{type(group).__name__}.{name}: expected {wanted}, got {value.dtype} {value.shape}")
             row += (value.__array_interface__["data"][0], *value.shape)
@@ -67,7 +75,7 @@ def numba_type(kind: Any) -> Any:
     for _, member in fields_of(kind):
         if isinstance(member, tuple):
             dtype, n_axes = member
-            members.append(types.Array(numpy_support.from_dtype(np.dtype(dtype)), n_axes, "C"))
+            members.append(types.Array(numpy_support.from_dtype(dtype), n_axes, "C"))
         elif get_origin(member) is tuple:
             members.append(types.UniTuple(types.float64, len(get_args(member))))
         else:

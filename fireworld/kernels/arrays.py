@@ -40,10 +40,10 @@ class BuildingArrays(NamedTuple):
     """What is fixed of each building, (n,); and the k fires that are lit later on."""
 
     building_id: Int64  # keys the building's random draws and breaks ties
-    order: UInt32  # in which the air exchange visits the buildings
     capacity: Float64  # energy per degree (a float32 number)
     initial_fuel: Float32  # energy
     ignition_point: Float64  # degrees above ambient
+    ignition_energy: Float64  # the least energy at which it is hot enough to burn
     emission: Float64  # energy radiated a step per K^4: wall_area * coefficient * Stefan-Boltzmann
     inflammable: UInt8
     later_step: Int64  # (k,), rising: the step in which each later fire is lit
@@ -59,14 +59,21 @@ class CoverArrays(NamedTuple):
     width: UInt32  # (n,), multiple of 4
     ptr: UInt32  # (n,), start in weight
     weight: Float64  # energy per degree of difference: flow * cover * cell size; 0 where not covered
+    order: UInt32  # (n,), in which the exchange visits the buildings
+    tile_ptr: UInt32  # (tiles+1,), which blocks reach into each tile of the padded grid, as CSR
+    tile_position: UInt32  # positions of their buildings in the order of visits
 
 
 class LinkArrays(NamedTuple):
-    """Radiation links as CSR over the emitting buildings."""
+    """Radiation links as CSR over the emitting buildings; lengths in millimetres."""
 
     ptr: UInt32  # (n+1,)
     building: UInt32
     share: Float64  # (a float32 number)
+    west: Float64  # (n,), bounding box of the centroids of what is inflammable among those a building is linked to
+    south: Float64  # turned inside out where there is none
+    east: Float64
+    north: Float64
 
 
 class FireConstants(NamedTuple):
@@ -94,8 +101,6 @@ class FireState(NamedTuple):
     warm: Int64  # (4,), box of the air that may differ from zero: first row, end, first cell, end
     span: UInt64x2  # (2, nx + 2), cells of each row of the air that may differ from zero: first, end
     rate: Float64  # (n,), burn rate of the step where a building burns
-    emitted: Float64  # (n,), scratch
-    scratch: Float64x2  # (2, pitch), scratch
 
 
 class GeometryArrays(NamedTuple):
@@ -113,10 +118,11 @@ class GeometryArrays(NamedTuple):
 
 
 class NearArrays(NamedTuple):
-    """Which buildings belong to one fire site when both burn, as CSR."""
+    """Which buildings belong to one fire site when both burn, as CSR; rising, in words of 64, a bit for each."""
 
     ptr: UInt32  # (n+1,)
-    building: UInt32
+    word: UInt32
+    bits: UInt64  # which buildings of that word
 
 
 class StreetArrays(NamedTuple):
@@ -379,6 +385,38 @@ class Ranks(NamedTuple):
     weighed: Int32  # (n,), the ranking of `worth`, -1 none
 
 
+class Warmth(NamedTuple):
+    """Where heat is, or may come in a step; n buildings in blocks of 64. Every call of a kernel makes it anew.
+
+    How long the lists are is in `number`: `fireworld.kernels.warmth`.
+    """
+
+    number: Int64  # (NUMBERS,), named below
+    n_of_code: Int64  # (9,), buildings of each code
+    block: UInt32  # (blocks,), rising: blocks in which something is or may become warm, or changes its code
+    visit: UInt32  # (n,), buildings over air that may be warm, in the order of visits
+    block_bits: UInt64  # a bit for each block: in `block`
+    visit_bits: UInt64  # a bit for each position in the order of visits: in `visit`
+    is_doubtful: UInt8  # (blocks,), 1: codes in it may change without heat enough to burn
+    unknown: Float64  # (n,), 0 where all that a building's heat can reach is listed; else 1
+    tile: UInt8x2  # (tile rows, tiles in a row), 1: the buildings over that tile of air are listed
+    waiting: UInt64  # a bit for each building: it burns, and no site has it yet; 0 but while that is found
+    burning: UInt32  # (n,), scratch
+    x: Float64  # (n,), scratch
+    y: Float64  # (n,), scratch
+    square: Float64  # (n,), scratch
+    emitted: Float64  # (n,), scratch
+    code: UInt8  # (n,), scratch
+    row: Float64x2  # (2, pitch), scratch
+
+
+N_BLOCKS, N_VISITS, N_KNOWN, ALL = 0, 1, 2, 3
+"""What is where in `Warmth.number`: how long the lists are; how many buildings are known; 1 once all are listed."""
+BLOCKS_CHANGED, VISITS_CHANGED, SITES_CHANGED, SITES_KNOWN, AGE, NUMBERS = 4, 5, 6, 7, 8, 9
+"""And, 0 or 1: whether more is to be listed; whether fire sites can be others than when they were found; whether they
+have been found since the call began. Then, steps since the call began. Last, how many numbers there are."""
+
+
 class Scratch(NamedTuple):
     """What the steps of an episode write on; b brigades."""
 
@@ -389,6 +427,7 @@ class Scratch(NamedTuple):
     described: Float64x2  # (n, 7); no rows where nobody ranks or sees them
     described_at: Int64  # (n,), -1 at first
     ranks: Ranks  # of n buildings, 0 where nobody ranks
+    warmth: Warmth
     seen: Float64  # (17,)
     work: Float64x2  # (2, w), w as `widest` says of the policy's network
 

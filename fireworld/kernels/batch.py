@@ -34,7 +34,7 @@ from fireworld.kernels.fire import is_over
 from fireworld.kernels.jit import inlined, kernel
 from fireworld.kernels.observation import N_ACTIONS, can_choose, find_target, observe, site_place
 from fireworld.kernels.ranking import N_TARGET_FEATURES, OWN_TARGET, describe_building, see_target
-from fireworld.kernels.step import begin_step, finish_step, opened_episode, sight_of
+from fireworld.kernels.step import begin_step, finish_step, look_at_all, opened_episode, score_last, sight_of
 
 
 class View(NamedTuple):
@@ -108,12 +108,15 @@ def work_on_worlds(rows: Array, batch_row: Array, indices: Array, what: int) -> 
         if what == STEP_GIVEN:
             for brigade in range(len(brigades.action)):
                 follow(brigade, batch.actions[i, brigade], i, episode, batch)
+        if what >= BEGIN:
+            look_at_all(episode)
         if what >= STEP_DECIDED:
             clock[STEP] += 1
-            finish_step(episode.city, episode.world, episode.constants, clock[SEED], clock[STEP])
+            finish_step(episode)
+            score_last(episode)
         if what >= BEGIN:
             note_decisions(i, brigades, batch.result)
-            begin_step(episode.city, episode.world, clock[STEP] + 1)
+            begin_step(episode, clock[STEP] + 1)
         show(i, episode, batch)
 
 

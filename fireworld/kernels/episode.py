@@ -15,7 +15,7 @@ from fireworld.kernels.arrays import (
     Seen,
 )
 from fireworld.kernels.choice import GIVEN, RANK_ALL, RANK_NAMED, TABLE, choose, explores, keeps_choice, table_state
-from fireworld.kernels.fire import is_over, light
+from fireworld.kernels.fire import is_over
 from fireworld.kernels.jit import inlined, inner, kernel
 from fireworld.kernels.learning import (
     EXPLORED,
@@ -33,8 +33,10 @@ from fireworld.kernels.learning import (
 from fireworld.kernels.observation import N_ACTIONS, can_choose, find_target, observe
 from fireworld.kernels.ranking import OWN_TARGET
 from fireworld.kernels.ranks import hear, line_up, rank_targets
-from fireworld.kernels.sites import find_sites
-from fireworld.kernels.step import finish_step, opened_episode, sight_of
+from fireworld.kernels.step import begin_step, finish_step, look_at_all, opened_episode, score_last, sight_of
+
+NO_STEP = 0
+"""A step in which no fire is lit."""
 
 
 @inner
@@ -67,12 +69,11 @@ def run_steps(episode: Episode) -> None:  # noqa: C901, PLR0912, PLR0915 - to ha
     scratch.described_at[:] = -1
     if learning:
         forget(learner)
+    look_at_all(episode)
     for step in range(clock[STEP] + 1, last_step + 2):
         if step > last_step and not learning:
             break
-        if step <= last_step:
-            light(buildings, fire, step)
-        find_sites(buildings, city.links, city.near, geometry, fire, world.civilians, brigades, sites)
+        begin_step(episode, step if step <= last_step else NO_STEP)
         for brigade in range(n_brigades):
             before[brigade] = brigades.action[brigade]
             known_before[brigade] = brigades.target[brigade]
@@ -149,7 +150,7 @@ def run_steps(episode: Episode) -> None:  # noqa: C901, PLR0912, PLR0915 - to ha
         if step > last_step:
             break
         clock[STEP] = step
-        finish_step(city, world, constants, seed, step)
+        finish_step(episode)
         if learning:
             take_reward(outcome.reward[TOTAL], learner)
             note_reward(step - 1, outcome.reward, learner)
@@ -158,6 +159,7 @@ def run_steps(episode: Episode) -> None:  # noqa: C901, PLR0912, PLR0915 - to ha
                 for brigade in range(n_brigades):
                     update(brigade, policy.table_of[brigade], 0.0, learner)
             break
+    score_last(episode)
 
 
 @kernel

@@ -7,24 +7,23 @@ import numpy as np
 from fireworld.kernels.addresses import opener
 from fireworld.kernels.arrays import (
     SEED,
+    SITES_CHANGED,
     STEP,
     Array,
     BrigadeState,
-    CityArrays,
     CivilianState,
-    Constants,
     Episode,
     FireState,
     HealthConstants,
-    WorldState,
 )
 from fireworld.kernels.brigades import act, shelter
-from fireworld.kernels.fire import advance_fire, draw_burn_rates, light
+from fireworld.kernels.fire import burn_on, draw_burn_rates, light
 from fireworld.kernels.health import harm
 from fireworld.kernels.jit import inlined, inner, kernel
-from fireworld.kernels.outcome import assess
+from fireworld.kernels.outcome import count_living, reward_step, score
 from fireworld.kernels.ranking import Sight
 from fireworld.kernels.sites import find_sites
+from fireworld.kernels.warmth import begin, doubt, refresh
 
 FIRST_CIVILIAN = np.int64(0)
 """Entity number of the first civilian, for the draws; the brigades' follow."""
@@ -42,14 +41,17 @@ def look(row: Array) -> None:
         row: (k,) int64, the address row of an `Episode`, here and below.
     """
     episode = opened_episode(row)
-    begin_step(episode.city, episode.world, episode.clock[STEP] + 1)
+    look_at_all(episode)
+    begin_step(episode, episode.clock[STEP] + 1)
 
 
 @kernel
 def finish(row: Array) -> None:
     """Carry out what the brigades decided in the step of the clock."""
     episode = opened_episode(row)
-    finish_step(episode.city, episode.world, episode.constants, episode.clock[SEED], episode.clock[STEP])
+    look_at_all(episode)
+    finish_step(episode)
+    score_last(episode)
 
 
 @inlined
@@ -71,24 +73,44 @@ def sight_of(episode: Episode) -> Sight:
 
 
 @inlined
-def begin_step(city: CityArrays, world: WorldState, step: int) -> None:
-    """Light what is lit in a step, and find the fire sites."""
-    buildings = city.buildings
-    light(buildings, world.fire, step)
-    find_sites(
-        buildings, city.links, city.near, city.geometry, world.fire, world.civilians, world.brigades, world.sites
-    )
+def look_at_all(episode: Episode) -> None:
+    """Begin with lists of everything, in whatever state the world is: before the first step of a call."""
+    begin(episode.city.cover, episode.world.fire, episode.scratch.warmth)
 
 
 @inlined
-def finish_step(city: CityArrays, world: WorldState, constants: Constants, seed: int, step: int) -> None:
-    """Act, burn, hurt, assess: carry out what the brigades decided, and compute what the step is worth."""
+def begin_step(episode: Episode, step: int) -> None:
+    """Light what is lit in a step, and find the fire sites if they can be others than before."""
+    if light(episode.city.buildings, episode.world.fire, step) > 0:
+        look_at_all(episode)
+    if episode.scratch.warmth.number[SITES_CHANGED] != 0:
+        find_sites(episode.city, episode.world, episode.scratch.warmth)
+
+
+@inlined
+def finish_step(episode: Episode) -> None:
+    """Act, burn, hurt, reward: carry out what the brigades decided, in the step of the clock."""
+    city, world, constants, warmth = episode.city, episode.world, episode.constants, episode.scratch.warmth
     fire, people, brigades, outcome = world.fire, world.civilians, world.brigades, world.outcome
+    seed, step = episode.clock[SEED], episode.clock[STEP]
     outcome.water[0] += act(brigades, fire, city.streets, world.ways, city.geometry, constants.brigades)
-    outcome.draws[0] = draw_burn_rates(city.buildings, fire, constants.fire, seed, step)
-    advance_fire(city.buildings, city.cover, city.links, fire, constants.fire)
+    for brigade in range(len(brigades.sprayed)):
+        if brigades.sprayed[brigade] > 0:
+            doubt(brigades.target[brigade], warmth)
+    refresh(city.cover, warmth)
+    outcome.draws[0] = draw_burn_rates(city.buildings, fire, constants.fire, seed, step, warmth)
+    burn_on(city.buildings, city.cover, city.links, fire, constants.fire, warmth)
+    n_alive = count_living(people.hp)
     outcome.draws[1] = hurt(fire, people, brigades, constants.health, seed, step)
-    assess(fire, people, city.geometry, constants.reward, outcome)
+    if count_living(people.hp) != n_alive:  # sites are measured by the living
+        warmth.number[SITES_CHANGED] = 1
+    reward_step(warmth.n_of_code, people, constants.reward, outcome)
+
+
+@inlined
+def score_last(episode: Episode) -> None:
+    """Write the scores: after the last step of a call."""
+    score(episode.world.fire, episode.world.civilians, episode.city.geometry, episode.world.outcome)
 
 
 @inner

@@ -86,7 +86,8 @@ def make_world(
 def assess(world: World) -> None:
     """Compute what the moment is worth."""
     state = world.state
-    assess_kernel(state.fire, state.civilians, world.city_arrays.geometry, world.constants.reward, state.outcome)
+    geometry, reward = world.city_arrays.geometry, world.constants.reward
+    assess_kernel(state.fire, state.civilians, geometry, reward, state.outcome, np.zeros(9, dtype=np.int64))
 
 
 def act(world: World) -> None:
