@@ -89,6 +89,7 @@ pictures: install  ## Draw the pictures of the docs again, from runs made again.
 	$(BIN)/fireworld render $(PICTURE)alone.mcap $(PICTURE)together.mcap -o docs/pictures/pair.png --step 60 --force
 	$(BIN)/fireworld render $(PICTURE)alone.mcap $(PICTURE)together.mcap -o docs/pictures/before-after.png --steps 0,last --force
 	$(BIN)/python -m tests.viewer.headless
+	$(BIN)/python -m tests.viewer.play_picture
 	$(BIN)/fireworld train paper --seed 1 -o $(PICTURE)training.npz --record $(PICTURE)training.mcap --force
 	$(BIN)/fireworld render $(PICTURE)training.mcap -o docs/pictures/training.png --force
 

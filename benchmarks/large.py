@@ -39,6 +39,8 @@ READ: Final = {
     "diff --html": "diff a.mcap b.mcap --html diff.html",
     "report": "report a.mcap -o one.html",
     "report, two logs": "report a.mcap b.mcap -o two.html",
+    "play": "play a.mcap -o play.html",
+    "play, two logs": "play a.mcap b.mcap -o play-two.html",
     "render, a still": "render a.mcap -o still.png",
     "render, two logs": "render a.mcap b.mcap -o pair.png",
     "render, a strip of four": "render a.mcap -o strip.png --steps 0,{third},{half},last",

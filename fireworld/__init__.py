@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from fireworld.policy.protocol import Observation as Observation
     from fireworld.policy.protocol import Policy as Policy
     from fireworld.policy.teams.network_team import NetworkTeam as NetworkTeam
+    from fireworld.policy.teams.table_team import TableTeam as TableTeam
     from fireworld.policy.teams.team import Team as Team
     from fireworld.policy.teams.team import load_team as load_team
     from fireworld.recording.difference import Difference as Difference
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
     from fireworld.recording.fork import fork as fork
     from fireworld.recording.official_log.imported import Imported as Imported
     from fireworld.recording.official_log.importer import import_log as import_log
+    from fireworld.recording.pages.play import play as play
     from fireworld.recording.record import run as run
     from fireworld.recording.run import Run as Run
     from fireworld.recording.run import open_log as open_log
@@ -92,6 +94,7 @@ _ROOMS = {
     "ScenarioCheck": "evaluation.scenario_check",
     "ScenarioChecks": "evaluation.scenario_check",
     "Session": "simulation.session",
+    "TableTeam": "policy.teams.table_team",
     "Team": "policy.teams.team",
     "TrainingLog": "training.log.reader",
     "Verification": "recording.verify",
@@ -113,6 +116,7 @@ _ROOMS = {
     "open_episode": "recording.episode",
     "open_log": "recording.run",
     "open_training": "training.log.reader",
+    "play": "recording.pages.play",
     "policies": "policy.names",
     "recover": "recording.export",
     "replay_episode": "training.log.replay",

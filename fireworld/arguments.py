@@ -11,6 +11,9 @@ from typing import Any, Final
 from fireworld.errors import FireworldError, expected
 
 SEED_MAX: Final = 2**32 - 1
+"""Of a seed that is asked for."""
+RUN_SEED_MAX: Final = 2**63 - 1
+"""Of a seed that follows from one: what the kernels count with."""
 STEPS_MAX: Final = 100_000
 
 

@@ -232,9 +232,9 @@ class Recorder:
         """Return what differs, and record the new run where it can be looked at."""
         from fireworld.recording.golden.store import store_recording
 
-        lines = [f"{_shown(result.path)}: the {result.kind} is not the same any more", result.sentence]
+        lines = [result.headline, f"{_shown(result.path)}: the {result.kind} is not the same any more"]
         if result.fresh is not None and result.differs:
-            lines += [f"  {line}".rstrip() for line in result.changes]
+            lines += [f"  {line}".rstrip() for line in result.lines]
             new = self._factory.mktemp("fireworld") / result.path.name
             store_recording(new, result.fresh)
             lines.append(

@@ -31,6 +31,7 @@ COMMANDS: Final = {
     "import-log": "Make a recording of an official kernel's log.",
     "recover": "Rescue the committed steps of a damaged recording.",
     "view": "Open recordings in Rerun.",
+    "play": "Write a recording, or two, as a page that plays.",
     "render": "Draw recordings: pictures, strips, films.",
     "report": "Write a recording, or two, as an HTML page.",
     "conformance": "Check the fire model against traces of another simulator.",

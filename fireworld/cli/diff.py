@@ -16,6 +16,7 @@ from fireworld.cli.tables import print_blocks
 if TYPE_CHECKING:
     from fireworld_recorder.diff import RunComparison
 
+    from fireworld.cause import Cause
     from fireworld.recording.difference import Difference
 
 
@@ -109,7 +110,7 @@ def command(
     elif difference.known_same and not outputs:
         click.echo(str(difference))
     else:
-        show_difference(difference.found, names=difference.names)
+        show_difference(difference.found, names=difference.names, cause=difference.cause)
     context.exit(0 if difference.same else 1)
 
 
@@ -144,12 +145,13 @@ def _diff_trainings(
     context.exit(0 if difference.same else 1)
 
 
-def show_difference(found: RunComparison, *, names: tuple[str, str]) -> None:
-    """Print the first difference, how both runs came out, when each topic came to differ, and how that spread."""
+def show_difference(found: RunComparison, *, names: tuple[str, str], cause: Cause | None = None) -> None:
+    """Print what changed, the first difference, how both runs came out, and how it spread by topic and step."""
     from fireworld.cli.tables import print_table
     from fireworld.recording import difference_text as text
 
-    click.echo("\n".join([text.verdict(found), *text.header_lines(found.header), ""]))
+    lines = [text.verdict(found)] if cause is None else text.head_lines(found, cause)
+    click.echo("\n".join([*lines, ""]))
     print_table(("", *names), list(text.totals_rows(*found.totals)))
     topics = list(text.topic_rows(found))
     if topics:

@@ -232,8 +232,8 @@ def _show(results: Sequence[GoldenResult], *, keep: Path | None) -> None:
     for result in results:
         if result.result == "same":
             continue
-        click.echo(f"\n{result.name}: {result.sentence}")
-        for line in result.changes:
+        click.echo(f"\n{result.name}: {result.headline}")
+        for line in result.lines:
             click.echo(f"  {line}".rstrip())
         if keep is not None and result.result == "different":
             click.echo(f"  the new {result.kind}: {keep / result.path.name}")

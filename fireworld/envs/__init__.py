@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from fireworld.envs.autoreset import Autoreset as Autoreset
     from fireworld.envs.brigade_env import BrigadeEnv as BrigadeEnv
     from fireworld.envs.brigade_env import brigade as brigade
+    from fireworld.envs.keyed import episode_seed as episode_seed
+    from fireworld.envs.keyed import explored as explored
     from fireworld.envs.many_worlds import Worlds as Worlds
     from fireworld.envs.many_worlds import worlds as worlds
     from fireworld.envs.parallel_env import TeamEnv as TeamEnv
@@ -41,6 +43,8 @@ _ROOMS = {
     "WholeTeamEnv": "team_env",
     "Worlds": "many_worlds",
     "brigade": "brigade_env",
+    "episode_seed": "keyed",
+    "explored": "keyed",
     "team": "parallel_env",
     "turns": "aec_env",
     "worlds": "many_worlds",

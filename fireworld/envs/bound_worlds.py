@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from fireworld.arguments import SEED_MAX, STEPS_MAX
+from fireworld.arguments import RUN_SEED_MAX, STEPS_MAX
 from fireworld.envs.setup import Setup
 from fireworld.envs.snapshots import fitting, within
 from fireworld.envs.views import fresh_batch, hide_absent
@@ -19,7 +19,7 @@ from fireworld.policy.kernel import KernelPolicy, given
 from fireworld.simulation.built import BuiltScenario
 from fireworld.simulation.world import World
 
-_BOUNDS: Final = {"clock": (0, max(SEED_MAX, STEPS_MAX)), "action": (-1, 4), "target": (-1, 2**31 - 1)}
+_BOUNDS: Final = {"clock": (0, RUN_SEED_MAX), "action": (-1, 4), "target": (-1, 2**31 - 1)}
 
 
 class BoundWorlds:
@@ -130,6 +130,8 @@ class BoundWorlds:
         for name, like in (("clock", np.zeros((len(playing), 3), dtype=np.int64)), *self._decided()):
             least, most = _BOUNDS[name]
             within(held, name, like, least=least, most=most)
+        steps = {"clock": held["clock"][:, STEP:]}
+        within(steps, "clock", np.zeros((len(playing), 2), dtype=np.int64), least=0, most=STEPS_MAX)
         for index, number in enumerate(playing.tolist()):
             fitting(held, f"world{index}", self._built[number].start.packing.memory)
 

@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from fireworld.arguments import SEED_MAX, STEPS_MAX
+from fireworld.arguments import RUN_SEED_MAX
 from fireworld.envs.snapshots import fitting, within
 from fireworld.errors import LogError, expected
 from fireworld.kernels.arrays import Array
@@ -124,7 +124,7 @@ class Histories:
         within(held, "played_action", np.zeros((n, most, b), dtype=np.uint8), least=0, most=NOTHING)
         within(held, "played_target", np.zeros((n, most, b), dtype=np.int32), least=-1, most=2**31 - 1)
         seeds = held.get("played_seeds", np.zeros(0))
-        within(held, "played_seeds", np.zeros((len(seeds), 3), dtype=np.int64), least=0, most=max(SEED_MAX, STEPS_MAX))
+        within(held, "played_seeds", np.zeros((len(seeds), 3), dtype=np.int64), least=0, most=RUN_SEED_MAX)
         first = np.diff(seeds[:, 0], prepend=-1) > 0
         rise = ((seeds[:, 1] == 0) == first).all() and (np.diff(seeds[:, 1])[~first[1:]] > 0).all()
         there = np.isin(np.flatnonzero(held["played_known"]), seeds[first, 0]).all()

@@ -10,7 +10,7 @@ from typing import Any, Final, Self, Unpack
 
 import numpy as np
 
-from fireworld.arguments import ArgumentError, seed_of, whole_number
+from fireworld.arguments import RUN_SEED_MAX, ArgumentError, seed_of, whole_number
 from fireworld.envs.actions import checked_actions
 from fireworld.envs.autoreset import Autoreset, autoreset_of
 from fireworld.envs.bound_worlds import BoundWorlds
@@ -382,7 +382,7 @@ def _world_seeds_of(given: object, n: int) -> list[int]:
     """Return n seeds; ArgumentError if they are anything else."""
     if not isinstance(given, Sequence | np.ndarray) or np.shape(given) != (n,):
         raise ArgumentError(expected("reset", "world_seeds", f"{n}, one of each world", given))
-    return [seed_of(one, name="world_seeds") for one in given]
+    return [whole_number("world_seeds", one, least=0, most=RUN_SEED_MAX) for one in given]
 
 
 def seeds_in(head: Mapping[str, Any]) -> Seeds:

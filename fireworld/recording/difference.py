@@ -7,13 +7,16 @@ import os
 from collections.abc import Collection, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, Final, overload
 
 from fireworld.errors import LogError, expected
 from fireworld.files import check_output, write_file
 from fireworld.recording.inputs import AnyRun, is_training, open_run, run_name
 from fireworld.records import StoredRun
 from fireworld.shown import text_table
+
+KEYS_SHOWN: Final = 3
+"""Keys of scenarios that cannot be compared."""
 
 if TYPE_CHECKING:
     from fireworld_recorder.diff import RunComparison
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
     from fireworld_recorder.step_difference import FirstDifference
     from fireworld_recorder.totals import Totals
 
+    from fireworld.cause import Cause
     from fireworld.training.log.difference import TrainingDifference
     from fireworld.training.log.reader import TrainingLog
 
@@ -70,10 +74,17 @@ class Difference:
 
     @property
     def header(self) -> Mapping[str, tuple[str | int, str | int]]:
-        """What the runs were asked to do differently; no difference by itself."""
+        """What the runs' headers say differently; no difference by itself."""
         from fireworld_recorder.header import header_differences
 
         return header_differences(self.runs[0].header, self.runs[1].header)
+
+    @cached_property
+    def cause(self) -> Cause:
+        """What the runs were made of differently: scenario, policy, seed, simulator; no difference by itself."""
+        from fireworld.recording.cause import run_cause
+
+        return run_cause(self.runs[0].header, self.runs[1].header)
 
     @property
     def spread(self) -> Spread:
@@ -106,13 +117,20 @@ class Difference:
 
         recordings = [{"path": run_name(run), "state": run.state, "damage": run.damage} for run in self.runs]
         digests = [run.digest for run in self.runs]
-        return {"same": self.same, "digests": digests, "recordings": recordings, **plain(self.found)}
+        known: dict[str, Any] = {
+            "same": self.same,
+            "digests": digests,
+            "recordings": recordings,
+            "cause": self.cause.to_dict(),
+            **plain(self.found),
+        }
+        return known
 
     def junit(self) -> bytes:
         """Return the comparison as JUnit XML, with a test case for each topic."""
         from fireworld.recording.difference_text import difference_junit
 
-        return difference_junit(self.found, self.rules, names=self.names)
+        return difference_junit(self.found, self.rules, self.cause, names=self.names)
 
     def page(self) -> str:
         """Return the comparison as an HTML page with maps and curves, which needs no other file.
@@ -141,13 +159,13 @@ class Difference:
         write_file(Path(path), self.page())
 
     def __repr__(self) -> str:
-        from fireworld.recording.difference_text import header_lines, totals_rows, verdict
+        from fireworld.recording.difference_text import head_lines, totals_rows
 
         if self.known_same:
             line = f"the same: {len(self.runs[0])} steps, digest {self.runs[0].digest}"
-            return "\n".join([line, *header_lines(self.header)])
+            return "\n".join([line, *(self.cause.lines if self.cause.changes else ())])
         table = text_table(("", *self.names), totals_rows(*self.totals), "<>>")
-        return "\n".join([verdict(self.found), *header_lines(self.header), "", table])
+        return "\n".join([*head_lines(self.found, self.cause), "", table])
 
     def _repr_html_(self) -> str:
         from fireworld.recording.pages.difference_page import difference_body
@@ -222,13 +240,28 @@ def diff(
     if tolerances or ignore:
         _ = difference.rules  # raises for a name that does not exist
     if not (any_scenario or same_digest):
-        from fireworld_recorder.header import check_same_scenario
-
-        check_same_scenario(runs[0].header, runs[1].header, names=difference.names)
+        _check_same_scenario(difference)
     if not difference.known_same and difference.first is not None and difference.first.step is None:
         cities = f"{runs[0].city.name} in {difference.names[0]} and {runs[1].city.name} in {difference.names[1]}"
         raise LogError(f"cannot compare runs in different cities, {cities}: {difference.first.sentence}")
     return difference
+
+
+def _check_same_scenario(difference: Difference) -> None:
+    """Raise LogError if two runs are of different scenarios, with the keys that differ."""
+    from fireworld.recording.cause import scenario_text
+
+    found = difference.cause.changes.get("scenario")
+    if found:
+        first, second = (
+            f"{scenario_text(run.header)} in {name}"
+            for run, name in zip(difference.runs, difference.names, strict=True)
+        )
+        keys = "; ".join(found[:KEYS_SHOWN]) + (
+            f"; and {len(found) - KEYS_SHOWN} more" if len(found) > KEYS_SHOWN else ""
+        )
+        what = f"cannot compare runs of different scenarios, {first} and {second}: {keys}"
+        raise LogError(f"{what}; try --any-scenario if that is meant")
 
 
 def _open_both(a: object, b: object, *, partial: bool) -> tuple[StoredRun, StoredRun]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from xml.etree.ElementTree import Element, SubElement
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from fireworld_recorder.spread import SpreadRow, ValuePair
     from fireworld_recorder.totals import Totals
 
+    from fireworld.cause import Cause
+
 COMMIT: Final = "/commit"
 LENGTH: Final = "length"
 """The case of steps that only one run has."""
@@ -27,9 +29,12 @@ SPREAD_HEADS: Final = ("step", "buildings", "fieryness", "brigades", "civilians"
 SPREAD_NOTE: Final = "how many differ; fieryness: buildings in another state; score, burning, burnt out: B - A"
 
 
-def header_lines(header: Mapping[str, tuple[str | int, str | int]]) -> list[str]:
-    """List what the runs were asked to do differently."""
-    return [f"{key.replace('_', ' ')}: {shortened(key, b)}, was {shortened(key, a)}" for key, (a, b) in header.items()]
+def head_lines(difference: RunComparison, cause: Cause) -> list[str]:
+    """List what changed, and where the runs first differ; of runs that are the same, that first."""
+    first = difference.first
+    if first is None:
+        return [verdict(difference), *(cause.lines if cause.changes else ())]
+    return [*cause.lines, first.sentence]
 
 
 def shortened(key: str, value: str | int) -> str:
@@ -47,9 +52,8 @@ def totals_rows(*totals: Totals) -> Iterator[tuple[str, ...]]:
 
 
 def change_lines(difference: RunComparison) -> list[str]:
-    """List what else is different: in what was asked for, and in how the runs came out."""
-    rows = totals_rows(*difference.totals)
-    return [*header_lines(difference.header), *(f"{label}: {b}, was {a}" for label, a, b in rows if a != b)]
+    """List what is different in how the runs came out."""
+    return [f"{label}: {b}, was {a}" for label, a, b in totals_rows(*difference.totals) if a != b]
 
 
 def topic_rows(difference: RunComparison) -> Iterator[tuple[str, str, str]]:
@@ -81,7 +85,7 @@ def verdict(difference: RunComparison) -> str:
     return f"the same: {difference.n_steps_compared} steps" if first is None else first.sentence
 
 
-def difference_junit(difference: RunComparison, rules: Rules, *, names: tuple[str, str]) -> bytes:
+def difference_junit(difference: RunComparison, rules: Rules, cause: Cause, *, names: tuple[str, str]) -> bytes:
     """Write a comparison as a suite with a test case for each topic, in the order in which things happen.
 
     A topic that differs is a failure whose message, and text, is its first difference; one that is not compared is
@@ -90,13 +94,14 @@ def difference_junit(difference: RunComparison, rules: Rules, *, names: tuple[st
     Args:
         difference: what was found.
         rules: by which it was found.
+        cause: what changed.
         names: paths of the two recordings, or what was run.
     """
     parts = [re.sub(r"[^\w-]+", "_", part) for part in Path(names[0]).with_suffix("").parts]
     class_name = ".".join(["fireworld", "diff", *(part for part in parts if part.strip("_"))])
     topics = (*(topic.topic for topic in STEP_TOPICS), Snapshot.topic, COMMIT, LENGTH)
     cases = [_case(name, class_name, difference, rules) for name in topics]
-    properties = {key: f"{b}, was {a}" for key, (a, b) in difference.header.items()}
+    properties = {what: "; ".join(lines) for what, lines in cause.changes.items()}
     return report("fireworld diff", f"{names[0]} and {names[1]}", cases, properties)
 
 

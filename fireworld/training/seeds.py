@@ -16,6 +16,17 @@ _HALF: Final = (1 << _HALF_BITS) - 1
 _ROUNDS: Final = 4
 
 
+def episode_seed(base: int, scenario_number: int, episode: int) -> int:
+    """Return the seed of an episode of a training of fireworld's own, 0 to 2**63 - 1.
+
+    Args:
+        base: the training's own seed.
+        scenario_number: its scenario's, counted through the curriculum from 0.
+        episode: its number in the scenario, from 0.
+    """
+    return hash_key(base, EPISODE, scenario_number, episode) >> 1
+
+
 @dataclass(frozen=True)
 class Seeds:
     """The seeds that follow from one base.

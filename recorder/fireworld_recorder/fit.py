@@ -9,14 +9,14 @@ from typing import Any, Final
 import numpy as np
 
 from fireworld.errors import LogError
-from fireworld.records import Brigades, Buildings, CityRecord, Civilians
+from fireworld.records import Brigades, Buildings, CityRecord, Civilians, Decisions
 from fireworld_recorder.schema import Field, message_of
 
 _FLOATS: Final = frozenset({"double", "float"})
 ALWAYS: Final = (Brigades, Buildings, Civilians, CityRecord)
 """Topics whose columns are there in every step, and whose numbers all have names; others have no columns in step 0, and
 later versions may add names."""
-BUILDING: Final = frozenset({"link_building", "refuge_building", "civilian_building", "in_building", "target"})
+BUILDING: Final = frozenset({"link_building", "refuge_building", "civilian_building", "in_building"})
 """Fields that hold indices of buildings, -1 for none."""
 PLACES: Final = frozenset({"x_m", "y_m", "outline_x_m", "outline_y_m", "node_x_m", "node_y_m"})
 PLACE_MAX_M: Final = 1e8
@@ -83,6 +83,8 @@ def check_record(record: Any, counts: Mapping[str, int], lacks: Lacks = _lacks_n
             first = lengths.setdefault(item.per, len(value))
             if len(value) != first:
                 raise LogError(f"{kind.topic}: {item.name}: {len(value)} entries, where others have {first}")
+    if isinstance(record, Decisions) and len(record.action) != len(record.target):
+        raise LogError(f"{kind.topic}: {len(record.action)} actions and {len(record.target)} targets")
 
 
 def check_field(

@@ -16,7 +16,6 @@ from fireworld_recorder.kind import NOUNS, RUN, LogKind
 
 PROFILE: Final = "fireworld"
 _ATTACHMENT: Final = "attachment:"
-_DIGEST_SHOWN: Final = 12
 _MAY_LACK: Final = ("simulator_digest",)
 """What older logs do not have."""
 
@@ -94,18 +93,6 @@ def header_differences(a: RunHeader, b: RunHeader) -> dict[str, tuple[str | int,
     """
     pairs = {item.name: (getattr(a, item.name), getattr(b, item.name)) for item in _fields(RUN)}
     return {name: pair for name, pair in pairs.items() if pair[0] != pair[1] and not (name in _MAY_LACK and "" in pair)}
-
-
-def check_same_scenario(a: RunHeader, b: RunHeader, *, names: tuple[str, str]) -> None:
-    """Raise LogError if two runs, called by `names`, are of different scenarios."""
-    if a.scenario_digest != b.scenario_digest:
-        first, second = (
-            f"{header.scenario} ({header.scenario_digest[:_DIGEST_SHOWN]}) in {name}"
-            for header, name in zip((a, b), names, strict=True)
-        )
-        raise LogError(
-            f"cannot compare runs of different scenarios, {first} and {second}; try --any-scenario if that is meant"
-        )
 
 
 def _fields(kind: LogKind) -> tuple[dataclasses.Field[Any], ...]:

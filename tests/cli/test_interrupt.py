@@ -101,6 +101,19 @@ def test_ctrl_c_that_others_made_something_else_of(here, fireworld, monkeypatch)
     assert (done.code, done.err) == (130, "interrupted\n")
 
 
+BEFORE = """
+import signal, sys
+sys.addaudithook(lambda event, names: event == "import" and names[0] == "click" and signal.raise_signal(signal.SIGINT))
+from fireworld.__main__ import main
+main()
+"""
+
+
+def test_ctrl_c_before_there_is_a_command_line():
+    done = subprocess.run([sys.executable, "-c", BEFORE], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "interrupted\n")
+
+
 LOST = """
 import signal, sys, time
 from fireworld.cli import _say_what_is_ignored

@@ -25,6 +25,7 @@ def test_a_name_of_any_bytes_serves_every_output(here, fireworld_process, odd):
         (("diff", a, b, "--html", f"{odd}.html", "--junit", f"{odd}.xml"), f"{odd}.html"),
         (("export", a, "--parquet", f"{odd}out"), f"{odd}out"),
         (("report", a, b, "-o", f"{odd}r.html"), f"{odd}r.html"),
+        (("play", a, b, "-o", f"{odd}p.html"), f"{odd}p.html"),
         (("render", a, "-o", f"{odd}.png"), f"{odd}.png"),
     ):
         done = fireworld_process(*words)
@@ -108,6 +109,7 @@ def test_inputs_with_names_of_any_bytes_are_read(here, fireworld, odd):
         ("run", town, "--set", "steps=4", "--record", log),
         ("view", log, "--save", "a.rrd"),
         ("report", log, "-o", "a.html"),
+        ("play", log, "-o", "p.html"),
         ("compare", "chief", "easiest", "--scenarios", town, "--seeds", 1, "--jobs", 1),
         ("train", curriculum, "--set", "n_episodes_max=1", "--jobs", 1, "-o", "t.npz", "--record", training),
         ("view", training, "--save", "t.rrd"),

@@ -11,7 +11,7 @@ import pytest
 
 import fireworld as fw
 from fireworld import envs
-from fireworld.arguments import ArgumentError
+from fireworld.arguments import STEPS_MAX, ArgumentError
 from fireworld.errors import LogError
 from fireworld.training.seeds import Seeds
 from tests.envs.towns import HOT, LATER, SMALL, pickled
@@ -193,6 +193,7 @@ FOREIGN = {
     "with numbers out of bounds": lambda: altered(put("playing", np.array([0, 1, 2]))),
     "with episodes out of bounds": lambda: altered(put("episode_number", np.array([0, -2, 0]))),
     "with a clock out of bounds": lambda: altered(put("clock", np.full((3, 3), -1))),
+    "with steps out of bounds": lambda: altered(put("clock", np.full((3, 3), STEPS_MAX + 1))),
     "with memory of another size": lambda: altered(put("world0", np.zeros(3, dtype=np.uint8))),
     "with another base": lambda: altered(with_base(-1)),
     "without a base": lambda: altered(with_base(None)),

@@ -64,6 +64,7 @@ def warm() -> None:
         "fireworld.recording.explanation",
         "fireworld.recording.fork",
         "fireworld.recording.golden.update",
+        "fireworld.recording.pages.play",
         "fireworld.recording.pages.run_page",
         "fireworld.reproduction.reproduce",
         "fireworld.training.log.verify",

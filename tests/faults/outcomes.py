@@ -14,6 +14,7 @@ USER_ERROR: Final = 2
 FAILURES: Final = ("traceback", "exit code", "half file", "memory", "hang", "line", "other")
 """Kinds of failures; "line": a refusal that is not one clear line, "other": any other broken promise."""
 _TRACEBACKS: Final = ("Traceback (most recent call last)", "internal error", "Exception ignored", "Fatal Python error")
+_BEGUN: Final = re.compile(r"fireworld/(?!__main__|__init__|version)\w+")
 _LINE: Final = re.compile(r"^(fireworld: .+|Error: .+|golden: .+)$")
 _ESCAPES: Final = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
@@ -96,7 +97,7 @@ def judge(done: Done, codes: Collection[int], *, cpu_seconds_max: float = CPU_SE
     found = []
     said = f"`{' '.join(done.words)}`"
     for sign in _TRACEBACKS:
-        if sign in done.err:
+        if sign in done.err and not came_before_fireworld(done):
             found.append(Failure("traceback", f"{said}: {_around(done.err, sign)}"))
             break
     if done.timed_out or done.cpu_seconds > cpu_seconds_max:
@@ -112,6 +113,11 @@ def judge(done: Done, codes: Collection[int], *, cpu_seconds_max: float = CPU_SE
     if done.code == USER_ERROR and not done.timed_out and done.words[0] != "pytest":
         found += [Failure("line", f"{said}: {fault}") for fault in faults_of_a_refusal(done)]
     return found
+
+
+def came_before_fireworld(done: Done) -> bool:
+    """Return whether a signal came while Python itself began, before there was a command line to take it."""
+    return not done.err or (done.line == "KeyboardInterrupt" and not _BEGUN.search(done.err))
 
 
 def faults_of_a_refusal(done: Done) -> list[str]:

@@ -195,6 +195,8 @@ WRITERS: Final[dict[str, Writer]] = {
     ),
     "report": Writer(("report", "run.mcap", "-o", "r.html"), ("r.html",), RUN, ("--force",)),
     "report of a training": Writer(("report", "training.mcap", "-o", "r.html"), ("r.html",), TRAINING, ("--force",)),
+    "play": Writer(("play", "run.mcap", "-o", "p.html"), ("p.html",), RUN, ("--force",)),
+    "play two": Writer(("play", "run.mcap", "other.mcap", "-o", "p.html"), ("p.html",), TWO, ("--force",)),
     "render": Writer(("render", "run.mcap", "-o", "p.png"), ("p.png",), RUN, ("--force",)),
     "render a film": Writer(("render", "run.mcap", "-o", "p.gif", "--every", 6), ("p.gif",), RUN, ("--force",)),
     "fork": Writer(

@@ -69,6 +69,7 @@ def test_run_record_verify_and_view(call, project):
     call("fireworld", "view", "a.mcap", "--save", "a.rrd")
     assert (project / "a.rrd").stat().st_size > 10_000
     call("fireworld", "report", "a.mcap", "-o", "a.html")
+    call("fireworld", "play", "a.mcap", "-o", "p.html")
     call("fireworld", "fork", "a.mcap", "--at", "3", "--decide", "0=easiest", "--record", "b.mcap")
 
 

@@ -82,3 +82,4 @@ def test_it_works_without_the_checkout(wheel, tmp_path):
     assert all(name in listed for name in scenario_names())
     call(sys.executable, "-m", "fireworld", "run", "quick", "--policy", "best", "--steps", "5", "--record", "a.mcap")
     assert "the same" in call(sys.executable, "-m", "fireworld", "verify", "a.mcap")
+    assert "wrote p.html" in call(sys.executable, "-m", "fireworld", "play", "a.mcap", "-o", "p.html")

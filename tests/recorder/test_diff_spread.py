@@ -6,7 +6,6 @@ import tracemalloc
 import numpy as np
 import pytest
 from fireworld_recorder.diff import StepRange, compare
-from fireworld_recorder.header import check_same_scenario
 from fireworld_recorder.reader import open_log
 from fireworld_recorder.spread import ValuePair
 
@@ -132,13 +131,6 @@ def test_watching_sees_every_step_of_either_run(run, with_records, records):
     assert rows[29].score == ValuePair(4.5, None)
     assert difference.spread.rows == ()
     assert difference.first.phase == "length"
-
-
-def test_runs_of_two_scenarios_are_refused_by_name():
-    a, b = synthetic.header(), synthetic.header(scenario="other", scenario_digest="ef" * 32)
-    check_same_scenario(a, synthetic.header(policy="random"), names=("a", "b"))
-    with pytest.raises(LogError, match=r"synthetic \(abababababab\) in a and other \(efefefefefef\) in b"):
-        check_same_scenario(a, b, names=("a", "b"))
 
 
 def test_memory_holds_a_step_of_each_run_and_not_the_runs(tmp_path):

@@ -89,3 +89,14 @@ def test_choices_of_another_version_are_shown(tmp_path, fireworld, field, value)
         assert done.code == (1 if words[0] in {"diff", "verify"} else done.code), (words, done)
     assert (tmp_path / "v.rrd").exists()
     assert (tmp_path / "p.png").exists()
+
+
+@pytest.mark.parametrize("field", ["action", "target"])
+def test_actions_and_targets_go_together(tmp_path, field):
+    city, path = synthetic.city(), tmp_path / "a.mcap"
+    with LogWriter(path, synthetic.header(), city) as log:
+        for step in synthetic.run(2, city_record=city):
+            empty = np.zeros(0, dtype=np.int32)
+            log.write(dataclasses.replace(step, decisions=dataclasses.replace(step.decisions, **{field: empty})))
+    with pytest.raises(LogError, match=r"/decisions: \d+ actions and \d+ targets"):
+        list(open_log(path))

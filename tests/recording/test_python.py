@@ -39,8 +39,8 @@ def test_a_difference_is_what_the_command_writes(here, fireworld):
 def test_a_difference_shows_itself(here):
     difference = diff(open_log("easiest.mcap"), "random.mcap")
     lines = repr(difference).splitlines()
-    assert lines[0] == difference.first.sentence
-    assert "policy: random, was easiest" in lines
+    assert lines[0].startswith("changed: policy: random, was easiest")
+    assert lines[1] == difference.first.sentence
     score = difference.totals[1].outcome.score
     assert any(line.startswith("score") and line.endswith(f"{score:.6g}") for line in lines)
     html = difference._repr_html_()

@@ -67,7 +67,10 @@ def test_it_moves_no_digest_of_a_run_and_older_logs_do_without(log_path, tmp_pat
     assert not fw.diff(old, log_path).header
     other = copied(log_path, tmp_path / "other.mcap", simulator_digest="ab" * 32)
     assert fw.diff(other, log_path).header == {"simulator_digest": ("ab" * 32, simulator_digest())}
-    assert f"simulator digest: {simulator_digest()[:12]}, was abababababab" in fireworld("diff", other, log_path).out
+    said = (
+        f"changed: simulator: {simulator_version()}, was 0.1.0+abababababab; scenario, policy and seed are the same\n"
+    )
+    assert said in fireworld("diff", other, log_path).out
 
 
 def test_who_recorded_what_is_computed_otherwise(log_path, tmp_path, fireworld):

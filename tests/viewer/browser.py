@@ -59,6 +59,18 @@ class Browser:
         """Go to a page."""
         self.send("POST", "/url", {"url": url})
 
+    def execute(self, script: str, *arguments: Any) -> Any:
+        """Execute JavaScript in the page and return what it returns."""
+        return self.send("POST", "/execute/sync", {"script": script, "args": list(arguments)})
+
+    def devtools(self, command: str, **parameters: Any) -> Any:
+        """Send a command of Chromium's own protocol."""
+        return self.send("POST", "/goog/cdp/execute", {"cmd": command, "params": parameters})
+
+    def complaints(self) -> list[str]:
+        """Return what the console has said since the last call."""
+        return [line["message"] for line in self.send("POST", "/se/log", {"type": "browser"})]
+
     def press(self, key: str) -> None:
         """Press a key and let go of it."""
         strokes = [{"type": stroke, "value": key} for stroke in ("keyDown", "keyUp")]

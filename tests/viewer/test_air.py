@@ -11,6 +11,7 @@ from fireworld_viewer import colors
 from fireworld_viewer.rerun_view import app
 from fireworld_viewer.rerun_view.city_layers import HOTTEST, air_pixels
 
+from fireworld.errors import LogError
 from fireworld.recording.replay import Replay
 from fireworld.records import CityRecord, MemoryRecording, Snapshot
 from tests import command_line
@@ -55,6 +56,16 @@ def test_the_air_of_a_snapshot_lies_over_the_city_and_bears_its_step(tmp_path: P
     assert np.count_nonzero(raw[..., 3]) == 2
     said = [(step, text.as_py()) for step, text in found["/air/when"]["Points3D:labels"]]
     assert said == [(0, ["air after step 0: at most 0 degrees"]), (3, ["air after step 3: at most 600 degrees"])]
+
+
+@pytest.mark.parametrize("sizes", [{"air_nx": -2}, {"air_nx": 10**6}, {"air_ny": 7}, {"air_nx": -2, "air_ny": -1}])
+def test_air_of_other_cells_than_the_citys_is_a_line(tmp_path: Path, sizes: dict[str, int]):
+    made = make_recording(3, 3, 2)
+    steps = [replace(record, snapshot=snapshot([[0, 0, 0], [0, 0, 0]])) for record in made]
+    recording = MemoryRecording(made.header, replace(city_with_air(made.city), **sizes), steps)
+    with pytest.raises(LogError, match=r"^/snapshot: fire.air: expected an array of the city's"):
+        app.save([recording], tmp_path / "air.rrd")
+    assert not [*tmp_path.iterdir()]
 
 
 def test_a_recording_without_snapshots_has_no_air(small, tmp_path: Path):

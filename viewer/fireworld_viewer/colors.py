@@ -100,6 +100,9 @@ WORSE_RGB: Final[Rgb] = (214, 60, 52)
 DIFFERENCE_RGB: Final[tuple[Rgb, ...]] = (BETTER_RGB, FIERYNESS_RGB[0], WORSE_RGB)
 """By difference + 1: -1 less damage in the second run, 0 the same, +1 more."""
 
+DIFFERS_RGB: Final[Rgb] = (160, 32, 154)
+"""Edges of what differs between two runs."""
+
 
 def packed_array(rgb: NDArray[Any]) -> UInt32Array:
     """Pack colors as 0xRRGGBBAA, opaque: (..., 3) to (...)."""

@@ -8,6 +8,7 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
+from fireworld.arguments import RUN_SEED_MAX
 from fireworld.errors import LogError, expected, one_line
 from fireworld.kernels.arrays import Array
 from fireworld.recording.inputs import AnyRun, check_replayable, is_training, open_run, run_name
@@ -17,7 +18,7 @@ from fireworld.scenario import Scenario
 from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.simulation.placement import CITY_ATTACHMENT
 from fireworld.training.log.environment import ENVIRONMENT
-from fireworld.training.log.played import OWN, RUN_SEED_MAX, Decided, Played, check_played, columns_of
+from fireworld.training.log.played import OWN, Decided, Played, check_played, columns_of
 from fireworld.training.log.played_run import PlayedEpisode, PlayedRun, digest_of, recorded_seeds
 from fireworld.training.log.reader import AnyTraining, TrainingLog, opened
 from fireworld.training.log.writer import CITY_FOLDER

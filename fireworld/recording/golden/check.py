@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -13,9 +14,11 @@ from fireworld_recorder.diff import RunComparison, compare
 from fireworld_recorder.reader import Log, open_log
 from fireworld_recorder.totals import plain
 
+from fireworld.cause import Cause
 from fireworld.errors import FireworldError, OutputError, expected
 from fireworld.files import check_output, read_text_file
 from fireworld.junit import clean, report
+from fireworld.recording.cause import run_cause
 from fireworld.recording.difference_text import change_lines
 from fireworld.recording.golden.again import run_again
 from fireworld.recording.golden.spec import prepare_golden, spec_of
@@ -45,6 +48,10 @@ class GoldenResult:
     fresh: Run | TrainedAgain | None = None
     """The new run or training; None if there was none."""
     difference: RunComparison | TrainingDifference | None = None
+    cause: Cause | None = None
+    """What was changed since it was recorded; None if it could not be run or compared."""
+    seconds: float = 0.0
+    """What running and comparing took."""
     error: str = ""
     """Why it could not be run or compared."""
     text_is_foreign: bool = False
@@ -84,6 +91,17 @@ class GoldenResult:
         return ""
 
     @property
+    def headline(self) -> str:
+        """What is wrong, in a line that begins with what changed; empty if nothing is."""
+        return f"{self.cause.short}; {self.sentence}" if self.cause is not None and self.differs else self.sentence
+
+    @property
+    def lines(self) -> list[str]:
+        """What stands below the headline: what changed, and what else is different, line by line."""
+        cause = self.cause.lines if self.cause is not None and self.differs else []
+        return [*cause, *self.changes]
+
+    @property
     def changes(self) -> list[str]:
         """What else is different, line by line."""
         if isinstance(self.difference, TrainingDifference):
@@ -105,7 +123,13 @@ class GoldenResult:
     def to_dict(self) -> dict[str, Any]:
         """Return the result as plain values; of a difference, a is the golden and b the new run or training."""
         header, difference = self.header, self.difference
-        common = {"name": self.name, "result": self.result, "seed": header and header.seed, "sentence": self.sentence}
+        common: dict[str, Any] = {
+            "name": self.name,
+            "result": self.result,
+            "seed": header and header.seed,
+            "sentence": self.sentence,
+        }
+        common["cause"] = self.cause and self.cause.to_dict()
         if isinstance(header, TrainingHeader):
             found = difference.to_dict() if isinstance(difference, TrainingDifference) else {"first": None}
             return {**common, "curriculum": header.curriculum, "method": header.method, **found}
@@ -182,6 +206,7 @@ def check_golden(path: Path, *, cities: CityCache | None = None) -> GoldenResult
     """Do a golden's spec again and compare; if that is not possible the result has the error."""
     header: RunHeader | TrainingHeader | None = None
     fresh: Run | TrainedAgain
+    began = time.perf_counter()
     try:
         if is_training(path):
             golden = open_training(path)
@@ -190,9 +215,9 @@ def check_golden(path: Path, *, cities: CityCache | None = None) -> GoldenResult
         else:
             header = open_log(path).header
             fresh = run_again(prepare_golden(spec_of(header), path.parent, recorded=header, cities=cities))
-        return compare_golden(path, fresh)
+        return replace(compare_golden(path, fresh), seconds=time.perf_counter() - began)
     except FireworldError as error:
-        return GoldenResult(path=path, header=header, error=str(error))
+        return GoldenResult(path=path, header=header, error=str(error), seconds=time.perf_counter() - began)
 
 
 def compare_golden(path: Path, fresh: Run | TrainedAgain) -> GoldenResult:
@@ -207,14 +232,17 @@ def compare_golden(path: Path, fresh: Run | TrainedAgain) -> GoldenResult:
     if isinstance(fresh, TrainedAgain):
         golden = open_training(path)
         difference = compare_trainings(golden, fresh, names=("golden", "now"))
+        cause = difference.cause
     else:
         golden, spec = open_log(path), spec_of(fresh.header)
         difference = compare(golden, fresh, tolerances=spec.tolerances, ignore=spec.ignore)
+        cause = run_cause(golden.header, fresh.header)
     return GoldenResult(
         path=path,
         header=golden.header,
         fresh=fresh,
         difference=difference,
+        cause=cause,
         text_is_foreign=not is_text_of(_text_beside(path), golden),
     )
 
@@ -228,10 +256,11 @@ def goldens_junit(results: Sequence[GoldenResult]) -> bytes:
     """Return results as JUnit XML: a difference is a failure, what cannot be run an error."""
     cases = []
     for result in results:
-        case = Element("testcase", {"classname": "golden", "name": clean(result.name), "time": "0"})
+        place = {"file": clean(str(result.path)), "line": "1", "time": f"{result.seconds:.3f}"}
+        case = Element("testcase", {"classname": "golden", "name": clean(result.name), **place})
         if result.result != "same":
             kind = "error" if result.difference is None else "failure"
-            fault = SubElement(case, kind, {"message": clean(result.sentence), "type": result.result})
-            fault.text = clean("\n".join((result.sentence, *result.changes)))
+            fault = SubElement(case, kind, {"message": clean(result.headline), "type": result.result})
+            fault.text = clean("\n".join((result.headline, *result.lines)))
         cases.append(case)
     return report("fireworld golden", "fireworld golden", cases)

@@ -183,7 +183,6 @@ def _hashes(log: TrainingLog) -> list[str]:
 
 
 def training_changes(difference: TrainingDifference) -> Iterator[str]:
-    """Yield what else is different: in what was asked for, in the tables, and scenario by scenario."""
-    _, *blocks = difference.describe()
-    for block in blocks:
+    """Yield what else is different: in the tables, and scenario by scenario."""
+    for block in difference.spread_blocks():
         yield from block_text(block).split("\n")

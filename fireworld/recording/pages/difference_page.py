@@ -58,11 +58,12 @@ def difference_page(compared: Difference) -> str:
 
 def difference_body(compared: Difference, images: Mapping[str, bytes]) -> list[str]:
     """Write what stands below the title; images are PNG files by name, and left out where missing."""
-    difference, first = compared.found, compared.first
+    difference, first, cause = compared.found, compared.first, compared.cause
     verdict = html_mark("the same", "good") if first is None else html_mark("different", "bad")
     sentence = f"{difference.n_steps_compared} steps are the same" if first is None else first.sentence
     return [
         f'<p class="first">{verdict} {escape(sentence)}</p>',
+        *(f"<p>{escape(line.strip())}</p>" for line in (cause.lines if first or cause.changes else ())),
         *(f'<p class="caveat">{escape(f"{name}: {run.damage}; nothing is compared beyond")}</p>'
           for run, name in zip(compared.runs, compared.names, strict=True) if run.damage is not None),
         _header(compared),

@@ -10,8 +10,10 @@ from typing import Any
 
 from fireworld_recorder.codec import encode
 
+from fireworld.cause import Cause
 from fireworld.errors import LogError, expected
 from fireworld.shown import SHOWN_MAX, Block, Shown, TextTable
+from fireworld.training.log.cause import training_cause
 from fireworld.training.log.first_difference import FirstDifference, Trained, first_difference
 from fireworld.training.log.played_difference import compare_played
 from fireworld.training.log.reader import AnyTraining, Part, TrainingLog, opened
@@ -26,6 +28,7 @@ class TrainingDifference(Shown):
     Attributes:
         names: what they are called.
         header: what was asked for differently: name, value of A, value of B.
+        cause: the same, key by key of the scenarios, in words.
         n_parts: episodes or generations compared.
         unit: what a part is.
         digests: of either, of as much as was compared.
@@ -35,6 +38,7 @@ class TrainingDifference(Shown):
 
     names: tuple[str, str]
     header: Mapping[str, tuple[Any, Any]]
+    cause: Cause
     n_parts: int
     unit: str
     first: FirstDifference | None
@@ -54,18 +58,24 @@ class TrainingDifference(Shown):
             "unit": self.unit,
             "n_parts_compared": self.n_parts,
             "header": {key: list(pair) for key, pair in self.header.items()},
+            "cause": self.cause.to_dict(),
             "first": first,
             "scenarios": [{**_plain(asdict(one)), "verdict": one.verdict} for one in self.spread],
         }
 
     def describe(self, *, limit: int = SHOWN_MAX) -> Iterator[Block]:
-        """Yield the first difference, what was asked for differently, and how it spread."""
-        yield f"the same: {self.n_parts} {self.unit}s" if self.first is None else self.first.sentence
-        for key, (a, b) in self.header.items():
-            yield f"{key}: {b}, was {a}"
+        """Yield what changed, the first difference, and how it spread."""
         if self.first is None:
+            yield f"the same: {self.n_parts} {self.unit}s"
+            yield from self.cause.lines if self.cause.changes else ()
             return
-        if self.first.entries:
+        yield from self.cause.lines
+        yield self.first.sentence
+        yield from self.spread_blocks(limit=limit)
+
+    def spread_blocks(self, *, limit: int = SHOWN_MAX) -> Iterator[Block]:
+        """Yield how the first difference spread: in the tables, and scenario by scenario."""
+        if self.first is not None and self.first.entries:
             yield ""
             yield f"tables after it: {self.first.n_entries} values differ"
             rows = [[f"{t}", f"{s}", action, f"{a:.6g}", f"{b:.6g}"] for t, s, action, a, b in self.first.entries]
@@ -119,7 +129,7 @@ def compare_trainings(
     _check_comparable(a, b, names)
     if a.is_played:
         n, where, scenarios = compare_played(a, b, on_part)
-        return TrainingDifference(names, _header(a, b), n, a.header.unit, where, scenarios)
+        return TrainingDifference(names, _header(a, b), training_cause(a, b), n, a.header.unit, where, scenarios)
     first: FirstDifference | None = None
     spread = Spread()
     n_parts = 0
@@ -131,7 +141,7 @@ def compare_trainings(
         n_parts += 1
         on_part()
     found = spread.scenarios([scenario.name for scenario in a.scenarios])
-    return TrainingDifference(names, _header(a, b), n_parts, a.header.unit, first, found)
+    return TrainingDifference(names, _header(a, b), training_cause(a, b), n_parts, a.header.unit, first, found)
 
 
 def _messages(part: Part) -> list[bytes]:

@@ -10,7 +10,7 @@ from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
 
-from fireworld.arguments import SEED_MAX
+from fireworld.arguments import RUN_SEED_MAX, SEED_MAX
 from fireworld.errors import LogError
 from fireworld.records import ACTION_NAMES, ACTIONS, Array, column, value
 from fireworld.training.seeds import EPISODES_MAX, WORKERS_MAX
@@ -20,7 +20,6 @@ OWN: Final = len(ACTIONS)
 NOTHING: Final = OWN + 1
 """Recorded of a brigade that had nothing to choose."""
 STEP_MAX: Final = 1_000_000
-RUN_SEED_MAX: Final = 2**63 - 1
 DIGEST_BYTES: Final = 32
 
 

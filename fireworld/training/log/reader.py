@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
@@ -17,19 +16,17 @@ from fireworld_recorder.reader import RawStep, raw_commits
 from fireworld_recorder.scan import TopicSize, scan
 
 from fireworld.arguments import path_of
-from fireworld.errors import FireworldError, LogError, OutputError, expected, one_line
+from fireworld.errors import LogError, OutputError, expected, one_line
 from fireworld.policy.teams.team import Team
-from fireworld.scenario import Scenario, parse_scenario
+from fireworld.scenario import Scenario
 from fireworld.shown import SHOWN_MAX, Block, Shown
-from fireworld.simulation.built import CityCache
-from fireworld.training.curriculum import Curriculum, CurriculumStage
-from fireworld.training.log.environment import Environment, PlayedTrainer, method_named
+from fireworld.training.log.environment import Environment, PlayedTrainer
 from fireworld.training.log.learned import LearnedEpisode, learned
 from fireworld.training.log.played import Played
 from fireworld.training.log.played_run import PlayedEpisode
 from fireworld.training.log.records import TRAINING, Episode, PartCommit, Plan, TrainingHeader, check_places
-from fireworld.training.log.writer import CITY_FOLDER, CURRICULUM_ATTACHMENT, METHOD_ATTACHMENT
-from fireworld.training.method import Method, Report, Trainer
+from fireworld.training.log.setting import check_plan, setting_of
+from fireworld.training.method import Report, Trainer
 from fireworld.training.methods.sarsa import SarsaTrainer
 
 if TYPE_CHECKING:
@@ -91,7 +88,8 @@ class TrainingLog(Shown):
         self.damage = self.found.damage
         self.topics: Mapping[str, TopicSize] = self.found.topics
         try:
-            self.method, self.curriculum, self._cities = _setting(self.header)
+            self.method, self.curriculum, self._cities = setting_of(self.header)
+            check_plan(self.plan, self.curriculum)
         except LogError as error:
             raise LogError(f"{path}: {error}") from None
         self._topics = self.trainer().topics
@@ -347,40 +345,6 @@ class TrainingLog(Shown):
         header = self.header
         what = f"{header.method} in {header.curriculum}, seed {header.seed}"
         return one_line(f"<TrainingLog {what}: {len(self)} {header.unit}s, {self.state}, digest {self.digest[:12]}>")
-
-
-def _setting(header: TrainingHeader) -> tuple[Method, Curriculum, CityCache]:
-    """Return the method and the curriculum that a header carries, and its cities."""
-    files = header.attachments
-    for name in (METHOD_ATTACHMENT, CURRICULUM_ATTACHMENT):
-        if name not in files:
-            raise LogError(expected("attachments", "", name, ", ".join(sorted(files)) or "none"))
-    try:
-        method = json.loads(files[METHOD_ATTACHMENT])
-        name = method.pop("name")
-        made = method_named(name).with_settings(method)
-        text = json.loads(files[CURRICULUM_ATTACHMENT])
-        stages = tuple(
-            CurriculumStage(
-                stage["name"],
-                bool(stage["cooperation"]),
-                tuple(parse_scenario(files[one], source=f"training: {one}") for one in stage["scenarios"]),
-            )
-            for stage in text["stages"]
-        )
-        curriculum = Curriculum(str(text["name"]), stages)
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise LogError(f"attachments: {CURRICULUM_ATTACHMENT} and {METHOD_ATTACHMENT} make no sense: {error}") from None
-    except FireworldError as error:
-        raise LogError(f"attachments: {error}") from None
-    if curriculum.digest != header.curriculum_digest:
-        raise LogError(expected("attachments", "curriculum", f"digest {header.curriculum_digest}", curriculum.digest))
-    cities = {
-        name.removeprefix(CITY_FOLDER).removesuffix(".json"): data
-        for name, data in files.items()
-        if name.startswith(CITY_FOLDER)
-    }
-    return made, curriculum, CityCache(cities)
 
 
 def without_columns(record: Any) -> Any:

@@ -14,6 +14,7 @@ import numpy as np
 from fireworld_recorder.kind import LogKind
 from fireworld_recorder.schema import Channel, channel_of
 
+from fireworld.arguments import RUN_SEED_MAX
 from fireworld.errors import LogError
 from fireworld.kernels.arrays import Trace
 from fireworld.kernels.learning import EXPLORED, GREEDY, KEPT
@@ -26,8 +27,6 @@ from fireworld.training.log.played import Played, check_played
 
 FORMAT: Final = "fireworld-training/1"
 PACKAGE: Final = "fireworld.training.v1"
-SEED_MAX: Final = 2**63 - 1
-"""Of an episode's run: what the kernels count with."""
 TERM_NAMES: Final = tuple(term.name for term in TERMS)
 
 
@@ -244,8 +243,8 @@ def check_places(record: Any, n_brigades: Sequence[int]) -> None:
     scenario, seed = (np.atleast_1d(getattr(record, name)) for name in fires)
     if len(scenario) and not 0 <= int(scenario.min()) <= int(scenario.max()) < len(n_brigades):
         raise LogError(f"{record.topic}: {fires[0]}: a scenario that the plan has not")
-    if len(seed) and int(seed.max()) > SEED_MAX:
-        raise LogError(f"{record.topic}: {fires[1]}: {int(seed.max())} is above {SEED_MAX}, the largest of a run")
+    if len(seed) and int(seed.max()) > RUN_SEED_MAX:
+        raise LogError(f"{record.topic}: {fires[1]}: {int(seed.max())} is above {RUN_SEED_MAX}, the largest of a run")
     if isinstance(record, Played):
         check_played(record, n_brigades[record.scenario])
     if isinstance(record, Tried) and not _fits(record):
@@ -256,6 +255,8 @@ def _fits(tried: Tried) -> bool:
     """Return whether the columns of a generation are of the same rankings, weights and fires."""
     n_weights = len(tried.mean)
     if not n_weights or n_weights != len(tried.spread) or len(tried.weights) % n_weights:
+        return False
+    if len(tried.seed) != len(tried.fire):
         return False
     return len(tried.weights) // n_weights * len(tried.fire) == len(tried.scores)
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Final, Literal, get_args
 import msgspec
 import numpy as np
 
-from fireworld.draws import EPISODE, TABLE, below, hash_key
+from fireworld.draws import TABLE, below
 from fireworld.errors import LogError, TrainingError, expected
 from fireworld.executors import Workers
 from fireworld.kernels.arrays import Array, Learner, PolicyArrays, Trace
@@ -28,6 +28,7 @@ from fireworld.simulation.state import fresh_learner, fresh_trace
 from fireworld.training.curriculum import Curriculum
 from fireworld.training.log.records import Episode, Tables, Updates, trace_columns
 from fireworld.training.method import Count, Limits, Method, NotNegative, Play, Report, Share, Trainer
+from fireworld.training.seeds import episode_seed
 
 Rule = Literal["sarsa", "expected-sarsa", "q-learning"]
 REPORTED: Final = (
@@ -345,7 +346,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         method, progress = self.method, self.progress
         number, episode = progress.scenario_number, progress.episode
         epsilon = _power(method.epsilon_decay, episode)
-        seed = hash_key(self.seed, EPISODE, number, 0 if method.fixed_noise else episode) >> 1
+        seed = episode_seed(self.seed, number, 0 if method.fixed_noise else episode)
         world = built.world(seed=seed)
         traced = self.recording or self.watched
         trace = fresh_trace(built.n_brigades, world.n_steps_max if traced else 0)

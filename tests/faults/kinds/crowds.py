@@ -31,6 +31,7 @@ ON_ONE_NAME: Final[dict[str, tuple[tuple[object, ...], str]]] = {
     "compare --results": ((*COMPARE, "--results", "a.parquet"), "a.parquet"),
     "export --force": (("export", "run.mcap", "--parquet", "out", "--force"), "out/steps.parquet"),
     "report --force": (("report", "run.mcap", "-o", "a.html", "--force"), "a.html"),
+    "play --force": (("play", "run.mcap", "-o", "a.html", "--force"), "a.html"),
     "recover --force": (("recover", "cut-run.mcap", "-o", "a.mcap", "--force"), "a.mcap"),
     "golden add": (("golden", "add", *RUN[1:], "--name", "one", "--dir", "g"), "g/one.mcap"),
     "golden update": (("golden", "update", "--dir", "stale", "--reason", "Another choice."), "stale/first.mcap"),

@@ -58,6 +58,7 @@ OF_ALL: Final = (
     Reader(("recover", "a.mcap", "-o", "o.mcap"), outputs=("o.mcap",)),
     Reader(("export", "a.mcap", "--parquet", "o"), outputs=("o",)),
     Reader(("report", "a.mcap", "-o", "o.html"), outputs=("o.html",)),
+    Reader(("play", "a.mcap", "-o", "o.html"), outputs=("o.html",)),
     Reader(("render", "a.mcap", "-o", "o.png"), outputs=("o.png",)),
     Reader(("view", "a.mcap", "--save", "o.rrd"), outputs=("o.rrd",)),
     Reader(("view", "good.mcap", "a.mcap", "--save", "o.rrd"), outputs=("o.rrd",)),
@@ -68,6 +69,8 @@ OF_ALL: Final = (
 OF_RUNS: Final = (
     Reader(("diff", "good.mcap", "a.mcap", "--html", "o.html", "--junit", "o.xml"), JUDGES, whole=True, judges=True),
     Reader(("report", "good.mcap", "a.mcap", "-o", "o.html"), outputs=("o.html",)),
+    Reader(("play", "good.mcap", "a.mcap", "-o", "o.html"), outputs=("o.html",)),
+    Reader(("play", "a.mcap", "-o", "o.html", "--from", 2, "--every", 3), outputs=("o.html",)),
     Reader(("render", "a.mcap", "-o", "o.png", "--steps", "0,3,last"), outputs=("o.png",)),
     Reader(("render", "a.mcap", "good.mcap", "-o", "o.gif", "--every", 6), outputs=("o.gif",)),
     Reader(("view", "a.mcap", "--save", "o.rrd", "--air"), outputs=("o.rrd",)),

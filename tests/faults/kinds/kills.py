@@ -13,7 +13,7 @@ from fireworld.errors import FireworldError
 from tests.faults import whole
 from tests.faults.bench import DONE, Bench, as_process
 from tests.faults.calls import draw_moment
-from tests.faults.outcomes import Outcome
+from tests.faults.outcomes import Outcome, came_before_fireworld
 from tests.faults.writers import OFTEN, WRITERS, Whole, call_again, look, missing_files, whole_call
 
 NAME: Final = "kills"
@@ -41,7 +41,7 @@ def run(generator: random.Random, bench: Bench) -> Outcome:
     )
     bench.told.append(f"{name}, signal {number} at {moment}")
     if number != signal.SIGKILL and done.code == -number:
-        begun = not bench.processes or done.err or bench.files() != given  # Python itself was not there yet
+        begun = not bench.processes or not came_before_fireworld(done) or bench.files() != given
         bench.outcome.expect(not begun, f"`{' '.join(done.words)}`: ended by signal {number}: {done.line}", "exit code")
     finished = done.code == expected.code
     look(bench, writer, expected, given, killed=done.code < 0)

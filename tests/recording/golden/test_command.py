@@ -79,8 +79,9 @@ def test_a_changed_policy_is_found_and_told(kept, golden, change_policy):
     change_policy("EASIEST")
     done = golden("check")
     assert done.code == 1
-    assert "quick-mine-Policy: step 1, choose: brigade 0 chose easiest, was nearest-to-me\n" in done.out
-    assert "  policy digest: " in done.out
+    assert "quick-mine-Policy: policy changed; step 1, choose: brigade 0 chose easiest, was nearest-to-me\n" in done.out
+    assert "  changed: policy: mine:Policy, digest " in done.out
+    assert "; scenario, seed and simulator are the same\n" in done.out
     assert 'If that is meant: fireworld golden update --reason "..."' in done.out
     assert "quick-easiest: " not in done.out
 
@@ -94,6 +95,7 @@ def test_json(kept, golden, change_policy):
     assert (different["result"], different["policy"], different["seed"]) == ("different", "mine:Policy", 1)
     assert (different["first"]["step"], different["first"]["a"], different["first"]["b"]) == (1, 3, 0)
     assert "policy_digest" in different["header"]
+    assert list(different["cause"]["changes"]) == ["policy"]
 
 
 def test_junit(kept, golden, write_policy):
@@ -115,8 +117,11 @@ def test_junit(kept, golden, write_policy):
 def test_junit_of_a_difference(kept, golden, change_policy):
     change_policy("EASIEST")
     assert golden("check", "--junit", "report.xml").code == 1
-    failure = report().find("testsuite/testcase/failure")
-    assert failure.get("message") == "step 1, choose: brigade 0 chose easiest, was nearest-to-me"
+    (case,) = [case for case in report().iter("testcase") if case.find("failure") is not None]
+    failure = case.find("failure")
+    assert failure.get("message") == "policy changed; step 1, choose: brigade 0 chose easiest, was nearest-to-me"
+    assert float(case.get("time")) > 0
+    assert (case.get("file"), case.get("line")) == ("recordings/golden/quick-mine-Policy.mcap", "1")
 
 
 def test_keep_records_the_new_runs_that_differ(kept, golden, here, change_policy, monkeypatch):
@@ -246,7 +251,7 @@ def test_a_scenario_of_ones_own_is_run_as_it_is_now(here, golden, monkeypatch):
     (here / "fires" / "own.yaml").write_text(scenario.replace("power_litres: 2000", "power_litres: 1000"))
     done = golden("check", here / "kept")
     assert done.code == 1
-    assert "scenario digest: " in done.out
+    assert "changed: scenario: parameters.brigades.power_litres: 1000, was 2000; policy, seed and" in done.out
     (here / "fires" / "own.yaml").unlink()
     done = golden("check", here / "kept")
     assert done.code == 2
@@ -271,7 +276,7 @@ def test_a_team_file_is_found_from_the_golden(here, golden, monkeypatch):
     TableTeam(tables=-tables, visits=np.zeros(tables.shape, dtype=np.int64)).save(here / "team.npz", force=True)
     done = golden("check", here / "kept")
     assert done.code == 1
-    assert "quick-team: step 1, choose: brigade 0 " in done.out
+    assert "quick-team: policy changed; step 1, choose: brigade 0 " in done.out
 
 
 def test_a_plain_recording_is_run_again_as_recorded(here, golden, write_policy, monkeypatch):

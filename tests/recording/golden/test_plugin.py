@@ -62,8 +62,9 @@ def test_stored_and_the_same_then_changed_then_updated(project):
     out = run(project, outcome={"failed": 1})
     out.fnmatch_lines(
         [
+            "policy changed; step 1, choose: brigade 0 chose easiest, was nearest-to-me",
             "recordings/test_mine-test_policy.mcap: the run is not the same any more",
-            "step 1, choose: brigade 0 chose easiest, was nearest-to-me",
+            "  changed: policy: mine:Policy, digest *, was *; scenario, seed and simulator are the same",
             "  return: *, was *",
             "the new run: *test_mine-test_policy.mcap; *",
             "if that is meant, run with --fireworld-update",
@@ -146,7 +147,9 @@ def test_options(project):
     assert order.settings == {"brigades.n": "3", "choices": "simultaneous"}
     assert order.tolerances == {"energy": 1e-6}
     project.makepyfile(test_mine=test.format(seed=2, ignore=[]))
-    run(project, outcome={"failed": 1}).fnmatch_lines(["step 0, draw: the runs have different random draws*"])
+    run(project, outcome={"failed": 1}).fnmatch_lines(
+        ["seed changed; step 0, draw: the runs have different random draws*"]
+    )
     project.makepyfile(test_mine=test.format(seed=2, ignore=everything))
     run(project, outcome={"passed": 1})
 
@@ -169,9 +172,9 @@ def test_a_training(project):
     out = run(project, outcome={"failed": 1})
     out.fnmatch_lines(
         [
+            "method changed; quick, episode 0, step *, brigade * in state *: learned value of *",
             "recordings/test_mine-test_it_learns.mcap: the training is not the same any more",
-            "quick, episode 0, step *, brigade * in state *: learned value of *",
-            "  alpha: 0.6, was 0.7",
+            "  changed: method: alpha: 0.6, was 0.7; curriculum, seed and simulator are the same",
             "the new training: *test_mine-test_it_learns.mcap; *",
         ]
     )

@@ -115,7 +115,8 @@ def test_another_default_is_located(kept, golden, other_default, changes, senten
     for part in sentence.split("*"):
         assert part.strip() in first
     (key,) = changes
-    assert f"  {key}: {changes[key]}, was {getattr(sarsa.PAPER, key)}" in done.out
+    words = [str(value).lower() for value in (changes[key], getattr(sarsa.PAPER, key))]
+    assert f"  changed: method: {key}: {words[0]}, was {words[1]}; curriculum, seed" in done.out
     assert 'If that is meant: fireworld golden update --reason "..."' in done.out
 
 
@@ -134,6 +135,8 @@ def test_another_rule_exploration_or_draw_is_located(kept, monkeypatch, name, va
     found = check_golden(kept / "tiny.mcap")
     assert found.result == "different"
     assert found.difference.header == {}
+    assert found.cause.changes == {}
+    assert found.headline.startswith("nothing recorded changed; ")
     assert found.difference.first.where.startswith(where)
     assert found.difference.first.phase == phase
 
@@ -169,6 +172,7 @@ def test_another_reward_of_the_scenario_is_located(kept, here):
     assert found.difference.first.phase == "reward"
     assert found.sentence.startswith("alone-1, episode 0, step 4: reward water damaged 0, was -1")
     assert "curriculum" in found.difference.header
+    assert "alone-1.reward.burning: -2.0, was not set" in found.cause.changes["curriculum"]
 
 
 def test_other_numbers_of_brigades_cannot_be_compared(kept, here, golden):
@@ -192,7 +196,7 @@ def test_for_programs(kept, golden, here, other_default):
     )
     assert (found["first"]["phase"], found["header"]) == ("learn", {"alpha": [0.7, 0.6]})
     failure = ElementTree.parse("report.xml").find("testsuite/testcase/failure")
-    assert failure.get("message") == found["sentence"]
+    assert failure.get("message") == f"method changed; {found['sentence']}"
     assert "alpha: 0.6, was 0.7" in failure.text
     new = open_training(here / "new" / "tiny.mcap")
     assert new.method.alpha == 0.6
@@ -223,7 +227,7 @@ def test_a_search(here, golden, monkeypatch):
     monkeypatch.setattr(search, "METHOD", dataclasses.replace(search.METHOD, step=0.5))
     done = golden("check")
     assert done.code == 1
-    assert "quick-search-training-seed-3: generation 0: " in done.out
+    assert "quick-search-training-seed-3: method changed; generation 0: " in done.out
 
 
 def test_stages(here, golden):

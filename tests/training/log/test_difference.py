@@ -39,6 +39,7 @@ def test_the_first_difference_names_the_cause(make_log, log_path, settings, phas
     assert words in first.sentence
     (key,) = settings
     assert list(found.header) == [key]
+    assert list(found.cause.changes) == ["seed" if key == "seed" else "method"]
     check_by_hand(first, log_path, make_log(**settings))
     assert found.to_dict()["first"]["sentence"] == first.sentence
     for row in found.spread:

@@ -138,7 +138,7 @@ def test_columns_that_cannot_be_are_refused(log, tmp_path):
                 pass
 
 
-@pytest.mark.parametrize("name", ["weights", "scores", "fire", "mean", "spread"])
+@pytest.mark.parametrize("name", ["weights", "scores", "fire", "seed", "mean", "spread"])
 def test_generations_whose_columns_do_not_fit_are_refused(make_log, tmp_path, name):
     from dataclasses import replace
 

@@ -49,15 +49,16 @@ def log(path):
     return fw.open_training(path)
 
 
-def rewrite(log, path, change):
+def rewrite(log, path, change, *, plan=None):
     """Write a log again, sealed as if it were true, changed: `change(number, record)`; None: left out."""
-    chain = Chain(log.found.first, TRAINING)
+    first = log.found.first if plan is None else encode(plan)
+    chain = Chain(first, TRAINING)
     with StepFile(
         path,
         metadata=to_metadata(log.header, TRAINING),
         attachments=log.header.attachments,
         channels=channels_of(log.trainer().topics),
-        city=log.found.first,
+        city=first,
         kind=TRAINING,
         force=True,
     ) as file:
@@ -157,7 +158,9 @@ def test_diff_names_the_first_step_that_differs(path, other, fireworld):
     assert fireworld("diff", path, path).code == 0
     done = fireworld("diff", path, other)
     assert done.code == 1
-    assert done.out.startswith("later, world 1, episode 0, step 1, brigade 2: ")
+    cause, first = done.out.splitlines()[:2]
+    assert cause.startswith("changed: nothing that is recorded; curriculum, method, seed and simulator are the same")
+    assert first.startswith("later, world 1, episode 0, step 1, brigade 2: ")
     found = json.loads(fireworld("diff", path, other, "--json").out)
     assert (found["first"]["world"], found["first"]["step"]) == (1, 1)
     assert [one["scenario"] for one in found["scenarios"]] == ["small", "later"]
@@ -357,3 +360,16 @@ def test_a_part_without_an_episode_is_a_line(path, log, tmp_path, fireworld):
         assert done.err.endswith("part 2: no /played, of which the method environment has one in every part\n"), (
             done.err
         )
+
+
+@pytest.mark.parametrize(
+    "change", [{"stage": [0, 7]}, {"stage": [-1, 0]}, {"n_brigades": [3, 99]}, {"stage": [0, 0, 0]}]
+)
+def test_a_plan_that_is_not_the_curriculums_is_a_line(log, tmp_path, fireworld, change):
+    (name, values), *_ = change.items()
+    plan = replace(log.plan, **{name: np.array(values, dtype=np.int32)})
+    file = rewrite(log, tmp_path / "b.mcap", lambda _, record: record, plan=plan)
+    for words in (("report", file, "-o", tmp_path / "r.html"), ("info", file)):
+        done = fireworld(*words)
+        assert done.code == 2
+        assert done.err.endswith("/plan: it has other stages or brigades than the curriculum that is attached\n")

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 Gaps = Sequence[float | None]  # numbers over steps; None where a run does not have the step
 
-_VIOLET: Final = "#a0209a"
+_VIOLET: Final = hexadecimal(colors.DIFFERS_RGB)
 _BRIGADE: Final = hexadecimal(colors.ACTIVITY_RGB[2])
 _KINDS: Final = {
     1: ("worse in B", hexadecimal(colors.WORSE_RGB)),

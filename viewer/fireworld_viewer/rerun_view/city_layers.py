@@ -9,6 +9,7 @@ import numpy as np
 import rerun
 from numpy.typing import NDArray
 
+from fireworld.errors import LogError, expected
 from fireworld.records import AIR, MATERIALS, CityRecord, Recording
 from fireworld_viewer import colors
 from fireworld_viewer.city_mesh import SHADES_PERCENT, CityMesh, city_box_m
@@ -191,9 +192,17 @@ def log_air(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
 
 
 def air_cells(city: CityRecord, array: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the (air_nx, air_ny) cells of a snapshot's array, which has a border."""
-    border = (array.shape[0] - city.air_nx) // 2
-    return array[border : border + city.air_nx, border : border + city.air_ny]
+    """Return the (air_nx, air_ny) cells of a snapshot's array, which has a border, and may have more beyond it along y.
+
+    Raises:
+        LogError: the array is of other cells than the city's.
+    """
+    nx, ny = city.air_nx, city.air_ny
+    border = (array.shape[0] - nx) // 2 if array.ndim == 2 else -1
+    if min(nx, ny, border + 1) < 1 or array.shape[0] != nx + 2 * border or array.shape[1] < ny + 2 * border:
+        sizes = " x ".join(map(str, array.shape))
+        raise LogError(expected("/snapshot", AIR, f"an array of the city's {nx} x {ny} cells and a border", sizes))
+    return array[border : border + nx, border : border + ny]
 
 
 def air_pixels(cells: NDArray[np.float64]) -> NDArray[np.uint8]:

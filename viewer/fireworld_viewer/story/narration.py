@@ -63,14 +63,29 @@ def event_lines(recording: Recording) -> Iterator[LogLine]:
 
 
 def decision_lines(recording: Recording, choices: ChoiceTables, new: NDArray[np.bool_]) -> Iterator[LogLine]:
+    """Write choices in words, a line each; arguments as for `choice_words`."""
+    steps = recording.steps.tolist()
+    for row, brigade, text in choice_words(recording, choices, new):
+        rgb = colors.BRIGADE_RGB[brigade % len(colors.BRIGADE_RGB)]
+        yield LogLine(steps[row], "INFO", f"brigade {brigade}: {text}", rgb)
+
+
+def choice_words(
+    recording: Recording, choices: ChoiceTables, shown: NDArray[np.bool_]
+) -> Iterator[tuple[int, int, str]]:
     """Write choices in words: the action, its target and value, and what the brigade observed.
 
-    `new`: (k, n_brigades), which of the choices of the recording to write.
+    Args:
+        recording: the run.
+        choices: its choices.
+        shown: (k, n_brigades), which of them to write.
+
+    Yields:
+        The row of the step, the brigade, and the words.
     """
     building_id = np.asarray(recording.city.building_id).tolist()
     observed = {name: per_brigade(recording, name, missing=-1, topic="/observations") for name in OBSERVED}
-    steps = recording.steps.tolist()
-    for row, brigade in zip(*(places.tolist() for places in np.nonzero(new)), strict=True):
+    for row, brigade in zip(*(places.tolist() for places in np.nonzero(shown)), strict=True):
         action, target = int(choices.action[row, brigade]), int(choices.target[row, brigade])
         parts = ["no choice"]
         if action >= 0:
@@ -78,8 +93,7 @@ def decision_lines(recording: Recording, choices: ChoiceTables, new: NDArray[np.
             exploring = " (exploring)" if choices.explored[row, brigade] else ""
             state = state_words({name: int(table[row, brigade]) for name, table in observed.items()})
             parts = [f"{action_name(action)}{aim}{exploring}", value_words(choices, row, brigade), state]
-        text = f"brigade {brigade}: {', '.join(part for part in parts if part)}"
-        yield LogLine(steps[row], "INFO", text, colors.BRIGADE_RGB[brigade % len(colors.BRIGADE_RGB)])
+        yield row, brigade, ", ".join(part for part in parts if part)
 
 
 def value_words(choices: ChoiceTables, row: int, brigade: int) -> str:

@@ -1,0 +1,88 @@
+"""A run, or two side by side, as a page that plays."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from fireworld_recorder.diff import compare
+from fireworld_viewer.play.page import FirstDifference, play_page
+from fireworld_viewer.story.steps import check_same_city, select_steps
+
+from fireworld.arguments import path_of
+from fireworld.files import check_output, text_of, write_file
+from fireworld.recording.inputs import AnyRecording, open_to_show, run_name
+from fireworld.records import Recording
+
+ENDINGS: Final = (".html", ".htm")  # of the page's file
+
+
+def play(
+    log: AnyRecording,
+    other: AnyRecording | None = None,
+    *,
+    output: str | os.PathLike[str],
+    first_step: int | None = None,
+    last_step: int | None = None,
+    every: int = 1,
+    force: bool = False,
+) -> Path:
+    """Write a recording, or two of one city side by side, as an HTML page that plays and needs no other file.
+
+    Args:
+        log: a run, or the path of one; one that was cut off or damaged is shown as far as it is good.
+        other: a second one.
+        output: the page, an .html file.
+        first_step: the first step to show; all from the start if left out.
+        last_step: the last step to show.
+        every: only each n-th step.
+        force: replace an existing file.
+
+    Returns:
+        The path of the page.
+
+    Raises:
+        OutputError: it cannot be written.
+        LogError: a recording is none, or cannot be read.
+        ViewError: there is no such step, or the cities differ.
+    """
+    path = path_of("output", output)
+    check_output(path, endings=ENDINGS, force=force)
+    page = page_of([log] if other is None else [log, other], first_step=first_step, last_step=last_step, every=every)
+    write_file(path, page)
+    return path
+
+
+def page_of(
+    logs: Sequence[AnyRecording],
+    *,
+    first_step: int | None = None,
+    last_step: int | None = None,
+    every: int = 1,
+) -> str:
+    """Return the page of one recording, or of two of one city; arguments and errors as for `play`.
+
+    `fireworld_viewer.play.page.frame` makes it a part of another page.
+    """
+    held = open_to_show(logs)
+    shown: list[Recording] = [select_steps(one, first=first_step, last=last_step, every=every) for one in held]
+    return play_page(
+        shown,
+        names=[text_of(Path(run_name(one)).name) for one in held],
+        damages=[getattr(one, "damage", None) for one in held],
+        first=_first_difference(shown),
+    )
+
+
+def _first_difference(shown: Sequence[Recording]) -> FirstDifference | None:
+    """Return where two recordings first differ, in the steps that are shown."""
+    if len(shown) < 2:
+        return None
+    a, b = shown
+    check_same_city(a.city, b.city)
+    first = compare(a, b).first
+    if first is None:
+        return None
+    return FirstDifference(step=int(a.steps[0]) if first.step is None else first.step, sentence=first.sentence)
