@@ -18,7 +18,7 @@ from fireworld.kernels.arrays import (
     FireState,
     Warmth,
 )
-from fireworld.kernels.jit import inlined, inner
+from fireworld.kernels.jit import inner
 from fireworld.kernels.warmth import take_tiles
 
 ONE, TWO, THREE, FOUR = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(4)
@@ -26,7 +26,7 @@ PADDING = 5
 """Cells of a row of air that are no cells of the city: one before, four behind them."""
 
 
-@inlined
+@inner
 def mix_row(
     before: Array, row: Array, after: Array, low: int, end: int, flow: float, kept: float, flush: float, mixed: Array
 ) -> None:
@@ -44,7 +44,7 @@ def mix_row(
         mixed[y] = warmth if warmth > flush else 0.0
 
 
-@inlined
+@inner
 def put_row(mixed: Array, low: int, end: int, row: Array) -> None:
     """Copy the cells [low, end) to where they belong."""
     for y in range(low, end):

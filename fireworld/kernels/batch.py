@@ -33,8 +33,10 @@ from fireworld.kernels.arrays import (
 from fireworld.kernels.fire import is_over
 from fireworld.kernels.jit import inlined, kernel
 from fireworld.kernels.observation import N_ACTIONS, can_choose, find_target, observe, site_place
+from fireworld.kernels.outcome import score
 from fireworld.kernels.ranking import N_TARGET_FEATURES, OWN_TARGET, describe_building, see_target
-from fireworld.kernels.step import begin_step, finish_step, look_at_all, opened_episode, score_last, sight_of
+from fireworld.kernels.step import begin_step, finish_step, opened_episode, sight_of
+from fireworld.kernels.warmth import begin
 
 
 class View(NamedTuple):
@@ -104,19 +106,20 @@ def work_on_worlds(rows: Array, batch_row: Array, indices: Array, what: int) -> 
     for k in range(len(indices)):
         i = indices[k]
         episode = opened_episode(rows[i])
-        clock, brigades = episode.clock, episode.world.brigades
+        city, world, clock, warmth = episode.city, episode.world, episode.clock, episode.scratch.warmth
+        brigades = world.brigades
         if what == STEP_GIVEN:
             for brigade in range(len(brigades.action)):
                 follow(brigade, batch.actions[i, brigade], i, episode, batch)
         if what >= BEGIN:
-            look_at_all(episode)
+            begin(city.cover, world.fire, warmth)
         if what >= STEP_DECIDED:
             clock[STEP] += 1
-            finish_step(episode)
-            score_last(episode)
+            finish_step(city, world, episode.constants, warmth, clock[SEED], clock[STEP])
+            score(world.fire, world.civilians, city.geometry, world.outcome)
         if what >= BEGIN:
             note_decisions(i, brigades, batch.result)
-            begin_step(episode, clock[STEP] + 1)
+            begin_step(city, world, warmth, clock[STEP] + 1)
         show(i, episode, batch)
 
 
@@ -218,7 +221,7 @@ def show_brigade(brigade: int, i: int, episode: Episode, batch: Batch) -> None:
 @inlined
 def show_target(action: int, brigade: int, has_site: bool, i: int, episode: Episode, view: View) -> None:
     """Write the features of the building that an action names for a brigade; MODEL 7."""
-    city, world, scratch = episode.city, episode.world, episode.scratch
+    city, world, constants, scratch = episode.city, episode.world, episode.constants, episode.scratch
     shown = view.targets[i, brigade, action]
     if not has_site:
         shown[:] = 0.0
@@ -228,7 +231,7 @@ def show_target(action: int, brigade: int, has_site: bool, i: int, episode: Epis
         find_target(brigade, action, world.brigades, city.buildings, world.fire, city.geometry, world.sites),
         episode.clock[STEP] + 1,
         world.brigades.target,
-        sight_of(episode),
+        sight_of(city, world, constants, scratch),
         scratch.seen,
     )
     for k in range(N_TARGET_FEATURES):

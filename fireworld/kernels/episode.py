@@ -31,9 +31,11 @@ from fireworld.kernels.learning import (
     update,
 )
 from fireworld.kernels.observation import N_ACTIONS, can_choose, find_target, observe
+from fireworld.kernels.outcome import score
 from fireworld.kernels.ranking import OWN_TARGET
 from fireworld.kernels.ranks import hear, line_up, rank_targets
-from fireworld.kernels.step import begin_step, finish_step, look_at_all, opened_episode, score_last, sight_of
+from fireworld.kernels.step import begin_step, finish_step, opened_episode, sight_of
+from fireworld.kernels.warmth import begin
 
 NO_STEP = 0
 """A step in which no fire is lit."""
@@ -65,15 +67,15 @@ def run_steps(episode: Episode) -> None:  # noqa: C901, PLR0912, PLR0915 - to ha
     features, before, known_before = scratch.features, scratch.action_before, scratch.target_before
     values, ranks = scratch.values, scratch.ranks
     learning, noting, ranking = learner.learning[0] != 0, len(seen.state) > 0, len(ranks.value) > 0
-    sight = sight_of(episode)
+    sight = sight_of(city, world, constants, scratch)
     scratch.described_at[:] = -1
     if learning:
         forget(learner)
-    look_at_all(episode)
+    begin(city.cover, fire, scratch.warmth)
     for step in range(clock[STEP] + 1, last_step + 2):
         if step > last_step and not learning:
             break
-        begin_step(episode, step if step <= last_step else NO_STEP)
+        begin_step(city, world, scratch.warmth, step if step <= last_step else NO_STEP)
         for brigade in range(n_brigades):
             before[brigade] = brigades.action[brigade]
             known_before[brigade] = brigades.target[brigade]
@@ -150,7 +152,7 @@ def run_steps(episode: Episode) -> None:  # noqa: C901, PLR0912, PLR0915 - to ha
         if step > last_step:
             break
         clock[STEP] = step
-        finish_step(episode)
+        finish_step(city, world, constants, scratch.warmth, seed, step)
         if learning:
             take_reward(outcome.reward[TOTAL], learner)
             note_reward(step - 1, outcome.reward, learner)
@@ -159,7 +161,7 @@ def run_steps(episode: Episode) -> None:  # noqa: C901, PLR0912, PLR0915 - to ha
                 for brigade in range(n_brigades):
                     update(brigade, policy.table_of[brigade], 0.0, learner)
             break
-    score_last(episode)
+    score(fire, world.civilians, geometry, outcome)
 
 
 @kernel

@@ -24,7 +24,7 @@ from fireworld.kernels.arrays import (
 )
 from fireworld.kernels.codes import can_catch, fieryness_of, is_alight, is_burning
 from fireworld.kernels.draws import normal
-from fireworld.kernels.jit import inlined, inner, kernel
+from fireworld.kernels.jit import inner, kernel
 from fireworld.kernels.warmth import ONE, PERIOD, begin, bounds, follow_heat, narrow
 
 AMBIENT_KELVIN = 293.0
@@ -32,7 +32,7 @@ STEFAN_BOLTZMANN = 5.6704e-8
 LEAST_SHARE = np.float32(0.005)
 
 
-@inlined
+@inner
 def may_burn(first: int, end: int, buildings: BuildingArrays, fire: FireState) -> bool:
     """Return whether any of the buildings [first, end) is hot enough to burn."""
     hot = False
@@ -83,7 +83,7 @@ def burn(buildings: BuildingArrays, fire: FireState, warmth: Warmth) -> None:
                 fire.fuel[b] = fuel - used
 
 
-@inlined
+@inner
 def is_dry(water: Array, first: int, end: int) -> bool:
     """Return whether no water lies on any of the buildings [first, end)."""
     wet = False
@@ -211,7 +211,7 @@ def is_over(n_burning: int, later_step: Array, step: int) -> bool:
     return n_burning == 0 and (len(later_step) == 0 or later_step[-1] <= step)
 
 
-@inlined
+@inner
 def burn_on(
     buildings: BuildingArrays,
     cover: CoverArrays,

@@ -45,7 +45,7 @@ def decide(brigade: int, before: Array, target_before: Array, episode: Episode) 
                 known,
                 policy.rankings[policy.table_of[brigade]],
                 policy.network,
-                sight_of(episode),
+                sight_of(city, world, constants, scratch),
                 scratch.ranks,
                 scratch.seen,
                 scratch.work,

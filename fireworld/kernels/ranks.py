@@ -43,7 +43,7 @@ def fresh_ranks(n_brigades: int, n_buildings: int) -> Ranks:
     )
 
 
-@inlined
+@inner
 def line_up(known: Array, geometry: GeometryArrays, sites: SiteState, ranks: Ranks) -> None:
     """Put the burning buildings in a row, site after site, and note who goes for them; `known` (b,), -1 nothing."""
     for k in range(np.uint64(sites.counts[2])):
@@ -80,7 +80,7 @@ def go_for(brigade: int, target: int, geometry: GeometryArrays, sites: SiteState
         row[k] = nearness(ranks.x[k] - x, ranks.y[k] - y)
 
 
-@inlined
+@inner
 def hear(brigade: int, before: int, target: int, geometry: GeometryArrays, sites: SiteState, ranks: Ranks) -> None:
     """Let the brigades to come know what one has chosen to go for, and not what it went for before; -1 nothing."""
     if target != before:
@@ -89,7 +89,7 @@ def hear(brigade: int, before: int, target: int, geometry: GeometryArrays, sites
     add_up(brigade, brigade + 1, 0, sites.counts[2], ranks.nearness, ranks.near_before)
 
 
-@inlined
+@inner
 def add_up(brigade: int, end_brigade: int, first: int, end: int, nearness: Array, near: Array) -> None:
     """Add how near some brigades' targets are to sums (n,) of the buildings [first, end) in the row.
 
@@ -107,7 +107,7 @@ def add_up(brigade: int, end_brigade: int, first: int, end: int, nearness: Array
         brigade += 1
 
 
-@inlined
+@inner
 def weigh_alike(first: int, end: int, ranking: int, weights: Array, step: int, sight: Sight, ranks: Ranks) -> None:
     """Weigh what all brigades see alike of the buildings [first, end) in the row, by the weights of a ranking."""
     for k in range(np.uint64(first), np.uint64(end)):

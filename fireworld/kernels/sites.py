@@ -10,7 +10,6 @@ from fireworld.kernels.arrays import (
     SITES_KNOWN,
     BrigadeState,
     BuildingArrays,
-    CityArrays,
     CivilianState,
     FireState,
     GeometryArrays,
@@ -18,7 +17,6 @@ from fireworld.kernels.arrays import (
     NearArrays,
     SiteState,
     Warmth,
-    WorldState,
 )
 from fireworld.kernels.codes import can_catch, is_alight
 from fireworld.kernels.jit import inner
@@ -253,15 +251,24 @@ def find_free_sides(
 
 
 @inner
-def find_sites(city: CityArrays, world: WorldState, warmth: Warmth) -> None:
+def find_sites(
+    buildings: BuildingArrays,
+    links: LinkArrays,
+    near: NearArrays,
+    geometry: GeometryArrays,
+    fire: FireState,
+    civilians: CivilianState,
+    brigades: BrigadeState,
+    sites: SiteState,
+    warmth: Warmth,
+) -> None:
     """Find and measure the fire sites of the moment and settle which brigade belongs to which."""
-    buildings, geometry, fire, sites = city.buildings, city.geometry, world.fire, world.sites
     put_out(fire, sites, warmth)
-    gather(fire, city.near, sites, warmth)
+    gather(fire, near, sites, warmth)
     number_sites(sites)
-    assign_brigades(world.brigades, buildings, geometry, sites)
+    assign_brigades(brigades, buildings, geometry, sites)
     relabel(sites)
-    civilian_squares(world.civilians, fire, geometry, sites, warmth)
+    civilian_squares(civilians, fire, geometry, sites, warmth)
     measure_sites(geometry, sites)
-    find_free_sides(buildings, city.links, geometry, fire, sites)
+    find_free_sides(buildings, links, geometry, fire, sites)
     warmth.number[SITES_CHANGED] = 0

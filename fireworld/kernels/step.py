@@ -11,10 +11,15 @@ from fireworld.kernels.arrays import (
     STEP,
     Array,
     BrigadeState,
+    CityArrays,
     CivilianState,
+    Constants,
     Episode,
     FireState,
     HealthConstants,
+    Scratch,
+    Warmth,
+    WorldState,
 )
 from fireworld.kernels.brigades import act, shelter
 from fireworld.kernels.fire import burn_on, draw_burn_rates, light
@@ -41,23 +46,24 @@ def look(row: Array) -> None:
         row: (k,) int64, the address row of an `Episode`, here and below.
     """
     episode = opened_episode(row)
-    look_at_all(episode)
-    begin_step(episode, episode.clock[STEP] + 1)
+    city, world, warmth = episode.city, episode.world, episode.scratch.warmth
+    begin(city.cover, world.fire, warmth)
+    begin_step(city, world, warmth, episode.clock[STEP] + 1)
 
 
 @kernel
 def finish(row: Array) -> None:
     """Carry out what the brigades decided in the step of the clock."""
     episode = opened_episode(row)
-    look_at_all(episode)
-    finish_step(episode)
-    score_last(episode)
+    city, world, warmth = episode.city, episode.world, episode.scratch.warmth
+    begin(city.cover, world.fire, warmth)
+    finish_step(city, world, episode.constants, warmth, episode.clock[SEED], episode.clock[STEP])
+    score(world.fire, world.civilians, city.geometry, world.outcome)
 
 
 @inlined
-def sight_of(episode: Episode) -> Sight:
-    """Return what the brigades of an episode look at when they value targets."""
-    city, world, constants, scratch = episode.city, episode.world, episode.constants, episode.scratch
+def sight_of(city: CityArrays, world: WorldState, constants: Constants, scratch: Scratch) -> Sight:
+    """Return what the brigades look at when they value targets."""
     return Sight(
         city.buildings,
         city.links,
@@ -73,26 +79,33 @@ def sight_of(episode: Episode) -> Sight:
 
 
 @inlined
-def look_at_all(episode: Episode) -> None:
-    """Begin with lists of everything, in whatever state the world is: before the first step of a call."""
-    begin(episode.city.cover, episode.world.fire, episode.scratch.warmth)
+def begin_step(city: CityArrays, world: WorldState, warmth: Warmth, step: int) -> None:
+    """Light what is lit in a step, and find the fire sites if they can be others than before.
+
+    Before the first step of a call, the lists of what is warm `begin`; after the last one it has its `score`.
+    """
+    if light(city.buildings, world.fire, step) > 0:
+        begin(city.cover, world.fire, warmth)
+    if warmth.number[SITES_CHANGED] != 0:
+        find_sites(
+            city.buildings,
+            city.links,
+            city.near,
+            city.geometry,
+            world.fire,
+            world.civilians,
+            world.brigades,
+            world.sites,
+            warmth,
+        )
 
 
 @inlined
-def begin_step(episode: Episode, step: int) -> None:
-    """Light what is lit in a step, and find the fire sites if they can be others than before."""
-    if light(episode.city.buildings, episode.world.fire, step) > 0:
-        look_at_all(episode)
-    if episode.scratch.warmth.number[SITES_CHANGED] != 0:
-        find_sites(episode.city, episode.world, episode.scratch.warmth)
-
-
-@inlined
-def finish_step(episode: Episode) -> None:
-    """Act, burn, hurt, reward: carry out what the brigades decided, in the step of the clock."""
-    city, world, constants, warmth = episode.city, episode.world, episode.constants, episode.scratch.warmth
+def finish_step(
+    city: CityArrays, world: WorldState, constants: Constants, warmth: Warmth, seed: int, step: int
+) -> None:
+    """Act, burn, hurt, reward: carry out what the brigades decided, and compute what the step is worth."""
     fire, people, brigades, outcome = world.fire, world.civilians, world.brigades, world.outcome
-    seed, step = episode.clock[SEED], episode.clock[STEP]
     outcome.water[0] += act(brigades, fire, city.streets, world.ways, city.geometry, constants.brigades)
     for brigade in range(len(brigades.sprayed)):
         if brigades.sprayed[brigade] > 0:
@@ -105,12 +118,6 @@ def finish_step(episode: Episode) -> None:
     if count_living(people.hp) != n_alive:  # sites are measured by the living
         warmth.number[SITES_CHANGED] = 1
     reward_step(warmth.n_of_code, people, constants.reward, outcome)
-
-
-@inlined
-def score_last(episode: Episode) -> None:
-    """Write the scores: after the last step of a call."""
-    score(episode.world.fire, episode.world.civilians, episode.city.geometry, episode.world.outcome)
 
 
 @inner

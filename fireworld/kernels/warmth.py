@@ -158,7 +158,7 @@ def list_bits(bits: Array, out: Array) -> np.int64:
     return np.int64(n)
 
 
-@inlined
+@inner
 def refresh(cover: CoverArrays, warmth: Warmth) -> None:
     """List what has been added since the lists were made."""
     number = warmth.number
@@ -191,7 +191,7 @@ def doubt(b: int, warmth: Warmth) -> None:
     warmth.is_doubtful[np.uint64(b) >> BLOCK_SHIFT] = 1
 
 
-@inlined
+@inner
 def take_tiles(x: int, low: int, end: int, cover: CoverArrays, warmth: Warmth) -> None:
     """Add the buildings over the cells [low, end) of a row of air, tile by tile: they exchange heat with it."""
     row = np.uint64(x) >> TILE_SHIFT
@@ -218,7 +218,7 @@ def know(b: int, cover: CoverArrays, links: LinkArrays, warmth: Warmth) -> None:
         take_tiles(row << TILE_SHIFT, low, low + cover.width[b], cover, warmth)
 
 
-@inlined
+@inner
 def follow_heat(cover: CoverArrays, links: LinkArrays, fire: FireState, warmth: Warmth) -> None:
     """Add what heat can reach from buildings that have become warm, before it does."""
     number = warmth.number

@@ -7,11 +7,12 @@ import pytest
 
 from fireworld.city.build import build_city
 from fireworld.city.generator import generate_plan
-from fireworld.kernels.arrays import ALL, N_BLOCKS, N_VISITS
+from fireworld.kernels.arrays import ALL, N_BLOCKS, N_VISITS, SEED, STEP
 from fireworld.kernels.fire import ignite
 from fireworld.kernels.jit import kernel
-from fireworld.kernels.step import begin_step, finish_step, look_at_all, opened_episode, score_last
-from fireworld.kernels.warmth import BLOCK, CROWDED, list_bits, set_bit
+from fireworld.kernels.outcome import score
+from fireworld.kernels.step import begin_step, finish_step, opened_episode
+from fireworld.kernels.warmth import BLOCK, CROWDED, begin, list_bits, set_bit
 from fireworld.parameters import PAPER
 from fireworld.policy.kernel import always
 from fireworld.simulation.city_arrays import city_arrays, ignition_energy
@@ -28,12 +29,13 @@ CORNER = int(np.flatnonzero(CITY.footprints.inflammable)[0])
 def run_in_one_call(row, n_steps):
     """Run steps in which the brigades go on with what they do."""
     episode = opened_episode(row)
-    look_at_all(episode)
+    city, world, warmth, clock = episode.city, episode.world, episode.scratch.warmth, episode.clock
+    begin(city.cover, world.fire, warmth)
     for _ in range(n_steps):
-        episode.clock[1] += 1
-        begin_step(episode, episode.clock[1])
-        finish_step(episode)
-    score_last(episode)
+        clock[STEP] += 1
+        begin_step(city, world, warmth, clock[STEP])
+        finish_step(city, world, episode.constants, warmth, clock[SEED], clock[STEP])
+    score(world.fire, world.civilians, city.geometry, world.outcome)
 
 
 def world_of(*ignited):
