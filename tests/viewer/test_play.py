@@ -156,7 +156,7 @@ def test_the_command_writes_what_the_function_writes(fireworld, here, small, slo
     assert fw.play("a.mcap", fw.open_log("b.mcap"), output="again.html").name == "again.html"
     assert (here / "again.html").read_bytes() == (here / "ab.html").read_bytes()
     first = unpacked((here / "ab.html").read_text(encoding="utf-8")).words["first"]
-    assert fireworld("diff", "a.mcap", "b.mcap").out.splitlines()[0] == first["sentence"]
+    assert first["sentence"] in fireworld("diff", "a.mcap", "b.mcap").out.splitlines()
 
 
 def test_the_same_bytes_wherever_the_recording_lies(fireworld, here, small):

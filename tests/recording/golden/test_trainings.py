@@ -125,7 +125,7 @@ def test_another_default_is_located(kept, golden, other_default, changes, senten
     [
         ("RULES", tuple(reversed(sarsa.RULES)), "alone-1, episode 0, step 3", "learn"),
         ("_power", lambda *_: 0.5, "alone-1, episode 0", "draw"),
-        ("hash_key", lambda *_: 77, "alone-1, episode 0", "draw"),
+        ("episode_seed", lambda *_: 77, "alone-1, episode 0", "draw"),
         ("below", lambda *_, bound: 0 * bound, "together-1, episode 3", "end"),
     ],
 )
