@@ -11,6 +11,8 @@ from fireworld.version import simulator_version
 if TYPE_CHECKING:
     from fireworld.scenario import Scenario
 
+DIGEST_SHOWN: Final = 12
+"""Digits of a digest that identify it."""
 LINES_MAX: Final = 8
 """Changed keys that are listed; of more their number is said."""
 NOT_SET: Final = "not set"
@@ -44,9 +46,7 @@ class Cause:
         if len(lines) == 1:
             return [f"{head}: {lines[0]}{rest}"]
         lines = [f"{what}: {line}" for what, several in self.changes.items() for line in several]
-        shown = (
-            lines if len(lines) <= LINES_MAX else [*lines[: LINES_MAX - 1], f"and {len(lines) - LINES_MAX + 1} more"]
-        )
+        shown = lines if len(lines) <= LINES_MAX else at_most(lines, LINES_MAX - 1)
         return [head + rest, *(f"  {line}" for line in shown)]
 
     @property
@@ -67,6 +67,11 @@ def cause_of(changes: Mapping[str, Sequence[str] | None]) -> Cause:
         [what for what, lines in changes.items() if lines is not None and not lines],
         [what for what, lines in changes.items() if lines is None],
     )
+
+
+def at_most(lines: Sequence[str], most: int) -> list[str]:
+    """Return the first lines, and how many more there are."""
+    return [*lines[:most], *([f"and {len(lines) - most} more"] if len(lines) > most else [])]
 
 
 def value_changes(a: Mapping[str, Any], b: Mapping[str, Any], *, prefix: str = "") -> list[str]:

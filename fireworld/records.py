@@ -51,7 +51,14 @@ EVENT_KINDS: Final = (
     "ignited", "extinguished", "burnt-out", "civilian-hurt", "civilian-died", "tank-empty", "refilled", "site-out",
     "brigade-hurt", "brigade-died",
 )  # fmt: skip
-"""Kinds of events. The entity of the first three is a building, then civilians, brigades, a fire site, brigades."""
+"""Kinds of events."""
+EVENT_ENTITIES: Final[Mapping[str, str]] = {
+    **dict.fromkeys(("ignited", "extinguished", "burnt-out"), "building"),
+    **dict.fromkeys(("civilian-hurt", "civilian-died"), "civilian"),
+    **dict.fromkeys(("tank-empty", "refilled", "brigade-hurt", "brigade-died"), "brigade"),
+    "site-out": "site",
+}
+"""What the entity of an event of a kind is."""
 
 FIERYNESS: Final = (
     "unburnt", "heating", "burning", "inferno",

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Final
-
-from fireworld.cause import SIMULATOR, Cause, cause_of, scenario_changes, simulator_changes
+from fireworld.cause import DIGEST_SHOWN, SIMULATOR, Cause, cause_of, scenario_changes, simulator_changes
 from fireworld.errors import FireworldError
 from fireworld.records import RunHeader
-
-DIGEST_SHOWN: Final = 12
 
 
 def run_cause(a: RunHeader, b: RunHeader) -> Cause:

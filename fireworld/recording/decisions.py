@@ -11,6 +11,7 @@ from fireworld.arguments import whole_number
 from fireworld.errors import LogError, PolicyError, expected
 from fireworld.policy.asking import ask, keeps
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
+from fireworld.recording.cause import scenario_text
 from fireworld.recording.inputs import run_name
 from fireworld.recording.replay import recorded_decision
 from fireworld.records import ACTION_NAMES, CityRecord, RunHeader, Steps, StoredRun
@@ -28,8 +29,8 @@ FALLBACK: Final = Decision(0)
 def check_same_draws(first: RunHeader, second: RunHeader, *, names: tuple[str, str]) -> None:
     """Raise LogError if two runs, with these names, do not start alike or do not see the same random draws."""
     if first.scenario_digest != second.scenario_digest:
-        wanted = f"{first.scenario} ({first.scenario_digest[:12]}), as in {names[0]}"
-        raise LogError(expected(names[1], "scenario", wanted, f"{second.scenario} ({second.scenario_digest[:12]})"))
+        wanted = f"{scenario_text(first)}, as in {names[0]}"
+        raise LogError(expected(names[1], "scenario", wanted, scenario_text(second)))
     if first.seed != second.seed:
         wanted = f"{first.seed}, as in {names[0]}: other seeds give different random draws"
         raise LogError(expected(names[1], "seed", wanted, second.seed))

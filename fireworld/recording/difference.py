@@ -249,6 +249,7 @@ def diff(
 
 def _check_same_scenario(difference: Difference) -> None:
     """Raise LogError if two runs are of different scenarios, with the keys that differ."""
+    from fireworld.cause import at_most
     from fireworld.recording.cause import scenario_text
 
     found = difference.cause.changes.get("scenario")
@@ -257,9 +258,7 @@ def _check_same_scenario(difference: Difference) -> None:
             f"{scenario_text(run.header)} in {name}"
             for run, name in zip(difference.runs, difference.names, strict=True)
         )
-        keys = "; ".join(found[:KEYS_SHOWN]) + (
-            f"; and {len(found) - KEYS_SHOWN} more" if len(found) > KEYS_SHOWN else ""
-        )
+        keys = "; ".join(at_most(found, KEYS_SHOWN))
         what = f"cannot compare runs of different scenarios, {first} and {second}: {keys}"
         raise LogError(f"{what}; try --any-scenario if that is meant")
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from xml.etree.ElementTree import Element, SubElement
 
+from fireworld.cause import DIGEST_SHOWN
 from fireworld.junit import clean, report
 from fireworld.outcome import NOT_RECORDED, QUANTITIES
 from fireworld.records import STEP_TOPICS, Snapshot
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 COMMIT: Final = "/commit"
 LENGTH: Final = "length"
 """The case of steps that only one run has."""
-DIGEST_SHOWN: Final = 12
 SPREAD_HEADS: Final = ("step", "buildings", "fieryness", "brigades", "civilians", "score", "burning", "burnt out")
 SPREAD_NOTE: Final = "how many differ; fieryness: buildings in another state; score, burning, burnt out: B - A"
 

@@ -5,7 +5,18 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from fireworld.records import ACTIONS, EVENT_KINDS, Array, CityRecord, Decisions, Draws, Events, StepRecord, name_of
+from fireworld.records import (
+    ACTIONS,
+    EVENT_ENTITIES,
+    EVENT_KINDS,
+    Array,
+    CityRecord,
+    Decisions,
+    Draws,
+    Events,
+    StepRecord,
+    name_of,
+)
 from fireworld_recorder.match import FieldDifference
 from fireworld_recorder.schema import Field
 
@@ -88,8 +99,7 @@ def _event_words(events: Events, index: int) -> str:
         return "nothing"
     code = int(events.kind[index])
     kind = name_of(EVENT_KINDS, code, "event of kind")
-    owner = {"civilian": "civilian", "brigade": "brigade", "tank": "brigade", "refilled": "brigade", "site": "site"}
-    return f"{kind} {owner.get(kind.partition('-')[0], 'building')} {_at(events.entity, index)}"
+    return f"{kind} {EVENT_ENTITIES.get(kind, 'building')} {_at(events.entity, index)}"
 
 
 def _at(values: Array, index: int) -> Any:

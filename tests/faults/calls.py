@@ -27,8 +27,9 @@ MORE_MEMORY_BYTES: Final = 3_000_000_000
 """Address space that a call may add: enough to be measured as too much, not enough to bring down the machine."""
 FILE_BYTES_MAX: Final = 1 << 29
 _WRITES: Final = frozenset({"os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.link", "os.truncate", "os.chmod"})
-_COUNTERS = mmap.mmap(-1, 16)
-"""What the call under way has counted: file events, commits."""
+_COUNTED: Final = struct.Struct("<qqq")
+_COUNTERS = mmap.mmap(-1, _COUNTED.size)
+"""What the call under way has counted: file events, commits; and the bytes that a fork had from its parent."""
 _ASKED: Final = {signal.SIGINT, signal.SIGTERM}
 _running: set[int] = set()
 
@@ -72,17 +73,16 @@ def forked(
         cpu_seconds_max: a call that takes more is ended.
         wall_seconds_max: the same of time that passes.
     """
-    _COUNTERS[:] = bytes(16)
+    _COUNTERS[:] = bytes(_COUNTED.size)
     texts = tuple(map(str, words))
-    held = _resident_bytes()
     child = _fork(texts, folder, io, at, before, act, cpu_seconds_max)
-    done = _wait(child, texts, io, at, wall_seconds_max)
-    return replace(done, peak_bytes=done.peak_bytes - held)
+    return _taken_by_a_fork(_wait(child, texts, io, at, wall_seconds_max))
 
 
 def crowd(many: Sequence[Sequence[object]], folder: Path, *, io: Path, cpu_seconds_max: float) -> list[Done]:
     """Call many commands at once, each in a fork of this process; arguments as for `forked`."""
-    began, held = [], _resident_bytes()
+    began = []
+    _COUNTERS[:] = bytes(_COUNTED.size)
     for number, words in enumerate(many):
         texts, own = tuple(map(str, words)), io / str(number)
         own.mkdir(parents=True)
@@ -90,7 +90,7 @@ def crowd(many: Sequence[Sequence[object]], folder: Path, *, io: Path, cpu_secon
         _running.add(child)
         began.append((child, texts, own))
     done = [_wait(child, texts, own, None, WALL_SECONDS_MAX) for child, texts, own in began]
-    return [replace(one, peak_bytes=one.peak_bytes - held) for one in done]
+    return list(map(_taken_by_a_fork, done))
 
 
 def process(
@@ -106,7 +106,7 @@ def process(
 ) -> Done:
     """Call `python -m fireworld WORDS...`; arguments as for `forked`."""
     texts = tuple(map(str, words))
-    _COUNTERS[:] = bytes(16)
+    _COUNTERS[:] = bytes(_COUNTED.size)
 
     def begin() -> None:
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -136,7 +136,7 @@ def process(
 def count_apart() -> None:
     """Let this process count by itself, not with the one that it is a fork of."""
     global _COUNTERS  # noqa: PLW0603 - memory that is shared with children, and with no other
-    _COUNTERS = mmap.mmap(-1, 16)
+    _COUNTERS = mmap.mmap(-1, _COUNTED.size)
 
 
 def end_what_runs() -> None:
@@ -155,8 +155,14 @@ def _limit(cpu_seconds_max: float) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
+def _taken_by_a_fork(done: Done) -> Done:
+    """Leave out what a fork had from the start; files that its parent has mapped it has not, until it reads them."""
+    had = _COUNTED.unpack(_COUNTERS)[2]
+    return replace(done, peak_bytes=done.peak_bytes - had if had else 0)  # 0: it was killed before it could tell
+
+
 def _resident_bytes() -> int:
-    """Return how much memory a fork of this process has from the start."""
+    """Return how much memory this process has."""
     return _pages(1) * resource.getpagesize()
 
 
@@ -187,6 +193,7 @@ def _become(
     """Be the child: end as the command line ends."""
     code: Any = 97
     try:
+        _COUNTERS[16:] = struct.pack("<q", _resident_bytes())
         os.setsid()
         signal.signal(signal.SIGINT, signal.default_int_handler)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -243,7 +250,7 @@ def _count(at: Moment | None) -> None:
 
     def counted(self: StepFile, step: int, messages: Any) -> None:
         commit(self, step, messages)
-        _COUNTERS[8:] = struct.pack("<q", struct.unpack("<q", _COUNTERS[8:])[0] + 1)
+        _COUNTERS[8:16] = struct.pack("<q", struct.unpack("<q", _COUNTERS[8:16])[0] + 1)
 
     def note(event: str, arguments: tuple[Any, ...]) -> None:
         nonlocal n_events
@@ -280,7 +287,7 @@ def _wait(child: int, words: tuple[str, ...], io: Path, at: Moment | None, wall_
         os.close(watched)
         _running.discard(child)
     code = os.waitstatus_to_exitcode(status)
-    n_events, n_commits = struct.unpack("<qq", _COUNTERS)
+    n_events, n_commits, _ = _COUNTED.unpack(_COUNTERS)
     return Done(
         words=words,
         code=code,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import mmap
 import os
 import random
 import subprocess
@@ -89,6 +90,18 @@ def leave():
 def test_what_a_fork_does_is_seen(tmp_path, act, seconds, kinds):
     done = forked(("planted",), tmp_path, io=tmp_path, act=act, cpu_seconds_max=seconds)
     assert [failure.kind for failure in judge(done, {0}, cpu_seconds_max=seconds)] == kinds
+
+
+@pytest.mark.slow
+def test_files_that_its_parent_has_mapped_hide_nothing(tmp_path):
+    """They are memory of the parent, and none of a fork that does not read them."""
+    n_bytes = 400_000_000
+    with (tmp_path / "mapped").open("w+b") as file:
+        file.truncate(n_bytes)
+        with mmap.mmap(file.fileno(), n_bytes, prot=mmap.PROT_READ) as mapped:
+            assert sum(mapped[:: mmap.PAGESIZE]) == 0
+            done = forked(("planted",), tmp_path, io=tmp_path, act=take, cpu_seconds_max=60)
+    assert [failure.kind for failure in judge(done, {0}, cpu_seconds_max=60)] == ["memory"]
 
 
 @pytest.mark.slow

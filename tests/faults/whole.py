@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from xml.etree import ElementTree
 
 from fireworld_recorder.reader import open_log
 
@@ -51,6 +52,17 @@ def golden(path: Path) -> str:
         return run_up_to(path)
     text = path.read_text("utf-8")
     return "" if text.endswith("\n") else "its last line is cut"
+
+
+def checked(path: Path) -> str:
+    """Return what is wrong with what a check of goldens writes: its JUnit file, or a new run."""
+    if path.suffix == ".mcap":
+        return run_up_to(path)
+    try:
+        ElementTree.parse(path)
+    except ElementTree.ParseError as error:
+        return str(error)
+    return ""
 
 
 def rrd(path: Path) -> str:

@@ -185,6 +185,7 @@ WRITERS: Final[dict[str, Writer]] = {
         ("g.xml", "kept"),
         STALE,
         again=("--force",),
+        whole=whole.checked,
         partials=("kept/*.mcap.storing",),
     ),
     "diff": Writer(

@@ -128,8 +128,8 @@ class GoldenResult:
             "result": self.result,
             "seed": header and header.seed,
             "sentence": self.sentence,
+            "cause": self.cause and self.cause.to_dict(),
         }
-        common["cause"] = self.cause and self.cause.to_dict()
         if isinstance(header, TrainingHeader):
             found = difference.to_dict() if isinstance(difference, TrainingDifference) else {"first": None}
             return {**common, "curriculum": header.curriculum, "method": header.method, **found}

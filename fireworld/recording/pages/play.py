@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from fireworld_recorder.diff import compare
 from fireworld_viewer.play.page import FirstDifference, play_page
-from fireworld_viewer.story.steps import check_same_city, select_steps
+from fireworld_viewer.story.steps import select_steps
 
 from fireworld.arguments import path_of
 from fireworld.files import check_output, text_of, write_file
 from fireworld.recording.inputs import AnyRecording, open_to_show, run_name
+from fireworld.recording.pages.shown import compare_shown, first_shown
 from fireworld.records import Recording
 
 ENDINGS: Final = (".html", ".htm")  # of the page's file
@@ -81,8 +81,5 @@ def _first_difference(shown: Sequence[Recording]) -> FirstDifference | None:
     if len(shown) < 2:
         return None
     a, b = shown
-    check_same_city(a.city, b.city)
-    first = compare(a, b).first
-    if first is None:
-        return None
-    return FirstDifference(step=int(a.steps[0]) if first.step is None else first.step, sentence=first.sentence)
+    found = first_shown(compare_shown(a, b), a)
+    return None if found is None else FirstDifference(step=found[0], sentence=found[1])

@@ -8,15 +8,15 @@ from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from fireworld_recorder.diff import compare
 from fireworld_recorder.totals import totals_of
 from fireworld_viewer.rerun_view import app
 from fireworld_viewer.rerun_view.pages import OutcomePage
-from fireworld_viewer.story.steps import check_same_city, select_steps
+from fireworld_viewer.story.steps import select_steps
 
 from fireworld.files import text_of
 from fireworld.recording.difference_text import totals_rows
 from fireworld.recording.inputs import AnyRecording, open_to_show, run_name
+from fireworld.recording.pages.shown import compare_shown, first_shown
 from fireworld.records import Recording
 
 
@@ -71,10 +71,8 @@ def _outcome(heads: Sequence[str], recordings: Sequence[Recording]) -> OutcomePa
     if len(recordings) == 1:
         return OutcomePage(heads=heads, rows=list(totals_rows(totals_of(recordings[0]))))
     first_run, second_run = recordings
-    check_same_city(first_run.city, second_run.city)
-    difference = compare(first_run, second_run)
-    rows, first = list(totals_rows(*difference.totals)), difference.first
+    difference = compare_shown(first_run, second_run)
+    rows, first = list(totals_rows(*difference.totals)), first_shown(difference, first_run)
     if first is None:
         return OutcomePage(heads=heads, rows=rows)
-    step = int(first_run.steps[0]) if first.step is None else first.step
-    return OutcomePage(heads=heads, rows=rows, first_step=step, first_sentence=first.sentence)
+    return OutcomePage(heads=heads, rows=rows, first_step=first[0], first_sentence=first[1])

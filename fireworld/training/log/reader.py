@@ -299,7 +299,7 @@ class TrainingLog(Shown):
         """Return the episode that is a part; errors as for `trainer_before`."""
         trainer = self.trainer_before(number)
         part = next(self.parts(number), None)
-        if part is None or Episode not in part or not isinstance(trainer, SarsaTrainer):
+        if part is None or not isinstance(trainer, SarsaTrainer):
             raise LogError(expected(str(self.path), "part", "an episode", number))
         return self._learned(trainer, part[Episode], number)
 
@@ -311,7 +311,7 @@ class TrainingLog(Shown):
         """
         player = self.player
         part = next(self.parts(number), None) if 0 <= number < len(self) else None
-        if part is None or Played not in part:
+        if part is None:
             raise LogError(expected(str(self.path), "part", f"one from 0 to {len(self) - 1}", number))
         return PlayedEpisode.of(
             part[Played],

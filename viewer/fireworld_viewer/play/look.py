@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
-from fireworld.records import ACTIVITIES, EVENT_KINDS, FIERYNESS, MATERIALS
+from fireworld.records import ACTIVITIES, EVENT_ENTITIES, EVENT_KINDS, FIERYNESS, MATERIALS
 from fireworld_viewer import colors
 from fireworld_viewer.story.series import LABELS
 
@@ -73,12 +73,8 @@ PANELS: Final = (
     Panel("return: reward so far", (Curve("rewards.sum_so_far", None),)),
 )
 
-ENTITY_OF: Final = {
-    **dict.fromkeys(("ignited", "extinguished", "burnt-out"), "building"),
-    **dict.fromkeys(("civilian-hurt", "civilian-died"), "civilian"),
-    **dict.fromkeys(("tank-empty", "refilled", "brigade-hurt", "brigade-died"), "brigade"),
-}
-"""What the entity of an event of a kind is, where it is one that can be looked at."""
+LOOKED_AT: Final = ("building", "civilian", "brigade")
+"""Entities that can be looked at: events of others lead nowhere."""
 
 
 def look() -> dict[str, Any]:
@@ -88,7 +84,7 @@ def look() -> dict[str, Any]:
         "activities": _named(ACTIVITIES, colors.ACTIVITY_RGB),
         "health": list(colors.HEALTH_RGB),
         "materials": list(MATERIALS),
-        "events": [[kind.replace("-", " "), ENTITY_OF.get(kind)] for kind in EVENT_KINDS],
+        "events": [[kind.replace("-", " "), _looked_at(EVENT_ENTITIES[kind])] for kind in EVENT_KINDS],
         "heatMax": HEAT_MAX,
         "unknownBrigade": colors.BRIGADE_UNKNOWN_RGB,
         "refuge": colors.REFUGE_RGB,
@@ -107,6 +103,10 @@ def look() -> dict[str, Any]:
             for panel in PANELS
         ],
     }
+
+
+def _looked_at(entity: str) -> str | None:
+    return entity if entity in LOOKED_AT else None
 
 
 def _named(names: tuple[str, ...], rgb: tuple[colors.Rgb, ...]) -> list[list[Any]]:

@@ -133,6 +133,3 @@ def _hash(text: str) -> str:
 @cache
 def _text(name: str) -> str:
     return (files("fireworld_viewer.play") / name).read_text(encoding="utf-8")
-
-
-__all__ = ["FRAME_HEIGHT", "SCRIPTS", "FirstDifference", "frame", "play_page", "program"]
