@@ -27,7 +27,9 @@ from typing import Any, Final
 import llvmlite
 import numba
 from numba.core.caching import _Cache
-from numba.core.compiler import CompileResult
+from llvmlite.binding import parse_bitcode
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompileResult, compile_result
 from numba.core.serialize import dumps
 
 from fireworld.files import without_waiting
@@ -151,10 +153,21 @@ class Store:
             sys.stderr.write(one_line(f"{line}; {hint}") + "\n")
 
 
+class InnerCode(JITCodeLibrary):  # type: ignore[misc]
+    """What kernels link into themselves. LLVM optimizes it there, once, and makes machine code of no more."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
+
+
 class KernelCache(_Cache):  # type: ignore[misc]  # numba is untyped
     """The compiled forms of one function, as numba's dispatcher asks for them."""
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], inner: bool = False) -> None:
+        self._inner = inner
         code = function.__code__
         self._name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
         self._about = f"{DIGEST} {function.__module__}.{function.__qualname__}-{code.co_firstlineno} ".encode()
@@ -177,6 +190,13 @@ class KernelCache(_Cache):  # type: ignore[misc]  # numba is untyped
         if data is None:
             return None
         try:
+            if self._inner:
+                bitcode, fndesc, signature = pickle.loads(data)
+                library = InnerCode(target_context.codegen(), fndesc.qualname)
+                library._final_module = parse_bitcode(bitcode)
+                library._finalized = True
+                return compile_result(target_context=target_context, typing_context=target_context.typing_context, library=library,
+                    entry_point=object(), fndesc=fndesc, signature=signature, objectmode=False)
             return CompileResult._rebuild(target_context, *pickle.loads(data))  # noqa: S301, SLF001 - sealed, and ours
         except Exception:  # noqa: BLE001 - whatever is wrong with it, it can be compiled again
             return None
@@ -186,6 +206,11 @@ class KernelCache(_Cache):  # type: ignore[misc]  # numba is untyped
         if data.lifted or data.library.has_dynamic_globals:  # it holds addresses of this process
             return
         name, purpose = self._place(sig, data.codegen)
+        if self._inner:
+            data.fndesc.typemap = data.fndesc.calltypes = None
+            data.library._ensure_finalized()
+            STORE.write(name, purpose, dumps((data.library._final_module.as_bitcode(), data.fndesc, data.signature)))
+            return
         STORE.write(name, purpose, dumps(data._reduce()))  # noqa: SLF001 - as numba's own cache does
 
     def enable(self) -> None:
