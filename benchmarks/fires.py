@@ -14,7 +14,8 @@ from fireworld.city.build import build_city
 from fireworld.city.city import Array, City, Plan
 from fireworld.city.generator import generate_plan
 from fireworld.kernels import fire as kernels
-from fireworld.kernels.arrays import CityArrays, FireConstants, FireState, Warmth
+from fireworld.kernels.arrays import CityArrays, FireConstants, FireState
+from fireworld.kernels.episode_arrays import Warmth
 from fireworld.kernels.warmth import fresh_warmth
 from fireworld.parameters import PAPER
 from fireworld.records import MATERIALS

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from fireworld.kernels.arrays import BuildingArrays, CoverArrays, FireConstants, FireState, LinkArrays, Warmth
+from fireworld.kernels.arrays import BuildingArrays, CoverArrays, FireConstants, FireState, LinkArrays
+from fireworld.kernels.episode_arrays import Warmth
 from fireworld.kernels.fire import burn_on
 from fireworld.kernels.jit import kernel
 from fireworld.kernels.warmth import begin

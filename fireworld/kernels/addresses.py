@@ -128,7 +128,7 @@ class _OpenedFields(AttributeTemplate):  # type: ignore[misc]
         return opened_type.member_type(name)
 
 
-@lower_getattr_generic(Opened)  # type: ignore[untyped-decorator]
+@lower_getattr_generic(Opened)
 def _read_field(context: Any, builder: Any, opened_type: Opened, row: Any, name: str) -> Any:
     """Write the code that reads a field of a row."""
     place, _ = opened_type.member[name]

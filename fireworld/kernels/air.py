@@ -8,16 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fireworld.kernels.arrays import (
-    ALL,
-    N_VISITS,
-    Array,
-    BuildingArrays,
-    CoverArrays,
-    FireConstants,
-    FireState,
-    Warmth,
-)
+from fireworld.kernels.arrays import Array, BuildingArrays, CoverArrays, FireConstants, FireState
+from fireworld.kernels.episode_arrays import ALL, N_VISITS, Warmth
 from fireworld.kernels.jit import inner
 from fireworld.kernels.warmth import take_tiles
 

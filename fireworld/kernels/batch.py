@@ -11,12 +11,8 @@ from typing import NamedTuple
 from fireworld.kernels.addresses import opener
 from fireworld.kernels.arrays import (
     BURNING,
-    LAST_STEP,
-    SEED,
-    STEP,
     Array,
     BrigadeState,
-    Episode,
     Float32x2,
     Float32x3,
     Float32x4,
@@ -30,8 +26,9 @@ from fireworld.kernels.arrays import (
     UInt8x2,
     UInt8x3,
 )
+from fireworld.kernels.episode_arrays import LAST_STEP, SEED, STEP, Episode
 from fireworld.kernels.fire import is_over
-from fireworld.kernels.jit import inlined, kernel
+from fireworld.kernels.jit import inner, kernel
 from fireworld.kernels.observation import N_ACTIONS, can_choose, find_target, observe, site_place
 from fireworld.kernels.outcome import score
 from fireworld.kernels.ranking import N_TARGET_FEATURES, OWN_TARGET, describe_building, see_target
@@ -138,14 +135,14 @@ def look_again(row: Array, batch_row: Array, i: int, brigade: int) -> None:
     show_brigade(brigade, i, opened_episode(row), opened_batch(batch_row))
 
 
-@inlined
+@inner
 def note_decisions(i: int, brigades: BrigadeState, result: Result) -> None:
     """Write down what the brigades of world i did in the step just done."""
     for brigade in range(len(brigades.action)):
         result.action[i, brigade], result.target[i, brigade] = brigades.action[brigade], brigades.target[brigade]
 
 
-@inlined
+@inner
 def follow(brigade: int, action: int, i: int, episode: Episode, batch: Batch) -> None:
     """Write down what a brigade of world i decides; one that chooses nothing does nothing."""
     city, world = episode.city, episode.world
@@ -160,7 +157,7 @@ def follow(brigade: int, action: int, i: int, episode: Episode, batch: Batch) ->
     brigades.action[brigade], brigades.target[brigade] = action, target
 
 
-@inlined
+@inner
 def show(i: int, episode: Episode, batch: Batch) -> None:
     """Write what is seen of world i, in whose coming step the fire sites are found, and what its last step came to."""
     city, world, clock = episode.city, episode.world, episode.clock
@@ -189,7 +186,7 @@ def show(i: int, episode: Episode, batch: Batch) -> None:
         show_buildings(i, episode, view)
 
 
-@inlined
+@inner
 def show_brigade(brigade: int, i: int, episode: Episode, batch: Batch) -> None:
     """Write what a brigade of world i sees."""
     world, constants, view = episode.world, episode.constants, batch.shown
@@ -218,7 +215,7 @@ def show_brigade(brigade: int, i: int, episode: Episode, batch: Batch) -> None:
         show_position(brigade, i, episode, view)
 
 
-@inlined
+@inner
 def show_target(action: int, brigade: int, has_site: bool, i: int, episode: Episode, view: View) -> None:
     """Write the features of the building that an action names for a brigade; MODEL 7."""
     city, world, constants, scratch = episode.city, episode.world, episode.constants, episode.scratch
@@ -238,7 +235,7 @@ def show_target(action: int, brigade: int, has_site: bool, i: int, episode: Epis
         shown[k] = scratch.seen[k]
 
 
-@inlined
+@inner
 def show_position(brigade: int, i: int, episode: Episode, view: View) -> None:
     """Write the state of a brigade itself."""
     brigades, frame, shown = episode.world.brigades, view.frame[i], view.brigades[i, brigade]
@@ -250,7 +247,7 @@ def show_position(brigade: int, i: int, episode: Episode, view: View) -> None:
     shown[5] = brigades.driven[brigade] > 0
 
 
-@inlined
+@inner
 def show_buildings(i: int, episode: Episode, view: View) -> None:
     """Write the burning buildings of world i and their features, as many as there is room for."""
     city, world, sites, scratch = episode.city, episode.world, episode.world.sites, episode.scratch

@@ -27,9 +27,7 @@ from typing import Any, Final
 import llvmlite
 import numba
 from numba.core.caching import _Cache
-from llvmlite.binding import parse_bitcode
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompileResult, compile_result
+from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
 from fireworld.files import without_waiting
@@ -153,21 +151,10 @@ class Store:
             sys.stderr.write(one_line(f"{line}; {hint}") + "\n")
 
 
-class InnerCode(JITCodeLibrary):  # type: ignore[misc]
-    """What kernels link into themselves. LLVM optimizes it there, once, and makes machine code of no more."""
-
-    def _optimize_final_module(self) -> None:
-        pass
-
-    def _finalize_final_module(self) -> None:
-        self._finalized = True
-
-
 class KernelCache(_Cache):  # type: ignore[misc]  # numba is untyped
     """The compiled forms of one function, as numba's dispatcher asks for them."""
 
-    def __init__(self, function: Callable[..., Any], inner: bool = False) -> None:
-        self._inner = inner
+    def __init__(self, function: Callable[..., Any]) -> None:
         code = function.__code__
         self._name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
         self._about = f"{DIGEST} {function.__module__}.{function.__qualname__}-{code.co_firstlineno} ".encode()
@@ -190,14 +177,7 @@ class KernelCache(_Cache):  # type: ignore[misc]  # numba is untyped
         if data is None:
             return None
         try:
-            if self._inner:
-                bitcode, fndesc, signature = pickle.loads(data)
-                library = InnerCode(target_context.codegen(), fndesc.qualname)
-                library._final_module = parse_bitcode(bitcode)
-                library._finalized = True
-                return compile_result(target_context=target_context, typing_context=target_context.typing_context, library=library,
-                    entry_point=object(), fndesc=fndesc, signature=signature, objectmode=False)
-            return CompileResult._rebuild(target_context, *pickle.loads(data))  # noqa: S301, SLF001 - sealed, and ours
+            return self.rebuilt(target_context, pickle.loads(data))  # noqa: S301 - sealed, and ours
         except Exception:  # noqa: BLE001 - whatever is wrong with it, it can be compiled again
             return None
 
@@ -206,12 +186,16 @@ class KernelCache(_Cache):  # type: ignore[misc]  # numba is untyped
         if data.lifted or data.library.has_dynamic_globals:  # it holds addresses of this process
             return
         name, purpose = self._place(sig, data.codegen)
-        if self._inner:
-            data.fndesc.typemap = data.fndesc.calltypes = None
-            data.library._ensure_finalized()
-            STORE.write(name, purpose, dumps((data.library._final_module.as_bitcode(), data.fndesc, data.signature)))
-            return
-        STORE.write(name, purpose, dumps(data._reduce()))  # noqa: SLF001 - as numba's own cache does
+        STORE.write(name, purpose, dumps(self.reduced(data)))
+
+    def reduced(self, result: Any) -> tuple[Any, ...]:
+        """Return what is kept of a compiled function."""
+        parts: tuple[Any, ...] = result._reduce()  # noqa: SLF001 - as numba's own cache does
+        return parts
+
+    def rebuilt(self, target_context: Any, parts: tuple[Any, ...]) -> Any:
+        """Return the compiled function again, of what was kept of it."""
+        return CompileResult._rebuild(target_context, *parts)  # noqa: SLF001 - the same
 
     def enable(self) -> None:
         """Do nothing: it is always on."""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from fireworld.kernels.arrays import BuildingArrays, FireState
-from fireworld.kernels.jit import inlined, inner
+from fireworld.kernels.jit import inner
 
 
-@inlined
+@inner
 def is_burning(b: int, buildings: BuildingArrays, fire: FireState) -> bool:
     """Return whether a building burns: hot enough, fuel left, inflammable (codes 1 to 3).
 
@@ -29,13 +29,13 @@ def fieryness_of(burning: bool, fuel: float, full: float, inflammable: int, wate
     return 4 + third if fuel > 0.0 else 8
 
 
-@inlined
+@inner
 def is_alight(code: int) -> bool:
     """Return whether a code is one of what burns."""
     return (code >= 1) & (code <= 3)
 
 
-@inlined
+@inner
 def can_catch(code: int) -> bool:
     """Return whether a code is one of what has never burned; what of it is inflammable can catch fire."""
     return (code == 0) | (code == 4)

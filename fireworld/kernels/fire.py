@@ -10,20 +10,10 @@ from numba import float32
 
 from fireworld.draws import BURN_RATE
 from fireworld.kernels.air import exchange_with_air, spread_air
-from fireworld.kernels.arrays import (
-    AGE,
-    N_BLOCKS,
-    SITES_CHANGED,
-    Array,
-    BuildingArrays,
-    CoverArrays,
-    FireConstants,
-    FireState,
-    LinkArrays,
-    Warmth,
-)
+from fireworld.kernels.arrays import Array, BuildingArrays, CoverArrays, FireConstants, FireState, LinkArrays
 from fireworld.kernels.codes import can_catch, fieryness_of, is_alight, is_burning
 from fireworld.kernels.draws import normal
+from fireworld.kernels.episode_arrays import AGE, N_BLOCKS, SITES_CHANGED, Warmth
 from fireworld.kernels.jit import inner, kernel
 from fireworld.kernels.warmth import ONE, PERIOD, begin, bounds, follow_heat, narrow
 

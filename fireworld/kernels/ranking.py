@@ -17,7 +17,7 @@ from fireworld.kernels.arrays import (
     LinkArrays,
     SiteState,
 )
-from fireworld.kernels.jit import inlined, inner
+from fireworld.kernels.jit import inner
 from fireworld.kernels.observation import N_ACTIONS
 
 N_OF_BUILDING, N_OF_BRIGADE, N_OF_TEAM = 7, 3, 3
@@ -84,19 +84,19 @@ def describe_building(
     out[6] = np.sqrt(max(litres, 0.0) / max(power, 1))
 
 
-@inlined
+@inner
 def beyond(square: float, range_square: float) -> float:
     """Return how far beyond its range a brigade is from a building, in hundreds of metres; squares in mm^2."""
     return min((np.sqrt(square) - np.sqrt(range_square)) / METERS_100, METERS_MOST) if square > range_square else 0.0
 
 
-@inlined
+@inner
 def nearness(dx: float, dy: float) -> float:
     """Return how near two buildings are, 1 down to 0, of their distances in mm."""
     return 1.0 / (1.0 + (dx * dx + dy * dy) / METERS_50_SQUARE)
 
 
-@inlined
+@inner
 def is_enough(here: float, needed: float) -> bool:
     """Return whether the brigades that go for a building can put it out in a step, so that no other is needed."""
     return here > 0.0 and here >= needed
@@ -141,7 +141,7 @@ def describe_target(
     out[12] = 1.0 if is_enough(here, described[6] * described[6]) else 0.0
 
 
-@inlined
+@inner
 def know_building(b: int, step: int, sight: Sight) -> None:
     """Describe a building in a step in which nobody has yet."""
     if sight.described_at[b] != step:
@@ -159,7 +159,7 @@ def know_building(b: int, step: int, sight: Sight) -> None:
         sight.described_at[b] = step
 
 
-@inlined
+@inner
 def see_target(brigade: int, b: int, step: int, known: Array, sight: Sight, out: Array) -> None:
     """Write the 13 features of a building that a brigade sees; `known` (b,) is what the brigades go for, -1 nothing."""
     know_building(b, step, sight)

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fireworld.kernels.arrays import Array, GeometryArrays, NetworkArrays, Ranks, SiteState
-from fireworld.kernels.jit import inlined, inner, kernel
+from fireworld.kernels.arrays import Array, GeometryArrays, NetworkArrays, SiteState
+from fireworld.kernels.episode_arrays import Ranks
+from fireworld.kernels.jit import inner, kernel
 from fireworld.kernels.network import value_by_network
 from fireworld.kernels.observation import N_ACTIONS, find_target, site_place
 from fireworld.kernels.ranking import (
@@ -56,7 +57,7 @@ def line_up(known: Array, geometry: GeometryArrays, sites: SiteState, ranks: Ran
         go_for(brigade, known[brigade], geometry, sites, ranks)
 
 
-@inlined
+@inner
 def count_in(target: int, number: float, sites: SiteState, ranks: Ranks) -> None:
     """Add to the number of brigades that go for a building, if it burns; -1 for none."""
     if target >= 0 and sites.place[target] >= 0:
@@ -140,7 +141,7 @@ def weigh_row(
         ranks.value[k] = value + extra
 
 
-@inlined
+@inner
 def value_targets(
     brigade: int,
     action: int,
@@ -193,7 +194,7 @@ def best_in_row(first: int, end: int, building_id: Array, sites: SiteState, rank
     return best
 
 
-@inlined
+@inner
 def rank_targets(
     brigade: int,
     own: bool,
@@ -249,6 +250,14 @@ def rank_targets(
     return best_action, np.int64(sites.member[place])
 
 
+@inner
+def line_up_before(brigade: int, known: Array, geometry: GeometryArrays, sites: SiteState, ranks: Ranks) -> None:
+    """Line up as `line_up` does, in the middle of a step: the brigades before one have been heard."""
+    line_up(known, geometry, sites, ranks)
+    for other in range(brigade):
+        hear(other, known[other], known[other], geometry, sites, ranks)
+
+
 @kernel
 def rank(
     brigade: int,
@@ -264,7 +273,5 @@ def rank(
     values: Array,
 ) -> tuple[np.int64, np.int64]:
     """Return what `rank_targets` does, asked alone; all arguments are named as there."""
-    line_up(known, sight.geometry, sight.sites, ranks)
-    for other in range(brigade):
-        hear(other, known[other], known[other], sight.geometry, sight.sites, ranks)
+    line_up_before(brigade, known, sight.geometry, sight.sites, ranks)
     return rank_targets(brigade, own, True, 0, step, known, weights, network, sight, ranks, seen, work, values)

@@ -5,9 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from fireworld.kernels.arrays import (
-    N_BLOCKS,
-    SITES_CHANGED,
-    SITES_KNOWN,
     BrigadeState,
     BuildingArrays,
     CivilianState,
@@ -16,9 +13,9 @@ from fireworld.kernels.arrays import (
     LinkArrays,
     NearArrays,
     SiteState,
-    Warmth,
 )
 from fireworld.kernels.codes import can_catch, is_alight
+from fireworld.kernels.episode_arrays import N_BLOCKS, SITES_CHANGED, SITES_KNOWN, Warmth
 from fireworld.kernels.jit import inner
 from fireworld.kernels.warmth import ONE, WORD_SHIFT, ZERO, bounds, clear_bit, has_bit, lowest_bit, set_bit
 

@@ -6,25 +6,20 @@ import numpy as np
 
 from fireworld.kernels.addresses import opener
 from fireworld.kernels.arrays import (
-    SEED,
-    SITES_CHANGED,
-    STEP,
     Array,
     BrigadeState,
     CityArrays,
     CivilianState,
     Constants,
-    Episode,
     FireState,
     HealthConstants,
-    Scratch,
-    Warmth,
     WorldState,
 )
 from fireworld.kernels.brigades import act, shelter
+from fireworld.kernels.episode_arrays import SEED, SITES_CHANGED, STEP, Episode, Scratch, Warmth
 from fireworld.kernels.fire import burn_on, draw_burn_rates, light
 from fireworld.kernels.health import harm
-from fireworld.kernels.jit import inlined, inner, kernel
+from fireworld.kernels.jit import inner, kernel
 from fireworld.kernels.outcome import count_living, reward_step, score
 from fireworld.kernels.ranking import Sight
 from fireworld.kernels.sites import find_sites
@@ -61,7 +56,7 @@ def finish(row: Array) -> None:
     score(world.fire, world.civilians, city.geometry, world.outcome)
 
 
-@inlined
+@inner
 def sight_of(city: CityArrays, world: WorldState, constants: Constants, scratch: Scratch) -> Sight:
     """Return what the brigades look at when they value targets."""
     return Sight(
@@ -78,7 +73,7 @@ def sight_of(city: CityArrays, world: WorldState, constants: Constants, scratch:
     )
 
 
-@inlined
+@inner
 def begin_step(city: CityArrays, world: WorldState, warmth: Warmth, step: int) -> None:
     """Light what is lit in a step, and find the fire sites if they can be others than before.
 
@@ -100,7 +95,7 @@ def begin_step(city: CityArrays, world: WorldState, warmth: Warmth, step: int) -
         )
 
 
-@inlined
+@inner
 def finish_step(
     city: CityArrays, world: WorldState, constants: Constants, warmth: Warmth, seed: int, step: int
 ) -> None:

@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numba.cpython.unsafe.numbers import trailing_zeros
 
-from fireworld.kernels.arrays import (
+from fireworld.kernels.arrays import Array, CoverArrays, FireState, LinkArrays
+from fireworld.kernels.episode_arrays import (
     ALL,
     BLOCKS_CHANGED,
     N_BLOCKS,
@@ -20,13 +21,9 @@ from fireworld.kernels.arrays import (
     NUMBERS,
     SITES_CHANGED,
     VISITS_CHANGED,
-    Array,
-    CoverArrays,
-    FireState,
-    LinkArrays,
     Warmth,
 )
-from fireworld.kernels.jit import inlined, inner
+from fireworld.kernels.jit import inner
 
 BLOCK, TILE, WORD = 64, 16, 64
 """Buildings in a block; cells along each side of a tile of air; bits in a word."""
@@ -121,25 +118,25 @@ def narrow(cover: CoverArrays, links: LinkArrays, fire: FireState, warmth: Warmt
     follow_heat(cover, links, fire, warmth)
 
 
-@inlined
+@inner
 def lowest_bit(bits: np.uint64) -> np.uint64:
     """Return which is the lowest bit; there must be one."""
     return np.uint64(trailing_zeros(bits))
 
 
-@inlined
+@inner
 def set_bit(k: int, bits: Array) -> None:
     """Set a bit in a row of words."""
     bits[np.uint64(k) >> WORD_SHIFT] |= ONE << (np.uint64(k) & LAST_BIT)
 
 
-@inlined
+@inner
 def has_bit(k: int, bits: Array) -> bool:
     """Return whether a bit in a row of words is set."""
     return bits[np.uint64(k) >> WORD_SHIFT] & (ONE << (np.uint64(k) & LAST_BIT)) != ZERO
 
 
-@inlined
+@inner
 def clear_bit(k: int, bits: Array) -> None:
     """Clear a bit in a row of words."""
     bits[np.uint64(k) >> WORD_SHIFT] &= ~(ONE << (np.uint64(k) & LAST_BIT))
@@ -170,21 +167,21 @@ def refresh(cover: CoverArrays, warmth: Warmth) -> None:
             warmth.visit[k] = cover.order[warmth.visit[k]]
 
 
-@inlined
+@inner
 def bounds(block: int, n: int) -> tuple[np.uint64, np.uint64]:
     """Return the first building of a block, and the one behind its last; `n`: of the city."""
     first = np.uint64(block) << BLOCK_SHIFT
     return first, min(first + np.uint64(BLOCK), np.uint64(n))
 
 
-@inlined
+@inner
 def add_building(b: int, warmth: Warmth) -> None:
     """Add a building to those that a step looks at, with all others of its block."""
     set_bit(np.uint64(b) >> BLOCK_SHIFT, warmth.block_bits)
     warmth.number[BLOCKS_CHANGED] = 1 - warmth.number[ALL]
 
 
-@inlined
+@inner
 def doubt(b: int, warmth: Warmth) -> None:
     """Note that a building may change its code, be it ever so cold: it burned, or has been watered."""
     add_building(b, warmth)

@@ -10,8 +10,9 @@ from typing import Final
 import numpy as np
 
 from fireworld.kernels.addresses import address_row
-from fireworld.kernels.arrays import LAST_STEP, SEED, STEP, Array, FireState, Learner, PolicyArrays, Scratch, Seen
+from fireworld.kernels.arrays import Array, FireState, Learner, PolicyArrays, Seen
 from fireworld.kernels.choice import RANK_ALL, RANK_NAMED
+from fireworld.kernels.episode_arrays import LAST_STEP, SEED, STEP, Scratch
 from fireworld.kernels.network import widest
 from fireworld.kernels.observation import N_ACTIONS, N_FEATURES
 from fireworld.kernels.ranking import N_OF_BUILDING, N_WEIGHTS

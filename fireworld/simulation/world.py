@@ -13,18 +13,8 @@ import numpy as np
 
 from fireworld.city.city import City
 from fireworld.kernels.addresses import address_row
-from fireworld.kernels.arrays import (
-    BURNING,
-    SEED,
-    STEP,
-    Array,
-    CityArrays,
-    Constants,
-    Learner,
-    PolicyArrays,
-    Seen,
-    WorldState,
-)
+from fireworld.kernels.arrays import BURNING, Array, CityArrays, Constants, Learner, PolicyArrays, Seen, WorldState
+from fireworld.kernels.episode_arrays import SEED, STEP
 from fireworld.kernels.fire import ignite
 from fireworld.kernels.observation import can_choose, observe
 from fireworld.kernels.outcome import assess

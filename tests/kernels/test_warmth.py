@@ -7,7 +7,7 @@ import pytest
 
 from fireworld.city.build import build_city
 from fireworld.city.generator import generate_plan
-from fireworld.kernels.arrays import ALL, N_BLOCKS, N_VISITS, SEED, STEP
+from fireworld.kernels.episode_arrays import ALL, N_BLOCKS, N_VISITS, SEED, STEP
 from fireworld.kernels.fire import ignite
 from fireworld.kernels.jit import kernel
 from fireworld.kernels.outcome import score
