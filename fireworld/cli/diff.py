@@ -161,11 +161,11 @@ def _diff_trainings(
 
 def show_difference(found: RunComparison, *, names: tuple[str, str], cause: Cause | None = None) -> None:
     """Print what changed, the first difference, how both runs came out, and how it spread by topic and step."""
-    from fireworld.cli.tables import print_table
+    from fireworld.cli.tables import print_lines, print_table
     from fireworld.recording import difference_text as text
 
     lines = [text.verdict(found)] if cause is None else text.head_lines(found, cause)
-    click.echo("\n".join([*lines, ""]))
+    print_lines([*lines, ""])
     print_table(("", *names), list(text.totals_rows(*found.totals)))
     topics = list(text.topic_rows(found))
     if topics:
@@ -174,7 +174,7 @@ def show_difference(found: RunComparison, *, names: tuple[str, str], cause: Caus
     if found.spread.rows:
         click.echo()
         print_table(text.SPREAD_HEADS, list(map(text.spread_cells, found.spread.rows)), left=(), narrow=True)
-        click.echo("\n".join(["", text.SPREAD_NOTE, *text.spread_sentences(found)]))
+        print_lines(["", text.SPREAD_NOTE, *text.spread_sentences(found)])
 
 
 def _parse_tolerance(text: str) -> tuple[str, float]:

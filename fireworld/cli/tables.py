@@ -45,19 +45,23 @@ def print_table(
 
 
 def print_lines(lines: Iterable[str]) -> None:
-    """Print lines, broken between words where the terminal ends; what continues a line stands further in."""
+    """Print lines, broken between words where the terminal ends; what continues a line stands further in.
+
+    Where no terminal is, and COLUMNS does not ask for a width, they stay whole.
+    """
+    import os
     import shutil
-    import textwrap
+    import sys
+    from textwrap import TextWrapper
 
     import click
 
+    is_wide = not (sys.stdout.isatty() or "COLUMNS" in os.environ)
     width = max(shutil.get_terminal_size().columns, 40)
     for line in lines:
         further = " " * (len(line) - len(line.lstrip()) + 2)
-        parts = textwrap.wrap(
-            line, width, subsequent_indent=further, break_long_words=False, break_on_hyphens=False
-        ) if len(line) > width else [line.rstrip()]  # fmt: skip
-        click.echo("\n".join(parts))
+        wrapper = TextWrapper(width, subsequent_indent=further, break_long_words=False, break_on_hyphens=False)
+        click.echo(line.rstrip() if is_wide or len(line) <= width else wrapper.fill(line))
 
 
 def print_blocks(blocks: Iterable[Block]) -> None:
