@@ -320,6 +320,14 @@ def text_of(name: str) -> str:
     return name.encode("utf-8", "backslashreplace").decode()
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder, if it is not there (OutputError)."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be made: {error.strerror or error}") from None
+
+
 def write_file(path: Path, data: bytes | str) -> None:
     """Write a file, beside and renamed; a text as UTF-8, with any bytes of names in it as Python writes them.
 

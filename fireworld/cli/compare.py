@@ -14,6 +14,7 @@ from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.installed import check_matplotlib
 from fireworld.cli.options import SEED_MAX
 from fireworld.cli.progress import BAR, COUNT, DESCRIPTION, LEFT, bars
+from fireworld.cli.reporting import check_reporting, print_annotations, reporting_options
 from fireworld.outcome import METRICS
 
 TESTS: Final = "test-1,test-2,test-3"
@@ -39,7 +40,7 @@ EXIT_CODES: Final = {"not worse": 0, "worse": 1, "cannot tell": 3}
 @click.option("--gate", is_flag=True, help="Turn the verdict into the exit code.")
 @click.option(
     "--gate-metric", type=click.Choice([metric.name for metric in METRICS]),
-    help="What --gate and --junit judge.  [default: score]",
+    help="What is judged.  [default: score]",
 )  # fmt: skip
 @click.option(
     "--margin", metavar="X", type=click.FloatRange(min=0), help="A loss up to X counts as not worse.  [default: 0]"
@@ -49,7 +50,8 @@ EXIT_CODES: Final = {"not worse": 0, "worse": 1, "cannot tell": 3}
 )
 @click.option("--junit", metavar="FILE.xml", type=click.Path(path_type=Path), help="Write a JUnit report.")
 @click.option("--plot", metavar="FILE.png", type=click.Path(path_type=Path), help="Draw every paired difference.")
-@click.option("--force", is_flag=True, help="Replace existing files of --junit and --plot.")
+@reporting_options
+@click.option("--force", is_flag=True, help="Replace existing files.")
 @click.option("--json", "as_json", is_flag=True, help="Write JSON.")
 @click.pass_context
 def command(
@@ -68,6 +70,8 @@ def command(
     results: Path | None,
     junit: Path | None,
     plot: Path | None,
+    summary: Path | None,
+    annotate: str | None,
     force: bool,
     as_json: bool,
 ) -> None:
@@ -88,17 +92,18 @@ def command(
     zero, and reaches below -margin), 3 cannot tell; 2 could not compare; 130 interrupted (--results keeps every run
     that is done).
     """
-    if not (gate or junit) and (margin is not None or gate_metric is not None):
-        raise click.UsageError("--margin and --gate-metric go with --gate or --junit.")
-    if force and not (junit or plot):
-        raise click.UsageError("--force goes with --junit or --plot.")
+    check_reporting(annotate=annotate, as_json=as_json)
+    if not (gate or junit or summary or annotate) and (margin is not None or gate_metric is not None):
+        raise click.UsageError("--margin and --gate-metric go with --gate, --junit, --summary or --annotate.")
+    if force and not (junit or plot or summary):
+        raise click.UsageError("--force goes with --junit, --plot or --summary.")
     from fireworld.evaluation.compare import compare
     from fireworld.executors import n_cores
     from fireworld.files import check_output, check_outputs, written_beside
     from fireworld.scenario import split_settings
     from fireworld.scenario.yaml_text import read_yaml
 
-    check_outputs([path for path in (junit, plot) if path is not None], force=force)
+    check_outputs([path for path in (junit, plot, summary) if path is not None], force=force)
     if plot:
         check_output(plot, force=force, endings=(".png", ".svg", ".pdf"))
         check_matplotlib("--plot")
@@ -123,10 +128,14 @@ def command(
             both.enter_context(written_beside(junit)).write_bytes(comparison.junit())
         if plot is not None:
             comparison.save_figure(plot, force=force)
+        if summary is not None:
+            comparison.save_summary(summary, force=force)
     if as_json:
         click.echo(json.dumps(comparison.to_dict(gate=gate), indent=2))
     else:
         click.echo("\n".join([repr(comparison), comparison.sentence, *([comparison.gate] if gate else [])]))
+    if annotate:
+        print_annotations(comparison.findings(), cannot="warning")
     context.exit(EXIT_CODES[comparison.judgement] if gate else 0)
 
 

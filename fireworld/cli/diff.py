@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NoReturn
 import click
 
 from fireworld.cli.installed import check_matplotlib
+from fireworld.cli.reporting import check_reporting, print_annotations, reporting_options
 from fireworld.cli.tables import print_blocks
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 @click.option("--json", "as_json", is_flag=True, help="Write JSON.")
 @click.option("--junit", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML for a CI server.")
 @click.option("--html", metavar="FILE", type=click.Path(path_type=Path), help="Write a page with maps and curves.")
+@reporting_options
 @click.option("--force", is_flag=True, help="Replace existing files.")
 @click.pass_context
 def command(
@@ -59,6 +61,8 @@ def command(
     as_json: bool,
     junit: Path | None,
     html: Path | None,
+    summary: Path | None,
+    annotate: str | None,
     force: bool,
 ) -> None:
     """Compare recording B with recording A, step by step.
@@ -75,6 +79,7 @@ def command(
     fireworld diff golden.mcap new.mcap --tolerance buildings.temperature=1e-6 --ignore draws
     fireworld diff golden.mcap new.mcap --from 10 --to 20
     fireworld diff golden.mcap new.mcap --html diff.html --junit diff.xml
+    fireworld diff golden.mcap new.mcap --summary diff.md --annotate github
 
     Exit code: 0 the same, 1 different, 2 could not compare (no file is written).
     """
@@ -82,14 +87,17 @@ def command(
     from fireworld.recording.difference import diff
     from fireworld.recording.inputs import is_training
 
-    outputs = [path for path in (junit, html) if path is not None]
+    check_reporting(annotate=annotate, as_json=as_json)
+    outputs = [path for path in (junit, html, summary) if path is not None]
     if force and not outputs:
-        raise click.UsageError("--force goes with --junit or --html.")
+        raise click.UsageError("--force goes with --junit, --html or --summary.")
     check_outputs(outputs, force=force, inputs=(first, second))
     if html is not None:
         check_matplotlib("diff --html")
     if is_training(first) and is_training(second):
-        asked = any((tolerances, ignore, first_step is not None, last_step is not None, any_scenario, outputs))
+        asked = any(
+            (tolerances, ignore, first_step is not None, last_step is not None, any_scenario, outputs, annotate)
+        )
         _diff_trainings(context, first, second, asked=asked, partial=partial, as_json=as_json)
     difference = diff(
         first,
@@ -104,18 +112,20 @@ def command(
     for run, name in zip(difference.runs, difference.names, strict=True):
         if run.damage is not None:
             click.echo(f"{name}: {run.damage}; nothing is compared beyond", err=True)
-    _write(difference, junit=junit, html=html, force=force)
+    _write(difference, junit=junit, html=html, summary=summary, force=force)
     if as_json:
         click.echo(json.dumps(difference.to_dict(), indent=2))
     elif difference.known_same and not outputs:
         click.echo(str(difference))
     else:
         show_difference(difference.found, names=difference.names, cause=difference.cause)
+    if annotate:
+        print_annotations([difference.finding()])
     context.exit(0 if difference.same else 1)
 
 
-def _write(difference: Difference, *, junit: Path | None, html: Path | None, force: bool) -> None:
-    """Write the outputs that were asked for, both or none, before anything is printed: a reader may leave early."""
+def _write(difference: Difference, *, junit: Path | None, html: Path | None, summary: Path | None, force: bool) -> None:
+    """Write the outputs that were asked for, all or none, before anything is printed: a reader may leave early."""
     from fireworld.files import written_beside
 
     with ExitStack() as both:
@@ -123,10 +133,14 @@ def _write(difference: Difference, *, junit: Path | None, html: Path | None, for
             both.enter_context(written_beside(junit)).write_bytes(difference.junit())
         if html is not None:
             difference.save_html(html, force=force)
+        if summary is not None:
+            difference.save_summary(summary, force=force)
     if junit is not None:
         click.echo(f"wrote {junit}", err=True)
     if html is not None:
         click.echo(f"wrote {html}; open it in a browser", err=True)
+    if summary is not None:
+        click.echo(f"wrote {summary}", err=True)
 
 
 def _diff_trainings(
@@ -147,11 +161,11 @@ def _diff_trainings(
 
 def show_difference(found: RunComparison, *, names: tuple[str, str], cause: Cause | None = None) -> None:
     """Print what changed, the first difference, how both runs came out, and how it spread by topic and step."""
-    from fireworld.cli.tables import print_table
+    from fireworld.cli.tables import print_lines, print_table
     from fireworld.recording import difference_text as text
 
     lines = [text.verdict(found)] if cause is None else text.head_lines(found, cause)
-    click.echo("\n".join([*lines, ""]))
+    print_lines([*lines, ""])
     print_table(("", *names), list(text.totals_rows(*found.totals)))
     topics = list(text.topic_rows(found))
     if topics:
@@ -160,7 +174,7 @@ def show_difference(found: RunComparison, *, names: tuple[str, str], cause: Caus
     if found.spread.rows:
         click.echo()
         print_table(text.SPREAD_HEADS, list(map(text.spread_cells, found.spread.rows)), left=(), narrow=True)
-        click.echo("\n".join(["", text.SPREAD_NOTE, *text.spread_sentences(found)]))
+        print_lines(["", text.SPREAD_NOTE, *text.spread_sentences(found)])
 
 
 def _parse_tolerance(text: str) -> tuple[str, float]:

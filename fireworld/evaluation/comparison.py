@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from importlib import import_module
@@ -11,11 +11,16 @@ from typing import TYPE_CHECKING, Any, Final
 from xml.etree import ElementTree as Xml
 
 from fireworld.arguments import ArgumentError
-from fireworld.errors import OutputError, expected, one_line
+from fireworld.cause import DIGEST_SHOWN
+from fireworld.errors import OutputError, ViewError, expected, one_line
 from fireworld.evaluation.inputs import in_a_row, seeds_text
 from fireworld.evaluation.paired import N_SEEDS_ENOUGH, Judgement, Pairing, Verdict, judge, over_all
+from fireworld.files import check_output, make_folder, write_file
+from fireworld.findings import Finding
+from fireworld.findings import Verdict as FindingVerdict
 from fireworld.html_page import html_mark, html_table, text_cell
 from fireworld.junit import report
+from fireworld.markdown import files_beside, markdown_page
 from fireworld.outcome import METRICS, Metric
 from fireworld.shown import text_table
 
@@ -25,6 +30,12 @@ if TYPE_CHECKING:
 FORMAT: Final = "fireworld-comparison/1"
 FORMAT_OF_SEVERAL: Final = "fireworld-comparisons/1"
 OVER_ALL: Final = "over all"
+_VERDICTS: Final[Mapping[Judgement, FindingVerdict]] = {
+    "not worse": "same",
+    "worse": "different",
+    "cannot tell": "cannot",
+}
+_WORDS: Final[Mapping[FindingVerdict, str]] = {verdict: judgement for judgement, verdict in _VERDICTS.items()}
 _MARKS: Final = {"better": "good", "worse": "bad", "cannot tell": "open", "the same policy": "open"}
 _CAPTION: Final = "mean (interquartile mean); B - A [95 % interval]; P: a run of B is the better one"
 
@@ -164,6 +175,41 @@ class Comparison:
             "notes": self.notes,
         }
 
+    def findings(self, pictures: Mapping[str, str] | None = None) -> list[Finding]:
+        """Return the comparison with each policy for the pages of a CI server, with pictures by policy."""
+        return [_finding(one, (pictures or {}).get(one.policies[1].name, "")) for one in self.each]
+
+    def summary(self, pictures: Mapping[str, str] | None = None, *, beside: Path | None = None) -> str:
+        """Return the comparison as Markdown: what was compared, the judgement, the table.
+
+        Args:
+            pictures: files, by policy.
+            beside: the folder of the Markdown file, from which pictures are named.
+        """
+        return markdown_page("compare", self.findings(pictures), beside=beside, words=_WORDS)
+
+    def save_summary(self, path: Path | str, *, force: bool = False) -> None:
+        """Write the Markdown to a file, and with matplotlib the figures to a folder FILE-files beside it.
+
+        Raises:
+            OutputError: the file exists, or cannot be written.
+        """
+        page = Path(path)
+        check_output(page, force=force)
+        from fireworld_viewer.pictures.figure_files import save_figure
+
+        folder, pictures = files_beside(page), {}
+        for number, one in enumerate(self.each, start=1):
+            picture = folder / f"difference-{number}.png"
+            try:
+                figure = one.figure()
+            except ViewError:  # no matplotlib
+                break
+            make_folder(folder)
+            save_figure(figure, picture, force=force)
+            pictures[one.policies[1].name] = str(picture)
+        write_file(page, self.summary(pictures, beside=page.parent))
+
     def junit(self) -> bytes:
         """Return JUnit XML: one case a metric, scenario and policy; only those of the gate, over all, can fail."""
         reference, *others = (policy.name for policy in self.policies)
@@ -231,6 +277,24 @@ class Comparison:
 
 
 _HEADS: Final = ("", "A", "B", "B - A", "P", "B is")
+
+
+def _finding(one: Comparison, picture: str) -> Finding:
+    a, b = one.policies
+    judged, pairing = one.judgement, over_all(one.pairings, one.metric)
+    names = [f"{policy.name} ({policy.digest[:DIGEST_SHOWN]})" for policy in (b, a)]
+    cause = f"policy: {names[0]}, against {names[1]}" if not one.same_policy else f"{names[0]}: the same policy"
+    scenarios = ", ".join(f"{name} ({digest[:DIGEST_SHOWN]})" for name, digest in one.scenarios)
+    return Finding(
+        name=f"{b.name} against {a.name}",
+        verdict=_VERDICTS[judged],
+        headline=f"{judged}: {pairing.sentence}",
+        cause=[cause, f"scenarios: {scenarios}", f"{seeds_text(one.seeds)}; fireworld {one.version}"],
+        first=_gate(one).removeprefix("gate: "),
+        heads=_HEADS,
+        rows=[row if len(row) == len(_HEADS) else [row[0], *[""] * (len(_HEADS) - 1)] for row in _text_rows(one)],
+        picture=picture,
+    )
 
 
 def find_metric(name: object) -> Metric:

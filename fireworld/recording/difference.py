@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from fireworld_recorder.totals import Totals
 
     from fireworld.cause import Cause
+    from fireworld.findings import Finding
     from fireworld.training.log.difference import TrainingDifference
     from fireworld.training.log.reader import TrainingLog
 
@@ -126,11 +127,60 @@ class Difference:
         }
         return known
 
+    def finding(self, *, links: Mapping[str, str] | None = None, picture: str = "") -> Finding:
+        """Return the comparison for the pages of a CI server, with links and a picture that are there already."""
+        from fireworld.findings import Finding
+        from fireworld.recording.difference_text import totals_rows, verdict
+
+        name, cause = f"{self.names[1]} against {self.names[0]}", self.cause
+        if self.same:
+            lines = cause.lines if cause.changes else ()
+            return Finding(name=name, verdict="same", headline="the same", cause=lines, rows=())
+        sentence = verdict(self.found)
+        return Finding(
+            name=name,
+            verdict="different",
+            headline=f"{cause.short}; {sentence}",
+            cause=cause.lines,
+            first=sentence,
+            heads=("", "A", "B"),
+            rows=[*totals_rows(*self.totals)],
+            file=self._file,
+            links=links or {},
+            picture=picture,
+        )
+
+    def summary(self) -> str:
+        """Return the comparison as Markdown: what changed, the first difference, how both runs came out."""
+        from fireworld.markdown import markdown_page
+
+        return markdown_page("diff", [self.finding()])
+
+    def save_summary(self, path: Path | str, *, force: bool = False) -> None:
+        """Write the Markdown to a file, and beside it in a folder FILE-files a page that plays both, and a picture.
+
+        Args:
+            path: the file.
+            force: replace existing files.
+
+        Raises:
+            OutputError: the file, or one of the others, exists or cannot be written.
+            LogError: a recording changed since it was opened.
+        """
+        from fireworld.recording.pages.summary import save_summary
+
+        save_summary(self, Path(path), force=force)
+
     def junit(self) -> bytes:
         """Return the comparison as JUnit XML, with a test case for each topic."""
         from fireworld.recording.difference_text import difference_junit
 
-        return difference_junit(self.found, self.rules, self.cause, names=self.names)
+        return difference_junit(self.found, self.rules, self.cause, names=self.names, file=self._file)
+
+    @property
+    def _file(self) -> str:
+        """Run A as a file, "" if it is none."""
+        return self.names[0] if getattr(self.runs[0], "path", None) is not None else ""
 
     def page(self) -> str:
         """Return the comparison as an HTML page with maps and curves, which needs no other file.

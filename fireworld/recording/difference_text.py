@@ -85,7 +85,9 @@ def verdict(difference: RunComparison) -> str:
     return f"the same: {difference.n_steps_compared} steps" if first is None else first.sentence
 
 
-def difference_junit(difference: RunComparison, rules: Rules, cause: Cause, *, names: tuple[str, str]) -> bytes:
+def difference_junit(
+    difference: RunComparison, rules: Rules, cause: Cause, *, names: tuple[str, str], file: str = ""
+) -> bytes:
     """Write a comparison as a suite with a test case for each topic, in the order in which things happen.
 
     A topic that differs is a failure whose message, and text, is its first difference; one that is not compared is
@@ -96,17 +98,19 @@ def difference_junit(difference: RunComparison, rules: Rules, cause: Cause, *, n
         rules: by which it was found.
         cause: what changed.
         names: paths of the two recordings, or what was run.
+        file: the first recording's, "" if it has none.
     """
     parts = [re.sub(r"[^\w-]+", "_", part) for part in Path(names[0]).with_suffix("").parts]
     class_name = ".".join(["fireworld", "diff", *(part for part in parts if part.strip("_"))])
     topics = (*(topic.topic for topic in STEP_TOPICS), Snapshot.topic, COMMIT, LENGTH)
-    cases = [_case(name, class_name, difference, rules) for name in topics]
+    cases = [_case(name, class_name, file, difference, rules) for name in topics]
     properties = {what: "; ".join(lines) for what, lines in cause.changes.items()}
     return report("fireworld diff", f"{names[0]} and {names[1]}", cases, properties)
 
 
-def _case(name: str, class_name: str, difference: RunComparison, rules: Rules) -> Element:
-    case = Element("testcase", {"classname": class_name, "name": name.removeprefix("/"), "time": "0"})
+def _case(name: str, class_name: str, file: str, difference: RunComparison, rules: Rules) -> Element:
+    place = {"file": clean(file), "line": "1"} if file else {}
+    case = Element("testcase", {"classname": class_name, "name": name.removeprefix("/"), **place, "time": "0"})
     failure = _failure(name, difference)
     if failure is not None:
         sentence, details = failure

@@ -133,7 +133,7 @@ def test_a_range_of_steps(diff, range_, code, words):
         (["--from", "9", "--to", "8"], "expected a range of steps, got 9 to 8"),
         (["--from", "31"], "expected a range of the steps 0 to 30, got steps 31 to the last"),
         (["--from", "-1"], "--from"),
-        (["--force"], "--force goes with --junit or --html"),
+        (["--force"], "--force goes with --junit, --html or --summary"),
         (["--junit", "missing/out.xml"], "expected an existing folder missing"),
         (["--junit", "."], "expected the name of a file"),
         (["--html", "short.mcap"], "short.mcap: expected a name that is free"),

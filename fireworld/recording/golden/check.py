@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Literal
 from xml.etree.ElementTree import Element, SubElement
 
 from fireworld_recorder.diff import RunComparison, compare
@@ -16,13 +16,19 @@ from fireworld_recorder.totals import plain
 
 from fireworld.cause import Cause
 from fireworld.errors import FireworldError, OutputError, expected
+from fireworld.executors import processes
 from fireworld.files import check_output, read_text_file
+from fireworld.findings import Finding
 from fireworld.junit import clean, report
 from fireworld.recording.cause import run_cause
-from fireworld.recording.difference_text import change_lines
+from fireworld.recording.difference_text import change_lines, totals_rows
 from fireworld.recording.golden.again import run_again
+from fireworld.recording.golden.digest import compare_digest, read_digest
+from fireworld.recording.golden.find import FOLDER, find_goldens
+from fireworld.recording.golden.keep import Kept, keep_new, kept_paths
 from fireworld.recording.golden.spec import prepare_golden, spec_of
-from fireworld.recording.golden.store import SUFFIX, is_text_of, make_folder, store_recording, text_path
+from fireworld.recording.golden.store import is_digest, text_path
+from fireworld.recording.golden.text import is_text_of
 from fireworld.recording.golden.training import prepare_training, training_changes, training_spec_of
 from fireworld.recording.inputs import is_training
 from fireworld.recording.run import Run
@@ -33,8 +39,6 @@ from fireworld.training.log.reader import TrainingLog, open_training
 from fireworld.training.log.records import TrainingHeader
 from fireworld.training.log.verify import TrainedAgain
 
-FOLDER: Final = Path("recordings/golden")
-"""Where goldens are, seen from the current folder, unless another place is named."""
 Result = Literal["same", "different", "cannot"]
 
 
@@ -54,6 +58,8 @@ class GoldenResult:
     """What running and comparing took."""
     error: str = ""
     """Why it could not be run or compared."""
+    kept: Kept | None = None
+    """Where the new run or training was kept, if that was asked for and it differs."""
     text_is_foreign: bool = False
     """The text beside the golden describes another recording, or is missing."""
 
@@ -110,14 +116,15 @@ class GoldenResult:
 
     @property
     def cells(self) -> tuple[str, str, str, str]:
-        """What was run by what policy, or trained in by what method, seed and length; "-" if the golden is not read."""
+        """What was run by what policy, or trained in by what method, seed and last step; "-" if it cannot be read."""
         header, difference = self.header, self.difference
         if isinstance(header, TrainingHeader):
             length = f"{difference.n_parts} {header.unit}s" if isinstance(difference, TrainingDifference) else "-"
             return header.curriculum, header.method, str(header.seed), length
         if header is None:
             return "-", "-", "-", "-"
-        length = str(difference.totals[0].n_steps) if isinstance(difference, RunComparison) else "-"
+        outcome = difference.totals[0].outcome if isinstance(difference, RunComparison) else None
+        length = str(outcome.steps) if outcome is not None else "-"
         return header.scenario, header.policy, str(header.seed), length
 
     def to_dict(self) -> dict[str, Any]:
@@ -143,32 +150,44 @@ class GoldenResult:
             "totals": run and plain(run.totals),
         }
 
+    def finding(self, *, name: str = "", file: str = "", line: int = 1) -> Finding:
+        """Return the result for the pages of a CI server.
+
+        Args:
+            name: what is said to be checked; the golden if left out.
+            file: what an annotation points to, and the line in it; the golden, or its text, if left out.
+            line: in that file.
+        """
+        difference = self.difference
+        runs = difference.totals if isinstance(difference, RunComparison) and self.differs else ()
+        text = text_path(self.path)
+        return Finding(
+            name=name or self.name,
+            verdict=self.result,
+            headline=self.headline,
+            cause=self.cause.lines if self.cause is not None and self.differs else (),
+            first=self.sentence,
+            heads=("", "golden", "new") if runs else (),
+            rows=[*totals_rows(*runs)] if runs else (),
+            file=file or str(text if text.is_file() else self.path),
+            line=line,
+            links=self.kept.links if self.kept is not None else {},
+            picture=str(self.kept.picture) if self.kept is not None and self.kept.picture is not None else "",
+        )
+
     def __repr__(self) -> str:
         return f"<GoldenResult {self.name}: {self.result}{f', {self.sentence}' if self.sentence else ''}>"
 
 
-def find_goldens(folder: Path = FOLDER, names: Collection[str] = ()) -> list[Path]:
-    """Return the goldens of a folder, or those of the given names, sorted by name.
-
-    Raises:
-        OutputError: there are none, or not the ones named.
-    """
-    found = {path.stem: path for path in sorted(folder.glob(f"*{SUFFIX}"), key=lambda path: path.stem)}
-    if not found:
-        got = "a folder without any" if folder.is_dir() else "no such folder"
-        raise OutputError(
-            expected(str(folder), "", f"a folder of golden recordings (*{SUFFIX})", got, "try `fireworld golden add`")
-        )
-    for name in names:
-        if name not in found:
-            near = get_close_matches(name, found, n=1)
-            hint = f"try {near[0]}" if near else "`fireworld golden check` lists them"
-            raise OutputError(expected(str(folder), "", "the name of a golden", name, hint))
-    return [path for name, path in found.items() if not names or name in names]
-
-
 def check_goldens(
-    folder: Path = FOLDER, names: Collection[str] = (), *, keep: Path | None = None, force: bool = False
+    folder: Path = FOLDER,
+    names: Collection[str] = (),
+    *,
+    matching: str = "",
+    keep: Path | None = None,
+    force: bool = False,
+    jobs: int = 1,
+    on_result: Callable[[GoldenResult], object] = lambda _: None,
 ) -> Iterator[GoldenResult]:
     """Run goldens again, or train them again, one at each step of the iteration, and compare.
 
@@ -177,29 +196,49 @@ def check_goldens(
     Args:
         folder: of the goldens.
         names: of those to check; all if there are none.
-        keep: folder in which the new runs and trainings that differ are recorded.
-        force: replace recordings in `keep`.
+        matching: an expression that their names must match, as for `find_goldens`.
+        keep: folder in which the new runs and trainings that differ are recorded, with pages.
+        force: replace files in `keep`.
+        jobs: how many are run at a time; with more than one each in a process, and the results are without new runs.
+        on_result: called as soon as one is done.
 
     Raises:
         OutputError: there are no such goldens, or `keep` cannot be used.
     """
-    paths = find_goldens(folder, names)
+    paths = find_goldens(folder, names, matching=matching)
     if keep is not None and keep.resolve() == folder.resolve():
         raise OutputError(expected(str(keep), "", "another folder than that of the goldens", "the same"))
     if keep is not None and not force:
-        for taken in (keep / path.name for path in paths if (keep / path.name).exists()):
+        for taken in (new for path in paths for new in kept_paths(path, keep) if new.exists()):
             check_output(taken)
-    return _check_all(paths, keep)
+    return _in_turn(paths, keep, on_result) if jobs == 1 else _side_by_side(paths, keep, on_result, jobs)
 
 
-def _check_all(paths: Sequence[Path], keep: Path | None) -> Iterator[GoldenResult]:
+def _in_turn(
+    paths: Sequence[Path], keep: Path | None, on_result: Callable[[GoldenResult], object]
+) -> Iterator[GoldenResult]:
     cities = CityCache()
     for path in paths:
-        result = check_golden(path, cities=cities)
-        if keep is not None and result.fresh is not None and result.result == "different":
-            make_folder(keep)
-            store_recording(keep / path.name, result.fresh)
+        result = _check(path, keep, cities)
+        on_result(result)
         yield result
+
+
+def _side_by_side(
+    paths: Sequence[Path], keep: Path | None, on_result: Callable[[GoldenResult], object], jobs: int
+) -> Iterator[GoldenResult]:
+    tasks = [partial(_check_alone, path, keep) for path in paths]
+    yield from processes(min(jobs, len(tasks))).run(tasks, lambda _, result: on_result(result)) or ()
+
+
+def _check_alone(path: Path, keep: Path | None) -> GoldenResult:
+    """Check a golden in a process of its own, from which no run is sent."""
+    return replace(_check(path, keep, CityCache()), fresh=None)
+
+
+def _check(path: Path, keep: Path | None, cities: CityCache) -> GoldenResult:
+    result = check_golden(path, cities=cities)
+    return result if keep is None else keep_new(result, keep)
 
 
 def check_golden(path: Path, *, cities: CityCache | None = None) -> GoldenResult:
@@ -208,7 +247,10 @@ def check_golden(path: Path, *, cities: CityCache | None = None) -> GoldenResult
     fresh: Run | TrainedAgain
     began = time.perf_counter()
     try:
-        if is_training(path):
+        if is_digest(path):
+            header = read_digest(path).header
+            fresh = run_again(prepare_golden(spec_of(header), path.parent, cities=cities))
+        elif is_training(path):
             golden = open_training(path)
             header = golden.header
             fresh = prepare_training(training_spec_of(header), path.parent, recorded=golden, cities=cities)
@@ -229,6 +271,10 @@ def compare_golden(path: Path, fresh: Run | TrainedAgain) -> GoldenResult:
     """
     golden: Log | TrainingLog
     difference: RunComparison | TrainingDifference
+    if is_digest(path) and isinstance(fresh, Run):
+        kept = read_digest(path)
+        difference, cause = compare_digest(kept, fresh), run_cause(kept.header, fresh.header)
+        return GoldenResult(path=path, header=kept.header, fresh=fresh, difference=difference, cause=cause)
     if isinstance(fresh, TrainedAgain):
         golden = open_training(path)
         difference = compare_trainings(golden, fresh, names=("golden", "now"))

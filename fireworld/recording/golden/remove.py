@@ -13,9 +13,10 @@ from fireworld_recorder.writer import PARTIAL_SUFFIX
 
 from fireworld.errors import FireworldError, OutputError
 from fireworld.files import read_text_file
-from fireworld.recording.golden.check import FOLDER, find_goldens
+from fireworld.recording.golden.digest import read_digest
+from fireworld.recording.golden.find import FOLDER, find_goldens
 from fireworld.recording.golden.spec import hash_line
-from fireworld.recording.golden.store import STORING, SUFFIX, TEXT_SUFFIX, text_path
+from fireworld.recording.golden.store import STORING, SUFFIX, TEXT_SUFFIX, is_digest, recording_path, text_path
 from fireworld.recording.inputs import is_training
 from fireworld.training.log.reader import open_training
 
@@ -30,6 +31,10 @@ class GoldenEntry:
     by: str
     """The policy, or the method."""
     seed: int
+    n_steps: int
+    """Steps of a run, episodes or generations of a training; without the state before the first."""
+    kind: str
+    """recording, digest or training."""
     n_bytes: int
     digest: str
     error: str = ""
@@ -47,15 +52,22 @@ def list_goldens(folder: Path = FOLDER) -> list[GoldenEntry]:
 
 def _entry(path: Path) -> GoldenEntry:
     n_bytes = path.stat().st_size
+    kind = "digest" if is_digest(path) else "recording"
     try:
+        if kind == "digest":
+            kept = read_digest(path)
+            run, n_steps = kept.header, len(kept.steps) - 1
+            return GoldenEntry(path.stem, run.scenario, run.policy, run.seed, n_steps, kind, n_bytes, kept.digest)
         if is_training(path):
             training = open_training(path)
             one = training.header
-            return GoldenEntry(path.stem, one.curriculum, one.method, one.seed, n_bytes, training.digest)
+            kind, n_parts = "training", len(training)
+            return GoldenEntry(path.stem, one.curriculum, one.method, one.seed, n_parts, kind, n_bytes, training.digest)
         log = open_log(path)
-        return GoldenEntry(path.stem, log.header.scenario, log.header.policy, log.header.seed, n_bytes, log.digest)
+        run, n_steps = log.header, int(log.steps.max(initial=0))
+        return GoldenEntry(path.stem, run.scenario, run.policy, run.seed, n_steps, kind, n_bytes, log.digest)
     except FireworldError as error:
-        return GoldenEntry(path.stem, "", "", 0, n_bytes, "", str(error))
+        return GoldenEntry(path.stem, "", "", 0, 0, kind, n_bytes, "", str(error))
 
 
 def leftovers_of(folder: Path = FOLDER) -> list[Path]:
@@ -63,9 +75,7 @@ def leftovers_of(folder: Path = FOLDER) -> list[Path]:
     partial = [path for ending in (PARTIAL_SUFFIX, STORING) for path in folder.glob(f"*{SUFFIX}{ending}")]
     partial += folder.glob(".fireworld-*/")
     texts = [
-        path
-        for path in folder.glob(f"*{TEXT_SUFFIX}")
-        if not path.with_suffix(SUFFIX).exists() and _is_golden_text(path)
+        path for path in folder.glob(f"*{TEXT_SUFFIX}") if not recording_path(path).exists() and _is_golden_text(path)
     ]
     return sorted([*partial, *texts])
 

@@ -42,6 +42,8 @@ class GoldenSpec(msgspec.Struct, frozen=True, kw_only=True):
     """The largest difference that is ignored, by field of the log."""
     ignore: tuple[str, ...] = ()
     """Topics and fields of the log that are not compared."""
+    test: str = ""
+    """The file of the test that made it, from the folder of the golden; empty: no test did."""
 
 
 def make_spec(
@@ -54,6 +56,7 @@ def make_spec(
     settings: Mapping[str, Any] | None = None,
     tolerances: Mapping[str, float] | None = None,
     ignore: Collection[str] = (),
+    test: Path | None = None,
 ) -> GoldenSpec:
     """Return the spec of a golden in `folder`; it names files by their paths from there.
 
@@ -66,6 +69,7 @@ def make_spec(
         settings: values by dotted key; text is read as YAML.
         tolerances: by field of the log.
         ignore: topics and fields of the log.
+        test: the file of the test that makes it.
 
     Raises:
         ScenarioError: no such scenario.
@@ -81,6 +85,7 @@ def make_spec(
         settings=setting_texts(settings),
         tolerances=dict(tolerances or {}),
         ignore=tuple(ignore),
+        test="" if test is None else name_from(test, folder),
     )
 
 
@@ -97,6 +102,13 @@ def spec_of(header: RunHeader) -> GoldenSpec:
         return msgspec.json.decode(content, type=GoldenSpec)
     except msgspec.DecodeError as error:
         raise LogError(f"{SPEC_ATTACHMENT}: {error}; the golden was not made by `fireworld golden`") from None
+
+
+def encode_spec(spec: msgspec.Struct) -> bytes:
+    """Return a spec as it is attached to a recording; a test that made it is named only if there is one."""
+    return msgspec.json.encode(
+        {key: value for key, value in msgspec.structs.asdict(spec).items() if key != "test" or value}
+    )
 
 
 def prepare_golden(
@@ -128,7 +140,7 @@ def prepare_golden(
         named = replace(named, name=spec.policy)
     built = (cities or CityCache()).build(scenario)
     run = prepare_run(built, named, seed=spec.seed, n_steps_max=spec.steps)
-    attachments = {**run.header.attachments, SPEC_ATTACHMENT: msgspec.json.encode(spec)}
+    attachments = {**run.header.attachments, SPEC_ATTACHMENT: encode_spec(spec)}
     return replace(run, header=replace(run.header, attachments=attachments))
 
 

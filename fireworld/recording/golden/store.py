@@ -1,41 +1,30 @@
-"""Golden recordings as files: the recording, and its text: what happened in it, to be read in a review."""
+"""Golden recordings as files: the recording and its text, or the digest alone."""
 
 from __future__ import annotations
 
-from itertools import groupby
 from pathlib import Path
 from typing import Final
 
-from fireworld_recorder.reader import Log, open_log
-from fireworld_recorder.totals import final_outcome
+from fireworld_recorder.reader import open_log
 from fireworld_recorder.writer import LogWriter
 
-from fireworld.errors import OutputError
+from fireworld.errors import LogError, expected
 from fireworld.files import read_text_file, write_file
-from fireworld.parameters import PRESETS
-from fireworld.recording.golden.spec import GoldenSpec, hash_line, spec_of
+from fireworld.recording.golden.digest import DIGEST_SUFFIX, write_digest
+from fireworld.recording.golden.text import golden_text
 from fireworld.recording.golden.training import store_training, training_text
 from fireworld.recording.inputs import is_training
-from fireworld.recording.replay import recorded_scenario
-from fireworld.records import EVENT_KINDS, Array, Steps, name_of
-from fireworld.scenario import Scenario
-from fireworld.scenario.document import DIRECTIONS
-from fireworld.training.log.reader import TrainingLog, open_training
+from fireworld.recording.run import Run
+from fireworld.training.log.reader import open_training
 from fireworld.training.log.verify import TrainedAgain
 
 SUFFIX: Final = ".mcap"
 TEXT_SUFFIX: Final = ".txt"
 STORING: Final = ".storing"
 """What the name of a golden ends in until it is whole."""
-LETTERS: Final = {"E": "easiest", "V": "nearest-to-civilian", "C": "nearest-to-center", "M": "nearest-to-me"}
-"""Of the actions, in their order."""
-OWN: Final = "T"
-"""An action beyond these: a target of the brigade's own."""
-NONE: Final = "."
-LEGEND: Final = ", ".join(
-    f"{letter} {action}" for letter, action in {**LETTERS, OWN: "own target", NONE: "none"}.items()
-)
-STEPS_IN_A_LINE: Final = 100
+LARGE_BYTES: Final = 2_000_000
+"""Size of a recording from which on it is worth a word that every accepted change commits all of it again."""
+LARGE_HINT: Final = "every accepted change commits it anew: keep its digest only, or use Git LFS"
 
 
 def text_path(path: Path) -> Path:
@@ -43,19 +32,46 @@ def text_path(path: Path) -> Path:
     return path.with_suffix(TEXT_SUFFIX)
 
 
-def store_golden(path: Path, fresh: Steps | TrainedAgain, *, free: bool = False) -> None:
+def digest_path(path: Path) -> Path:
+    """Return where the golden is if it is a digest only."""
+    return path.with_suffix(DIGEST_SUFFIX)
+
+
+def recording_path(path: Path) -> Path:
+    """Return where the golden is if it is a recording."""
+    return path.with_suffix(SUFFIX)
+
+
+def is_digest(path: Path) -> bool:
+    """Return whether a golden is a digest only."""
+    return path.suffix == DIGEST_SUFFIX
+
+
+def store_golden(path: Path, fresh: Run | TrainedAgain, *, free: bool = False) -> None:
     """Write a golden and its text; each is written beside and renamed, replacing what is there (OutputError).
 
     Args:
-        path: of the recording.
+        path: of the recording, or of the digest.
         fresh: the run, or what is trained.
         free: there must be no golden of that name.
+
+    Raises:
+        LogError: a digest is to be kept of what is compared by tolerances, or of a training.
     """
+    if is_digest(path):
+        write_digest(path, _only_run(fresh))
+        return
     store_recording(path, fresh, free=free)
     store_text(path)
 
 
-def store_recording(path: Path, fresh: Steps | TrainedAgain, *, free: bool = False) -> None:
+def _only_run(fresh: Run | TrainedAgain) -> Run:
+    if isinstance(fresh, TrainedAgain):
+        raise LogError(expected("digest-only golden", "", "a run", "a training", "keep its log; it is short"))
+    return fresh
+
+
+def store_recording(path: Path, fresh: Run | TrainedAgain, *, free: bool = False) -> None:
     """Write a recording, `free` as for `store_golden`; a training is trained for it (OutputError)."""
     if isinstance(fresh, TrainedAgain):
         store_training(path, fresh, free=free, scratch_suffix=STORING)
@@ -66,141 +82,17 @@ def store_recording(path: Path, fresh: Steps | TrainedAgain, *, free: bool = Fal
 
 
 def store_text(path: Path) -> bool:
-    """Write the text of a golden if it is missing or outdated; return whether it was.
+    """Write the text of a golden if it is missing or outdated; return whether it was. A digest has none.
 
     Raises:
         LogError: the golden cannot be read.
         OutputError: the text cannot be written.
     """
+    if is_digest(path):
+        return False
     text = training_text(open_training(path)) if is_training(path) else golden_text(open_log(path))
     beside, content = text_path(path), text.encode()
     if beside.is_file() and read_text_file(beside).encode() == content:
         return False
     write_file(beside, content)
     return True
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder, if it is not there (OutputError)."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be made: {error.strerror or error}") from None
-
-
-def golden_text(log: Log) -> str:
-    """Return a recording as text: what was run, how it ended, every event, all decisions, and the final hash."""
-    blocks = (_facts(log, spec_of(log.header)), _events(log), _decisions(log), [hash_line(log.digest)])
-    return "\n\n".join("\n".join(block) for block in blocks) + "\n"
-
-
-def is_text_of(text: str, log: Log | TrainingLog) -> bool:
-    """Return whether a text describes this recording, in whatever words."""
-    return hash_line(log.digest) in text.splitlines()
-
-
-def _facts(log: Log, spec: GoldenSpec) -> list[str]:
-    """List what was run and how it came out; the numbers are written as they were in the first goldens."""
-    outcome, city = final_outcome(log), log.city
-    ended = "still burning" if outcome.time_to_complete is None else "the fire is out"
-    settings = "".join(f", {key}={text}" for key, text in spec.settings.items())
-    exceptions = [f"{field} to {tolerance:g}" for field, tolerance in spec.tolerances.items()]
-    exceptions += [f"not {name}" for name in spec.ignore]
-    facts = {
-        "scenario": f"{log.header.scenario}{settings}",
-        "kind": scenario_kind(recorded_scenario(log.header)),
-        "policy": log.header.policy,
-        "seed": str(log.header.seed),
-        "steps": f"{outcome.steps} of at most {log.header.n_steps_max}, {ended}",
-        "score": f"{outcome.score:.6g} of {outcome.score_max:g}",
-        "burnt out": f"{outcome.n_burnt_out} of {len(city.building_id)} buildings",
-        "alive": f"{outcome.n_civilians_alive} of {len(city.civilian_hp)} civilians",
-        "return": f"{outcome.total_reward:.6g}",
-        "water": f"{outcome.water_used_litres:g} litres",
-        "compared": "exactly" + "".join(f", {exception}" for exception in exceptions),
-    }
-    return [f"{label:<10} {text}" for label, text in facts.items()]
-
-
-def _events(log: Log) -> list[str]:
-    """List the events of every step that has any."""
-    lines = ["events by step, with the numbers of the buildings; tank-empty and refilled: of the brigades"]
-    kinds, entities = log.ragged("events", "kind"), log.ragged("events", "entity")
-    for step, kind, entity in zip(log.steps, kinds, entities, strict=True):
-        if len(kind):
-            lines.append(f"{step:>5}  {_step_events(kind, entity)}")
-    return lines
-
-
-def _step_events(kinds: Array, entities: Array) -> str:
-    events = zip(kinds.tolist(), entities.tolist(), strict=True)
-    parts = []
-    for kind, group in groupby(events, key=lambda event: event[0]):
-        name = name_of(EVENT_KINDS, kind, "kind")
-        parts.append(f"{name} {', '.join(str(entity) for _, entity in group)}")
-    return "; ".join(parts)
-
-
-def _decisions(log: Log) -> list[str]:
-    """Write a strip of letters for each brigade, one for each step, and list where its targets change."""
-    lines = [f"decisions, a letter for each step: {LEGEND}"]
-    steps = log.steps.tolist()
-    actions, targets = log.ragged("decisions", "action"), log.ragged("decisions", "target")
-    for brigade in range(len(log.city.brigade_tank_litres)):
-        chosen = [(step, _entry(row, brigade)) for step, row in zip(steps, actions, strict=True) if step]
-        letters = "".join(_letter(action) for _, action in chosen)
-        counts = (f"{letters.count(letter)} {letter}" for letter in (*LETTERS, OWN, NONE) if letter in letters)
-        lines.append(f"brigade {brigade}: {', '.join(counts)}")
-        starts = range(0, len(letters), STEPS_IN_A_LINE)
-        lines += [f"{chosen[start][0]:>5}  {letters[start : start + STEPS_IN_A_LINE]}" for start in starts]
-        lines += _changes_of([(step, _entry(row, brigade)) for step, row in zip(steps, targets, strict=True) if step])
-    return lines
-
-
-def _changes_of(targets: list[tuple[int, int]]) -> list[str]:
-    """List from which step on a brigade had which building as its target."""
-    changes = [next(group) for _, group in groupby(targets, key=lambda entry: entry[1])]
-    words = [f"{step} {'none' if target < 0 else target}" for step, target in changes]
-    return [f"       targets from step: {', '.join(words)}"] if words else []
-
-
-def _letter(action: int) -> str:
-    return NONE if action < 0 else (*LETTERS, OWN)[min(action, len(LETTERS))]
-
-
-def _entry(row: Array, brigade: int) -> int:
-    """Return what a brigade's entry is, -1 where there is none."""
-    return int(row[brigade]) if brigade < len(row) else -1
-
-
-def scenario_kind(scenario: Scenario) -> str:
-    """Return the kind of a scenario in words.
-
-    Scenarios that differ only in places, in numbers of buildings or people, or in random draws are of one kind.
-    """
-    changed = scenario.resolved_parameters != PRESETS[scenario.preset]
-    return ", ".join(
-        (
-            f"{'generated city' if scenario.city.generated else 'city'} of {scenario.city.summary}",
-            f"{scenario.brigades.n} brigades",
-            _where_fire_is(scenario),
-            _where_people_are(scenario),
-            f"choices {scenario.choices}",
-            f"reward {scenario.reward if isinstance(scenario.reward, str) else f'{scenario.reward.of} with weights'}",
-            f"parameters {scenario.preset}" + (" with changes" if changed else ""),
-        )
-    )
-
-
-def _where_fire_is(scenario: Scenario) -> str:
-    place = "one place" if len(scenario.fires) == 1 else "several places"
-    return f"fire in {place}" + (", by building" if any(fire.buildings for fire in scenario.fires) else "")
-
-
-def _where_people_are(scenario: Scenario) -> str:
-    civilians = scenario.civilians
-    if civilians.count == 0:
-        return "no civilians"
-    if civilians.buildings is not None or civilians.at is not None:
-        return "civilians by building"
-    return "civilians all around" if set(civilians.directions) == set(DIRECTIONS) else "civilians on some sides"

@@ -14,7 +14,7 @@ import msgspec
 from fireworld.errors import LogError, expected
 from fireworld.executors import threads
 from fireworld.files import name_from
-from fireworld.recording.golden.spec import SPEC_ATTACHMENT, hash_line, path_to, setting_texts
+from fireworld.recording.golden.spec import SPEC_ATTACHMENT, encode_spec, hash_line, path_to, setting_texts
 from fireworld.scenario import scenario_names
 from fireworld.shown import block_text, text_table
 from fireworld.simulation.built import CityCache
@@ -41,6 +41,8 @@ class TrainingSpec(msgspec.Struct, frozen=True, kw_only=True):
     """Of the curriculum; None: all."""
     settings: dict[str, str] = {}
     """Hyperparameters of the method, as `--set` takes them."""
+    test: str = ""
+    """As of the spec of a run."""
 
 
 def make_training_spec(
@@ -51,6 +53,7 @@ def make_training_spec(
     seed: int = 1,
     stages: str | Sequence[str] | None = None,
     settings: Mapping[str, Any] | None = None,
+    test: Path | None = None,
 ) -> TrainingSpec:
     """Return the spec of a golden training in `folder`; it names files by their paths from there.
 
@@ -61,6 +64,7 @@ def make_training_spec(
         seed: of all random draws.
         stages: of the curriculum, by name: a list, or text as in "alone,together". None: all.
         settings: hyperparameters by name.
+        test: the file of the test that makes it.
 
     Raises:
         TrainingError, ScenarioError: no such curriculum or scenario.
@@ -75,6 +79,7 @@ def make_training_spec(
         seed=seed,
         stages=None if names is None else tuple(names),
         settings=setting_texts(settings),
+        test="" if test is None else name_from(test, folder),
     )
 
 
@@ -123,7 +128,7 @@ def prepare_training(
     method = find_method(spec.method).with_settings(spec.settings)
     make = partial(method.trainer, curriculum, seed=spec.seed, cities=cities or CityCache())
     header = header_of(make())
-    attachments = {**header.attachments, SPEC_ATTACHMENT: msgspec.json.encode(spec)}
+    attachments = {**header.attachments, SPEC_ATTACHMENT: encode_spec(spec)}
     return TrainedAgain(make, replace(header, attachments=attachments), workers)
 
 

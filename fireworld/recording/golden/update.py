@@ -8,19 +8,26 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from fireworld_recorder.reader import open_log
+import msgspec
 
 from fireworld.errors import FireworldError, LogError, OutputError, expected
-from fireworld.files import read_text_file, write_file
+from fireworld.files import make_folder, read_text_file, write_file
 from fireworld.interrupt import gentle_interrupt
 from fireworld.recording.golden.again import run_again
-from fireworld.recording.golden.check import FOLDER, GoldenResult, check_goldens, compare_golden
-from fireworld.recording.golden.spec import GoldenSpec, make_spec, prepare_golden, spec_of
-from fireworld.recording.golden.store import SUFFIX, make_folder, store_golden, store_text
-from fireworld.recording.golden.training import TrainingSpec, make_training_spec, prepare_training, training_spec_of
-from fireworld.recording.inputs import is_training
+from fireworld.recording.golden.check import GoldenResult, check_goldens, compare_golden
+from fireworld.recording.golden.find import FOLDER, spec_in
+from fireworld.recording.golden.spec import make_spec, prepare_golden, spec_of
+from fireworld.recording.golden.store import (
+    SUFFIX,
+    digest_path,
+    is_digest,
+    recording_path,
+    store_golden,
+    store_text,
+    text_path,
+)
+from fireworld.recording.golden.training import make_training_spec, prepare_training, training_spec_of
 from fireworld.recording.run import Run
-from fireworld.training.log.reader import open_training
 from fireworld.training.log.verify import TrainedAgain
 
 REASONS: Final = "REASONS.md"
@@ -47,6 +54,7 @@ def add_golden(
     settings: Mapping[str, Any] | None = None,
     name: str | None = None,
     folder: Path = FOLDER,
+    digest_only: bool = False,
 ) -> Path:
     """Run a scenario and store the recording and its text as a golden.
 
@@ -58,9 +66,10 @@ def add_golden(
         settings: keys of the scenario with other values; text is read as YAML.
         name: of the golden; None: made of scenario, policy and seed.
         folder: where it goes.
+        digest_only: keep what it was made of, its outcome and a code for every step, instead of the recording.
 
     Returns:
-        The path of the recording.
+        The path of the recording, or of the digest.
 
     Raises:
         OutputError: there is such a golden already, the name is not possible, or it cannot be written.
@@ -70,6 +79,7 @@ def add_golden(
     spec = make_spec(folder, scenario=scenario, policy=policy, seed=seed, steps=steps, settings=settings)
     fresh = run_again(prepare_golden(spec, folder))
     make_folder(folder)
+    path = digest_path(path) if digest_only else path
     with gentle_interrupt():
         store_golden(path, fresh, free=True)
     return path
@@ -153,6 +163,8 @@ def update_goldens(
 def store_if_changed(path: Path, fresh: Run | TrainedAgain) -> bool:
     """Store a golden, unless it is there already, was made by the same spec and is the same.
 
+    A digest takes the place of a recording, and the other way round.
+
     Returns:
         Whether the recording was stored; its text is written in any case if it is outdated.
 
@@ -161,7 +173,10 @@ def store_if_changed(path: Path, fresh: Run | TrainedAgain) -> bool:
     """
     wanted = training_spec_of(fresh.header) if isinstance(fresh, TrainedAgain) else spec_of(fresh.header)
     try:
-        same = _spec_in(path) == wanted and not compare_golden(path, fresh).differs
+        same = (
+            msgspec.structs.replace(spec_in(path), test=wanted.test) == wanted
+            and not compare_golden(path, fresh).differs
+        )
     except FireworldError:
         same = False
     if same:
@@ -169,12 +184,9 @@ def store_if_changed(path: Path, fresh: Run | TrainedAgain) -> bool:
         return False
     make_folder(path.parent)
     store_golden(path, fresh)
+    for old in (recording_path(path), text_path(path)) if is_digest(path) else (digest_path(path),):
+        old.unlink(missing_ok=True)
     return True
-
-
-def _spec_in(path: Path) -> GoldenSpec | TrainingSpec:
-    """Return the spec of a golden; LogError if it cannot be read."""
-    return training_spec_of(open_training(path).header) if is_training(path) else spec_of(open_log(path).header)
 
 
 def _update(result: GoldenResult) -> GoldenUpdate:
@@ -189,7 +201,8 @@ def _free_path(folder: Path, name: str) -> Path:
     if not re.fullmatch(r"[\w.+=-]+", name) or name.startswith((".", "-")):
         raise OutputError(expected("name", "", "letters, digits and any of _ . + = -", name))
     path = folder / f"{name}{SUFFIX}"
-    if path.exists():
+    if path.exists() or digest_path(path).exists():
+        path = path if path.exists() else digest_path(path)
         hint = "`fireworld golden update` records it anew; or try another name"
         raise OutputError(expected(str(path), "", "a name that is free", "an existing golden", hint))
     return path

@@ -18,7 +18,7 @@ from fireworld_recorder.writer import LogWriter
 from fireworld.policy.teams.table_team import TableTeam
 from fireworld.policy.words import N_STATES
 from fireworld.recording.golden import check, store
-from fireworld.recording.golden.check import find_goldens
+from fireworld.recording.golden.find import find_goldens
 from fireworld.recording.golden.store import store_text, text_path
 from fireworld.recording.golden.update import update_goldens
 from tests import command_line
@@ -127,7 +127,8 @@ def test_junit_of_a_difference(kept, golden, change_policy):
 def test_keep_records_the_new_runs_that_differ(kept, golden, here, change_policy, monkeypatch):
     change_policy("EASIEST")
     assert golden("check", "--keep", "new").code == 1
-    assert [path.name for path in (here / "new").iterdir()] == ["quick-mine-Policy.mcap"]
+    kept_files = {"quick-mine-Policy" + end for end in (".mcap", ".html", "-difference.html", ".png")}
+    assert {path.name for path in (here / "new").iterdir()} == kept_files
     pair = kept / "quick-mine-Policy.mcap", here / "new" / "quick-mine-Policy.mcap"
     assert command_line.call(monkeypatch, "diff", *pair).code == 1
     before = contents(kept)
@@ -313,9 +314,9 @@ def test_a_damaged_golden_cannot_be_checked(kept, golden):
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (("check",), "recordings/golden: expected a folder of golden recordings (*.mcap), got no such folder"),
-        (("check", "."), ".: expected a folder of golden recordings (*.mcap), got a folder without any"),
-        (("update", "--reason", "x"), "recordings/golden: expected a folder of golden recordings"),
+        (("check",), "recordings/golden: expected a folder of goldens (*.mcap, *.digest), got no such folder"),
+        (("check", "."), ".: expected a folder of goldens (*.mcap, *.digest), got a folder without any"),
+        (("update", "--reason", "x"), "recordings/golden: expected a folder of goldens"),
         (("add", "quick"), "Missing option '--policy'"),
         (("add", "quack", "--policy", "easiest"), "scenario: expected the name of a scenario or a .yaml file"),
         (("add", "quick", "--policy", "easist"), "try easiest"),

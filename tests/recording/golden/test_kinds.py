@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fireworld.recording.golden.store import scenario_kind
+from fireworld.recording.golden.text import scenario_kind
 from fireworld.scenario import load_scenario, parse_scenario
 
 QUICK = load_scenario("quick")

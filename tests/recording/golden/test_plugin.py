@@ -9,9 +9,11 @@ import pytest
 from fireworld_recorder.reader import open_log
 
 from fireworld.pytest_plugin import NAME_MAX, golden_name
-from fireworld.recording.golden.check import check_golden, find_goldens
+from fireworld.recording.golden.check import check_golden
+from fireworld.recording.golden.find import find_goldens
 from fireworld.recording.golden.spec import GoldenSpec, prepare_golden, spec_of
 from fireworld.recording.golden.store import store_golden
+from fireworld.recording.golden.update import add_golden
 from fireworld.recording.record import run_prepared
 from tests.recording.golden.conftest import POLICY
 
@@ -326,3 +328,148 @@ def test_recordings_of_renamed_tests_are_listed_and_removed(project):
     assert left == [
         f"{name}{end}" for name in ("test_mine-test_other", "test_other-test_else") for end in (".mcap", ".txt")
     ]
+
+
+def names_in(project):
+    """The files of the folder of recordings."""
+    return sorted(path.name for path in (project.path / "recordings").iterdir())
+
+
+def test_digests_only(project):
+    """By the setting, and by the argument; a recording and a digest take each other's place."""
+    project.makepyfile(test_mine=ONE)
+    run(project, UPDATE, outcome={"passed": 1})
+    project.makeini("[pytest]\nfireworld_digest_only = true\n")
+    run(project, outcome={"passed": 1})
+    run(project, UPDATE, outcome={"passed": 1}).fnmatch_lines(["recordings/test_mine-test_policy.digest"])
+    assert names_in(project) == ["test_mine-test_policy.digest"]
+    run(project, outcome={"passed": 1})
+    assert check_golden(project.path / "recordings" / "test_mine-test_policy.digest").result == "same"
+    sys.modules.pop("mine")
+    change_policy(project, "EASIEST")
+    out = run(project, outcome={"failed": 1})
+    out.fnmatch_lines(
+        [
+            "policy changed; step 1, choose: brigade 0 chose easiest, was nearest-to-me",
+            "recordings/test_mine-test_policy.digest: the run is not the same any more",
+            "the new run: *test_mine-test_policy.mcap",
+        ]
+    )
+    project.makepyfile(test_mine=ONE.replace("steps=5", "steps=5, digest_only=False"))
+    run(project, UPDATE, outcome={"passed": 1})
+    assert names_in(project) == ["test_mine-test_policy.mcap", "test_mine-test_policy.txt"]
+    project.makepyfile(test_mine=ONE.replace("steps=5", "steps=5, ignore=['draws']"))
+    run(project, UPDATE, outcome={"failed": 1}).fnmatch_lines(["digest-only golden: expected no tolerances*"])
+
+
+def test_recordings_that_no_test_made_are_never_removed(project):
+    """Such as those of `fireworld golden add`, whatever their names are."""
+    project.makepyfile(test_mine=ONE)
+    run(project, UPDATE, outcome={"passed": 1})
+    add_golden("quick", policy="random", steps=2, name="test_mine-added", folder=project.path / "recordings")
+    add_golden(
+        "quick", policy="random", steps=2, name="test_mine-too", folder=project.path / "recordings", digest_only=True
+    )
+    before = names_in(project)
+    run(project, UPDATE, outcome={"passed": 1}).no_fnmatch_line("*no test uses*")
+    assert names_in(project) == before
+
+
+def test_recordings_of_files_that_are_gone(project):
+    """Only a run of all tests tells: not one of a file."""
+    project.makeini("[pytest]\nfireworld_digest_only = true\n")
+    project.makepyfile(test_mine=ONE, test_other=ONE.replace("test_policy", "test_else"))
+    run(project, UPDATE, outcome={"passed": 2})
+    (project.path / "test_other.py").unlink()
+    run(project, "test_mine.py", outcome={"passed": 1}).no_fnmatch_line("*no test uses*")
+    out = run(project, outcome={"passed": 1})
+    out.fnmatch_lines(["*fireworld: 1 recordings that no test uses*", "recordings/test_other-test_else.digest"])
+    run(project, UPDATE, outcome={"passed": 1})
+    assert names_in(project) == ["test_mine-test_policy.digest"]
+
+
+def test_a_file_that_uses_none_any_more(project):
+    project.makepyfile(test_mine=ONE)
+    run(project, UPDATE, outcome={"passed": 1})
+    project.makepyfile(test_mine="def test_nothing(): ...")
+    run(project, outcome={"passed": 1}).fnmatch_lines(["recordings/test_mine-test_policy.mcap"])
+
+
+def test_a_run_that_is_broken_off_removes_nothing(project):
+    project.makepyfile(test_mine=ONE + "\n\n" + ONE.replace("test_policy", "test_then"))
+    run(project, UPDATE, outcome={"passed": 2})
+    before = names_in(project)
+    broken = 'import pytest\ndef test_ends():\n    pytest.exit("enough", returncode=0)\n'
+    project.makepyfile(test_mine=ONE + broken + ONE.replace("test_policy", "test_then"))
+    result = project.runpytest_inprocess(UPDATE)
+    assert result.ret == 0
+    result.stdout.no_fnmatch_line("*no test uses*")
+    assert names_in(project) == before
+
+
+def test_update_keeps_a_recording_of_before_tests_were_named(project):
+    project.makepyfile(test_mine=ONE)
+    (project.path / "recordings").mkdir()
+    path = project.path / "recordings" / "test_mine-test_policy.mcap"
+    spec = GoldenSpec(scenario="quick", policy="mine:Policy", seed=3, steps=5)
+    store_golden(path, run_prepared(prepare_golden(spec, path.parent)))
+    run(project, UPDATE, outcome={"passed": 1}).no_fnmatch_line("*stored*")
+
+
+@pytest.mark.parametrize("words", [(), ("-n", "1")])
+def test_keep_summary_and_annotations(project, words):
+    """The files of all that differs land in one folder; the summary says the cause first, annotations mark the test."""
+    project.mkpydir("inner")
+    broken = 'def test_broken(recording):\n    recording(scenario="quack", policy="mine:Policy")\n'
+    project.makepyfile(test_mine=ONE, test_broken=broken)
+    (project.path / "inner" / "test_inner.py").write_text(ONE)
+    options = ("--fireworld-keep", "new", "--fireworld-summary", "new/summary.md", "--fireworld-annotate", "github")
+    command = (sys.executable, "-m", "pytest", *words)
+    for more in ((UPDATE,), options):
+        done = subprocess.run([*command, *more], cwd=project.path, capture_output=True, text=True, check=False)
+        assert done.returncode == 1
+        change_policy(project, "EASIEST")
+    new = project.path / "new"
+    ends = (".html", ".mcap", ".png", "-difference.html")
+    assert {path.name for path in new.iterdir()} == {
+        "inner", "summary.md", *(f"test_mine-test_policy{end}" for end in ends)
+    }  # fmt: skip
+    assert {path.name for path in (new / "inner").iterdir()} == {f"test_inner-test_policy{end}" for end in ends}
+    summary = (new / "summary.md").read_text()
+    assert summary.startswith(
+        "## recordings of tests: 1 failed otherwise, 2 different\n\n### test\\_broken.py::test\\_broken\n"
+    )
+    assert "**changed: policy: mine:Policy, digest " in summary
+    assert "](inner/test_inner-test_policy.html)" in summary
+    assert "](test_mine-test_policy.png)" in summary
+    told = [line for line in done.stdout.splitlines() if line.startswith("::")]
+    assert len(told) == 3
+    assert any(
+        line.startswith(
+            "::error file=inner/test_inner.py,line=2,title=inner/test_inner.py%3A%3Atest_policy::policy changed; step 1"
+        )
+        for line in told
+    )
+
+
+def test_nothing_to_say(project):
+    project.makepyfile(test_mine=ONE)
+    run(project, UPDATE, outcome={"passed": 1})
+    out = run(project, "--fireworld-summary=s.md", "--fireworld-annotate=github", outcome={"passed": 1})
+    out.no_fnmatch_line("::*")
+    assert (project.path / "s.md").read_text() == "## recordings of tests: 1 the same\n"
+    assert not (project.path / "s-files").exists()
+
+
+def test_what_else_failed_is_in_the_summary(project):
+    project.makepyfile(test_mine=ONE + "    assert 1 == 2, 'no'\n", test_gone="import no_such_module")
+    project.runpytest_inprocess(UPDATE, "--continue-on-collection-errors")
+    words = ("--fireworld-summary=s.md", "--fireworld-annotate=github", "--continue-on-collection-errors")
+    result = project.runpytest_inprocess(*words)
+    result.assert_outcomes(failed=1, errors=1)
+    lines = [line for line in result.outlines if line.startswith("::")]
+    assert lines == [
+        "::error file=test_gone.py,line=1,title=test_gone.py::ModuleNotFoundError: No module named 'no_such_module'",
+        "::error file=test_mine.py,line=1,title=test_mine.py%3A%3Atest_policy::AssertionError: no",
+    ]
+    assert (project.path / "s.md").read_text().startswith("## recordings of tests: 2 failed otherwise, 1 the same\n")

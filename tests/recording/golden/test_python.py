@@ -28,7 +28,7 @@ def test_add_check_update(here, change_policy):
 
 
 def test_mistakes_are_found_before_anything_is_run(here):
-    with pytest.raises(OutputError, match="expected a folder of golden recordings"):
+    with pytest.raises(OutputError, match="expected a folder of goldens"):
         check_goldens(here / "kept")  # not only when it is iterated over
     add_golden("quick", policy="random", steps=2, folder=here / "kept")
     with pytest.raises(OutputError, match="another folder than that of the goldens"):

@@ -9,9 +9,11 @@ import subprocess
 import pytest
 from fireworld_recorder.reader import open_log
 
-from fireworld.recording.golden.check import check_golden, find_goldens
+from fireworld.recording.golden.check import check_golden
+from fireworld.recording.golden.find import find_goldens
 from fireworld.recording.golden.spec import spec_of
-from fireworld.recording.golden.store import golden_text, scenario_kind, text_path
+from fireworld.recording.golden.store import text_path
+from fireworld.recording.golden.text import golden_text, scenario_kind
 from fireworld.recording.golden.training import training_spec_of, training_text
 from fireworld.recording.inputs import is_training
 from fireworld.recording.replay import recorded_scenario
