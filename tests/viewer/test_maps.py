@@ -186,15 +186,18 @@ def simulated(rgb, matrix):
     return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
 
 
-@pytest.mark.parametrize(
-    "matrix",
-    [
-        np.eye(3),
-        np.array([[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]]),
-        np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]),
-    ],
-    ids=["all cones", "no red", "no green"],
-)
+EYES = {
+    "all cones": np.eye(3),
+    "no red": np.array(
+        [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]]
+    ),
+    "no green": np.array(
+        [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]
+    ),
+}
+
+
+@pytest.mark.parametrize("matrix", EYES.values(), ids=EYES)
 def test_those_who_do_not_see_red_or_green_can_tell_the_buildings_apart(matrix):
     seen = [simulated(rgb, matrix) for rgb in (*colors.FIERYNESS_RGB, colors.REFUGE_RGB)]
     names = (*FIERYNESS, "refuge")
@@ -202,6 +205,14 @@ def test_those_who_do_not_see_red_or_green_can_tell_the_buildings_apart(matrix):
         (names[a], names[b]): np.linalg.norm(seen[a] - seen[b]) for a in range(len(seen)) for b in range(a)
     }  # fmt: skip
     assert min(apart.values()) > 12.0, min(apart, key=apart.get)
+
+
+@pytest.mark.parametrize("matrix", EYES.values(), ids=EYES)
+def test_those_who_do_not_see_red_or_green_can_tell_runs_and_differences_apart(matrix):
+    a, b = (simulated(rgb, matrix) for rgb in colors.RUN_RGB)
+    assert np.linalg.norm(a - b) > 60.0
+    better, same, worse = (simulated(rgb, matrix) for rgb in colors.DIFFERENCE_RGB)
+    assert min(np.linalg.norm(one - other) for one, other in ((better, worse), (better, same), (worse, same))) > 18.0
 
 
 def test_letters_can_be_read_on_every_ball():

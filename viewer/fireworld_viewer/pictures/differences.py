@@ -30,10 +30,10 @@ _KINDS: Final = {
     0: ("other difference", "#cec4e6"),
 }
 """Of buildings that differ: label and color by the sign that `compare_damage` returns."""
-BETTER: Final = "#0072b2"
-WORSE: Final = "#d55e00"
+BETTER: Final = hexadecimal(colors.BETTER_RGB)
+WORSE: Final = hexadecimal(colors.WORSE_RGB)
 EQUAL: Final = "#8a8a8a"
-"""Blue, vermilion and grey: every eye can distinguish them; side and mark say the same."""
+"""Bluish green, vermilion and grey: every eye can distinguish them; side and mark say the same."""
 _INK: Final = "#222222"
 _GOLDEN: Final = 0.6180339887498949
 _SPREAD: Final = 0.3  # points lie that far above and below their line
@@ -63,7 +63,7 @@ def draw_paired_differences(panels: Sequence[DifferencePanel], *, title: str) ->
         axes.remove()
     figure.suptitle(label_text(title), fontsize=12, x=0.01, ha="left")
     figure.supxlabel(
-        "a point is a seed: B - A. Blue, upward: B is better; orange, downward: A is; grey: equal. "
+        "a point is a seed: B - A. Green, mark up: B is better; orange, mark down: A is; grey: equal. "
         "Black: mean and 95 % interval.",
         fontsize=9,
     )

@@ -176,10 +176,15 @@ def _write_rrd(
         log_legend(stream, comparing=comparing, acting=acting, map_by=recordings[0].city.attribution)
         if outcome is not None:
             log_page(stream, OUTCOME_PATH, outcome.markdown)
+        apart_m = blueprint.names_apart_m(recordings)
         if comparing:
-            log_comparison(stream, *recordings, focus=plotted, outcome=outcome, after_block=write_out)
+            log_comparison(
+                stream, *recordings, focus=plotted, outcome=outcome, names_apart_m=apart_m, after_block=write_out
+            )
         else:
-            RunLayers(stream, recordings[0].city, focus=plotted, after_block=write_out).add(recordings[0])
+            city = recordings[0].city
+            layers = RunLayers(stream, city, focus=plotted, names_apart_m=apart_m, after_block=write_out)
+            layers.add(recordings[0], complete=True)
         stream.disconnect()
         if not is_whole(path):
             raise _no_room(path)
