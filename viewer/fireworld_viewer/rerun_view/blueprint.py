@@ -54,7 +54,7 @@ def single(recording: Recording, *, focus: bool, outcome: OutcomePage | None = N
         shares.insert(1, 0.4 + 0.2 * n_lanes)
     left = rrb.Vertical(*rows, row_shares=shares)
     plots = [counts_view("", [""], recording), *plot_tabs("", [""], recording, focus=focus)]
-    right = rrb.Vertical(*plots, legend_view(), row_shares=[1.0] * len(plots) + [1.5])
+    right = rrb.Vertical(*plots, legend_view(), row_shares=[1.0] * len(plots) + [1.3])
     return blueprint(rrb.Horizontal(left, right, column_shares=[1.8, 1]))
 
 
@@ -298,14 +298,15 @@ def frame_all(recordings: Sequence[Recording], *, aspect: float) -> Camera:
         corners = np.array([every.min(axis=0) - _MARGIN_M, every.max(axis=0) + _MARGIN_M])
     (west, south), (east, north) = corners.tolist()
     x_m, half_width_m = (west + east) / 2, (east - west) / 2
+    edges = [(y, z) for y in (south, north) for z in (0.0, _HEIGHT_M)]
 
     def distance_m(y_m: float) -> float:
         """Return how far the eye must be from a place on the ground for both edges and what stands on them."""
-        return max(
+        far_m = [
             max(half_width_m / aspect, abs((y - y_m) * _UP + z * _SOUTH)) / _SLOPE - (y - y_m) * _SOUTH + z * _UP
-            for y in (south, north)
-            for z in (0.0, _HEIGHT_M)
-        )
+            for y, z in edges
+        ]
+        return float(max(far_m))
 
     # The near edge of the ground is seen larger than the far one, so that the middle of the picture is nearer.
     y_m = min(np.linspace(south, north, 41).tolist(), key=distance_m)

@@ -37,10 +37,10 @@ def log_plots(layers: Layers, recording: Recording, focus_index: Sequence[int]) 
                 numbers = series(recording, field)[:, np.newaxis]
                 log_plot(layers, f"plots/{path}", numbers, [layers.name or LABELS[field]], [shown])
     if recorded(recording, "rewards"):
-        rgb = _of_run(layers, _REWARD_RGB)
+        terms_rgb = _of_run(layers, _REWARD_RGB)
         numbers = np.column_stack([series(recording, field) for field in REWARDS])
-        log_plot(layers, "plots/reward", numbers, [LABELS[field] for field in REWARDS], rgb)
-        _log_stacked_rewards(layers, recording, rgb)
+        log_plot(layers, "plots/reward", numbers, [LABELS[field] for field in REWARDS], terms_rgb)
+        _log_stacked_rewards(layers, recording, terms_rgb)
     tanks = series(recording, "brigades.tank_litres")
     names = [f"brigade {index}" for index in range(tanks.shape[1])]
     log_plot(layers, "plots/tanks", tanks, names, _of_run(layers, _cycle(len(names))))
