@@ -185,13 +185,22 @@ class Run:
 
         return map_of(self, self[step])
 
-    def film(self, path: str | os.PathLike[str], *, fps: float = 10.0, every: int = 1, force: bool = False) -> Path:
+    def film(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        fps: float = 10.0,
+        every: int = 1,
+        whole: bool = False,
+        force: bool = False,
+    ) -> Path:
         """Write a film of the run.
 
         Args:
             path: a .gif or .mp4 file.
             fps: steps a second.
             every: only each n-th step.
+            whole: show the whole city, not only the part in which it burns.
             force: replace an existing file.
 
         Raises:
@@ -201,7 +210,7 @@ class Run:
         from fireworld.recording.pages.pictures import render_film
 
         output = path_of("path", path)
-        render_film(self._recording, output, fps=fps, every=every, force=force)
+        render_film(self._recording, output, fps=fps, every=every, whole=whole, force=force)
         return output
 
     def view(self, *, save: str | os.PathLike[str] | None = None, force: bool = False) -> None:

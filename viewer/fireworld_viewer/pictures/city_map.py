@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fireworld.records import ACTIVITIES, CityRecord, StepRecord
 from fireworld_viewer import colors
-from fireworld_viewer.city_mesh import city_box_m
+from fireworld_viewer.pictures.extent import MARGIN_M, Extent, whole_extent
 from fireworld_viewer.pictures.figure_files import INK
 from fireworld_viewer.story.series import existing
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 STREET: Final = "#ffffff"
 GROUND: Final = "#dedad2"
 JET_EDGE: Final = "#174a7c"
-MARGIN_M: Final = 12.0
 WIDTH_INCHES: Final = 7.6
 """Of a map on which everything has its full size; on smaller ones, balls and letters are smaller too."""
 
@@ -82,20 +81,16 @@ def state_of(city: CityRecord, record: StepRecord) -> MapState:
     )
 
 
-def extent_m(city: CityRecord) -> tuple[float, float, float, float]:
-    """Return what a map shows of the plane: west, east, south, north."""
-    (west, south), (east, north) = city_box_m(city, MARGIN_M)
-    return west, east, south - MARGIN_M, north
-
-
 class CityMap:
-    """A map on axes of a known width; `show` sets what is on it."""
+    """A map of a city, or of a part of it, on axes of a known width; `show` sets what is on it."""
 
-    def __init__(self, axes: Axes, city: CityRecord, *, inches: float, n_brigades: int = 0) -> None:
+    def __init__(
+        self, axes: Axes, city: CityRecord, *, inches: float, n_brigades: int = 0, part: Extent | None = None
+    ) -> None:
         from matplotlib.collections import LineCollection, PolyCollection
 
         self.axes, self.city = axes, city
-        west, east, south, north = extent_m(city)
+        west, east, south, north = part or whole_extent(city)
         self._east_m = east
         axes.set(xlim=(west, east), ylim=(south, north), aspect="equal", xticks=[], yticks=[], facecolor=GROUND)
         axes.spines[:].set_visible(False)
@@ -199,7 +194,7 @@ class CityMap:
         axes.plot([x, x + length], [y, y], color=INK, linewidth=2.5, solid_capstyle="butt", zorder=8)
         axes.annotate(
             f"{length} m", (x + length, y), xytext=(4, 0), textcoords="offset points", va="center", color=INK,
-            fontsize=10 * max(self._scale, 0.75),
+            fontsize=10 * max(self._scale, 0.75), bbox={"facecolor": GROUND, "edgecolor": "none", "pad": 1.0},
         )  # fmt: skip
 
 

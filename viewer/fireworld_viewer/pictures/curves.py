@@ -26,6 +26,12 @@ _PANEL_INCHES: Final = 2.3
 _BURNING: Final = ("#d9600c", "-")
 _BURNT_OUT: Final = ("#161414", "--")
 _WATER_DAMAGED: Final = ("#4f6fc4", "-.")
+COUNT_STYLES: Final[Mapping[str, tuple[str, str]]] = {
+    "score.n_burning": _BURNING,
+    "score.n_burnt_out": _BURNT_OUT,
+    "score.n_water_damaged": _WATER_DAMAGED,
+}
+"""Color and line of the counts of buildings, by field."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +66,7 @@ PANELS: Final = (
     ),
     Panel(
         "buildings",
-        {"score.n_burning": _BURNING, "score.n_burnt_out": _BURNT_OUT, "score.n_water_damaged": _WATER_DAMAGED},
+        COUNT_STYLES,
         from_zero=True,
         counts=True,
     ),
