@@ -445,3 +445,11 @@ def test_it_is_fast(shown, big):
     )
     assert drawn_ms < 500 * 6, "machines that do other work too have time"
     assert np.median(frames_ms) < 8 * 3
+
+
+def test_it_opens_where_it_is_told_to(shown, small):
+    page = play_page([small], names=["small.mcap"], start=17)
+    shown.show(page)
+    assert shown.step() == 17
+    shown.show(page, at="#5")
+    assert shown.step() == 5, "the address goes before"

@@ -69,6 +69,17 @@ def fire_extent(recordings: Sequence[Recording]) -> Extent | None:
     return None if part.wide * part.high > _MOST * whole.wide * whole.high else part
 
 
+def widened(part: Extent | None, places: NDArray[np.float64], city: CityRecord) -> Extent | None:
+    """Return a part of a city with room for some places, (k, 2); None where that is most of the city, or `part` is."""
+    if part is None:
+        return None
+    corners = np.array([(part.west, part.south), (part.east, part.north)])
+    whole = whole_extent(city)
+    west, east, south, north = _around(np.concatenate([corners, *([places - MARGIN_M, places + MARGIN_M])]), 0.0)
+    box = Extent(max(west, whole.west), min(east, whole.east), max(south, whole.south), min(north, whole.north))
+    return None if box.wide * box.high > _MOST * whole.wide * whole.high else box
+
+
 def _touched(recording: Recording) -> NDArray[np.bool_]:
     """Return which buildings are at some step not as they were, or are sprayed: (n,)."""
     found: NDArray[np.bool_] = np.any(recording.column("/buildings", "fieryness") != 0, axis=0)

@@ -96,6 +96,7 @@ class MapGrid:
         heading: str = "",
         labels: Sequence[str] = (),
         curves: Sequence[Recording] = (),
+        legend_rows: int = 0,
         dpi: int = DPI,
     ) -> None:
         part = cells[0].part or whole_extent(cells[0].city)
@@ -107,9 +108,12 @@ class MapGrid:
         row_height = map_height + n_lines * _LINE_INCHES + _GAP_INCHES
         curves_height = _ABOVE_CURVES_INCHES + _CURVES_INCHES + _BELOW_CURVES_INCHES if curves else 0.0
         above = _GAP_INCHES / 2 + (1.7 * _LINE_INCHES if heading else 0.0)
-        needed = above + n_lines * _LINE_INCHES + (len(self._labels) + 1) * _LEGEND_LINE_INCHES + 2 * _GAP_INCHES
+        n_rows = max(len(self._labels), legend_rows)
+        needed = above + n_lines * _LINE_INCHES + (n_rows + 1) * _LEGEND_LINE_INCHES + 2 * _GAP_INCHES
         inset_at = needed
-        needed += _INSET_INCHES + _GAP_INCHES if cells[0].part else 0.0
+        has_room = not heading or needed + _INSET_INCHES < above + rows * row_height  # strips are no higher for it
+        inset = cells[0].part if has_room else None
+        needed += _INSET_INCHES + _GAP_INCHES if inset else 0.0
         self._width = _GAP_INCHES + columns * (map_inches + _GAP_INCHES) + _LEGEND_INCHES
         credit = one_line(cells[0].city.attribution)
         below = _CREDIT_INCHES / 2 if credit else 0.0
@@ -132,8 +136,8 @@ class MapGrid:
             self._write_credit(
                 credit, _GAP_INCHES + room, above + rows * row_height - _GAP_INCHES + _CREDIT_INCHES, inches=room
             )
-        if cells[0].part:
-            self._add_inset(cells[0].city, cells[0].part, left=self._width - _LEGEND_INCHES, top=inset_at)
+        if inset:
+            self._add_inset(cells[0].city, inset, left=self._width - _LEGEND_INCHES, top=inset_at)
         for index, run in enumerate(curves):
             self._add_curves(curves, run, left=_GAP_INCHES + index * (map_inches + _GAP_INCHES),
                              top=above + row_height + below - _GAP_INCHES + _ABOVE_CURVES_INCHES)  # fmt: skip

@@ -35,6 +35,7 @@ def draw_map(
     civilians_xy: NDArray[Any] | None = None,
     title: str = "",
     part: Extent | None = None,
+    legend_rows: int = 0,
 ) -> Figure:
     """Draw a city from above: buildings, streets, refuges, hydrants, civilians and brigades.
 
@@ -46,6 +47,7 @@ def draw_map(
         civilians_xy: (n_civilians, 2) positions in metres; those of the start if left out.
         title: heading; the city's name if left out.
         part: what is shown of it; all if left out.
+        legend_rows: how many rows there is at least room for in the legend.
 
     Raises:
         ViewError: matplotlib is not installed.
@@ -59,7 +61,7 @@ def draw_map(
         brigades=brigades,
         civilian_xy_m=civilians_xy,
     )
-    return MapGrid([MapCell(city, state, one_line(title or city.name), part=part)]).figure
+    return MapGrid([MapCell(city, state, one_line(title or city.name), part=part)], legend_rows=legend_rows).figure
 
 
 def draw_record(city: CityRecord, record: StepRecord, *, title: str, part: Extent | None = None) -> Figure:

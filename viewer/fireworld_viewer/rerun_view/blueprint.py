@@ -33,7 +33,7 @@ LEGEND_ROOM: Final = 0.45
 """Width of the empty part of a plot, right of the last step, by that of the steps: the legend covers no curve there."""
 _LANES_SHOWN: Final = 8
 _CURVES_NAMED: Final = 6
-"""Rows of a legend that there is room for; brigades of larger teams are told by a click."""
+"""Rows of a legend that there is room for; in larger teams a click on a curve names it."""
 _MARGIN_M: Final = 25.0
 _HEIGHT_M: Final = 45.0  # of what stands on the ground: houses, brigades with their gauges, names of refuges
 _LEAST_DISTANCE_M: Final = 100.0

@@ -170,8 +170,13 @@ def common_steps(
     return steps, rows_a, rows_b
 
 
-def check_same_city(first: CityRecord, second: CityRecord) -> None:
-    """Check that two runs took place in the same city; ViewError, with what differs, if one building does."""
+def check_same_city(first: CityRecord, second: CityRecord | None = None) -> None:
+    """Check that two runs took place in the same city; ViewError, with what differs, if one building does.
+
+    One alone is in the same city as itself.
+    """
+    if second is None:
+        return
     for name in ("building_id", "outline_ptr", "outline_x_m", "outline_y_m", "floors"):
         if not np.array_equal(getattr(first, name), getattr(second, name)):
             n, m = len(first.building_id), len(second.building_id)
