@@ -123,7 +123,7 @@ def test_the_same_run_twice_differs_nowhere(small, tmp_path: Path):
 
 def test_different_cities_are_refused(small, tmp_path: Path):
     other = make_recording(5, 5, 3)
-    said = r"expected two recordings of one city, got 'grid' with 36 .* and 'grid' with 25"
+    said = r"expected two of one city, got 'grid' with 36 .* and 'grid' with 25"
     with pytest.raises(ViewError, match=said):
         app.save([small, other], tmp_path / "x.rrd")
     taller = MemoryRecording(small.header, replace(small.city, floors=small.city.floors + 1), list(small))
@@ -133,5 +133,5 @@ def test_different_cities_are_refused(small, tmp_path: Path):
 
 
 def test_a_run_without_steps_is_refused():
-    with pytest.raises(ViewError, match="expected two recordings with steps, got 3 and 0 steps"):
+    with pytest.raises(ViewError, match="expected two with steps, got 3 and 0 steps"):
         common_steps(np.arange(3), np.arange(0))

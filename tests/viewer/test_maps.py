@@ -226,7 +226,7 @@ def test_which_steps_are_shown(small, slower):
     assert [record.step for record in both.records] == [35, 30]
     with pytest.raises(ViewError, match="expected a step from 0 to 40, got 41"):
         read_steps([small], [41])
-    with pytest.raises(ViewError, match="expected a recording with steps"):
+    with pytest.raises(ViewError, match="recording: expected one with steps"):
         read_steps([MemoryRecording(small.header, small.city, [])], [0])
 
 

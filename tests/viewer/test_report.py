@@ -197,7 +197,7 @@ def test_the_commands_of_a_page_repeat_the_run(fireworld, tmp_path):
         (("a.mcap", "-o", "none/a.html"), "none/a.html: expected an existing folder none, got 'none'; make it first"),
         (("absent.mcap", "-o", "a.html"), "absent.mcap: cannot be read"),
         (("a.mcap", "b.mcap", "a.mcap", "-o", "a.html"), "Expected one or two recordings, got 3"),
-        (("a.mcap", "other.mcap", "-o", "a.html"), "expected two recordings of one city"),
+        (("a.mcap", "other.mcap", "-o", "a.html"), "recordings: expected two of one city"),
         (
             ("start.mcap", "-o", "mine.html"),
             "mine.html: expected a name that is free, got an existing file; use --force to replace it",

@@ -37,8 +37,7 @@ class Page {
     this.panels = words.look.panels.map((panel) => this.addPanel(panel)).filter(Boolean);
     this.chosen = new Chosen(this.runs, this.player, this.theme, () => this.draw());
     this.legend = new Legend(this.runs, this.theme, () => this.draw());
-    if (words.start !== null) this.player.goToStep(words.start);
-    this.player.readAddress();
+    this.player.readAddress(words.start);
     this.listen();
     this.resize();
   }
