@@ -16,6 +16,7 @@ from fireworld_viewer.pictures.figure_files import plain_style, png_bytes
 from fireworld_viewer.pictures.maps import draw_steps
 from fireworld_viewer.play.page import frame
 from fireworld_viewer.story.series import action_name
+from fireworld_viewer.story.steps import select_steps
 
 from fireworld.html_page import compared_row, html_credit, html_figure, html_mark, html_page, html_table, text_cell
 from fireworld.recording.difference_text import (
@@ -27,7 +28,7 @@ from fireworld.recording.difference_text import (
     totals_rows,
 )
 from fireworld.recording.pages.play import page_of_difference
-from fireworld.records import PHASES, StepRecord, StoredRun
+from fireworld.records import PHASES, Recording, StepRecord, StoredRun
 
 if TYPE_CHECKING:
     from fireworld_recorder.diff import RunComparison
@@ -157,21 +158,22 @@ def _draw_all(difference: Difference) -> Mapping[str, bytes]:
     """Draw curves of the runs, if their digests differ, and maps of the steps where they first and last differ."""
     images: dict[str, bytes] = {}
     rows = difference.spread.rows
+    runs = [select_steps(run) for run in difference.runs] if difference.rows else []  # each file is read once
     with plain_style():
-        part = fire_extent(difference.runs)
+        part = fire_extent(runs) if runs else None
         for moment, row in zip(("first", "last"), [*rows[:1], *rows[1:][-1:]], strict=False):
-            images[f"{moment}-both"] = png_bytes(draw_steps(difference.runs, [row.step]))
+            images[f"{moment}-both"] = png_bytes(draw_steps(runs, [row.step]))
             city, (a, b) = difference.runs[0].city, (run.step(row.step) for run in difference.runs)
             differing = differing_entities(a, b, difference.rules, city)
             crew = np.column_stack([b.brigades.x_m, b.brigades.y_m])[decided_otherwise(a, b)]
             around = widened(part, crew, city)
             images[f"{moment}-difference"] = png_bytes(draw_difference_map(city, a, b, differing, part=around))
         if difference.rows:
-            images["curves"] = _draw_curves(difference)
+            images["curves"] = _draw_curves(difference, runs)
     return images
 
 
-def _draw_curves(difference: Difference) -> bytes:
+def _draw_curves(difference: Difference, runs: Sequence[Recording]) -> bytes:
     """Draw the curves of both runs, and how many buildings differ."""
     steps = [row.step for row in difference.rows]
     n_buildings = {
@@ -180,4 +182,4 @@ def _draw_curves(difference: Difference) -> bytes:
     }
     first_step = None if difference.first is None else difference.first.step
     more = {"buildings that differ": n_buildings}
-    return png_bytes(draw_pair_curves(difference.runs, more=more, first_step=first_step))
+    return png_bytes(draw_pair_curves(runs, more=more, first_step=first_step))

@@ -9,7 +9,7 @@ from typing import Final
 from fireworld_viewer.pictures.figure_files import STILLS, plain_style, png_bytes, save_figure
 from fireworld_viewer.pictures.film import FILMS, FPS, save_film
 from fireworld_viewer.pictures.maps import draw_record, draw_steps
-from fireworld_viewer.story.steps import LAST, read_steps_between
+from fireworld_viewer.story.steps import LAST, read_steps_between, select_steps
 
 from fireworld.errors import ViewError
 from fireworld.files import check_output
@@ -50,7 +50,7 @@ def render_picture(
     such step, the cities differ or matplotlib is missing.
     """
     check_output(Path(output), endings=STILLS, force=force)
-    recordings = open_to_show(logs)
+    recordings = [select_steps(one) for one in open_to_show(logs)]  # each file is read once
     with plain_style():
         save_figure(draw_steps(recordings, steps, whole=whole), Path(output), force=force)
 
@@ -73,7 +73,7 @@ def render_film(
     the number of frames done and of all.
     """
     check_output(Path(output), endings=FILMS, force=force)
-    recordings = open_to_show(logs)
+    recordings = [select_steps(one) for one in open_to_show(logs)]
     shown = read_steps_between(recordings, first=first_step, last=last_step, every=every)
     frames = iter(range(1, len(shown) + 1))
     with plain_style():

@@ -68,12 +68,12 @@ def page_of(
     """
     held = open_to_show(logs)
     shown: list[Recording] = [select_steps(one, first=first_step, last=last_step, every=every) for one in held]
-    return play_page(
-        shown,
-        names=_names(held),
-        damages=_damages(held),
-        first=_first_difference(shown),
-    )
+    return page_of_steps(shown, held)
+
+
+def page_of_steps(shown: Sequence[Recording], logs: Sequence[Recording]) -> str:
+    """Return the page of recordings of which the steps to show were read before; arguments and errors as for `play`."""
+    return play_page(shown, names=_names(logs), damages=_damages(logs), first=_first_difference(shown))
 
 
 def page_of_difference(logs: Sequence[AnyRecording], first: tuple[int | None, str] | None) -> str:

@@ -24,7 +24,7 @@ from fireworld.files import check_output, write_file
 from fireworld.html_page import compared_row, html_credit, html_figure, html_page, html_table, text_cell
 from fireworld.outcome import NOT_RECORDED, QUANTITIES
 from fireworld.recording.inputs import AnyRun, open_one_or_two, run_name
-from fireworld.recording.pages.play import page_of
+from fireworld.recording.pages.play import page_of_steps
 from fireworld.records import ACTION_NAMES, EVENT_KINDS, Recording, StoredRun, name_of
 from fireworld.version import simulator_version
 
@@ -57,7 +57,7 @@ def report(logs: AnyRun | Sequence[AnyRun], output: Path | str, *, force: bool =
         images = {"maps": png_bytes(draw_steps(shown, maps)), "curves": png_bytes(draw_curves(shown))}
         if any(map(_has_decisions, runs)):
             images["timeline"] = png_bytes(draw_timeline(shown))
-    write_file(Path(output), _run_page(runs, shown, images, page_of(runs)))
+    write_file(Path(output), _run_page(runs, shown, images, page_of_steps(shown, runs)))
 
 
 def _run_page(logs: Sequence[StoredRun], shown: Sequence[Recording], images: Mapping[str, bytes], played: str) -> str:

@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _BUILT: Final = "#b9b5ad"
+_OUTLINES_MAX: Final = 10_000
+"""Buildings of which the small map has the outlines; of more it has a dot each, which is drawn faster."""
+_LEAST_SHARE: Final = 0.05
+"""Of the longer side of the small map: a frame that is smaller could not be seen."""
 _LETTERS_INCHES: Final = 0.082  # a letter of a curve's name
 
 
@@ -33,12 +37,18 @@ class CityInset:
         axes.set(xlim=(west, east), ylim=(south, north), aspect="equal", anchor="NW", xticks=[], yticks=[])
         axes.set_facecolor(GROUND)
         axes.spines[:].set_visible(False)
-        faces = np.full(len(city.building_id), _BUILT, dtype=object)
-        faces[np.asarray(city.refuge_building, dtype=np.int64)] = hexadecimal(colors.REFUGE_RGB)
-        axes.add_collection(
-            PolyCollection(outlines_m(city), facecolors=faces.tolist(), edgecolors="none"), autolim=False
-        )
-        frame = Rectangle((part.west, part.south), part.wide, part.high, facecolor="none", edgecolor=INK, linewidth=1.4)
+        refuges = np.asarray(city.refuge_building, dtype=np.int64)
+        if len(city.building_id) <= _OUTLINES_MAX:
+            houses = PolyCollection(outlines_m(city), facecolors=_BUILT, edgecolors="none")
+            axes.add_collection(houses, autolim=False)
+        else:
+            axes.plot(city.center_x_m, city.center_y_m, linestyle="", marker=",", color=_BUILT)
+        x, y = (np.asarray(one)[refuges] for one in (city.center_x_m, city.center_y_m))
+        axes.scatter(x, y, s=9.0, marker="s", color=hexadecimal(colors.REFUGE_RGB), linewidths=0)
+        least = _LEAST_SHARE * max(east - west, north - south)
+        wide, high = max(part.wide, least), max(part.high, least)
+        corner = part.west + (part.wide - wide) / 2, part.south + (part.high - high) / 2
+        frame = Rectangle(corner, wide, high, facecolor="none", edgecolor=INK, linewidth=1.4, zorder=4)
         axes.add_patch(frame)
         self.axes = axes
         self.brigades: Any = axes.scatter([], [], s=14.0, edgecolors=INK, linewidths=0.5, zorder=5)
