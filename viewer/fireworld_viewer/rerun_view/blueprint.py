@@ -83,7 +83,7 @@ def pair(first: Recording, second: Recording, *, focus: bool, outcome: OutcomePa
     ]
     words = rrb.Tabs(*pages(outcome)[:-1], legend_view(comparing=True), *pages(outcome)[-1:], active_tab=0)
     rows = [row_of_maps, rrb.Horizontal(*plots, words), rrb.Horizontal(*details)]
-    shares = [1.8, 1.2, 1.2]
+    shares = [2.1, 1.1, 1.1]
     if outcome is not None:
         rows.insert(1, rrb.StateTimelineView(name="Are A and B the same?", origin="/diff/agreement"))
         shares.insert(1, 0.5)
