@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import tempfile
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any, Final
 
@@ -12,7 +13,10 @@ import numpy as np
 
 from benchmarks.timing import Contender, Row, compare
 from fireworld import envs
-from fireworld.policy.kernel import always
+from fireworld.kernels.arrays import Array
+from fireworld.kernels.choice import RANK_NAMED
+from fireworld.policy.kernel import KernelPolicy, always
+from fireworld.policy.names import find_policy
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import BuiltScenario, build_scenario
 from fireworld.simulation.world import World
@@ -23,6 +27,11 @@ N_STEPS: Final = 40
 """The fire burns as long, whatever the random draws are."""
 SIZES: Final = (1, 16, 64, 256)
 N_RECORDED: Final = 64
+N_WORLDS: Final = 64
+N_EPISODE_STEPS: Final = 400
+"""About four episodes."""
+TEAMS: Final = {"features": "paper-cooperative", "targets": "best"}
+"""Which team's episodes are played by those who see what; of targets, those that the four actions name."""
 
 
 def from_python(built: BuiltScenario) -> Contender:
@@ -90,6 +99,62 @@ def form(name: str, env: Any, run: Callable[[Any], None]) -> Contender:
     return Contender(name, run, prepare, parts=N_STEPS)
 
 
+def team_of(kind: str) -> KernelPolicy:
+    """Return the team for an observation."""
+    policy = find_policy(TEAMS[kind]).policy
+    assert isinstance(policy, KernelPolicy)
+    return replace(policy, kinds=tuple(min(kind, RANK_NAMED) for kind in policy.kinds))
+
+
+class Episodes:
+    """Episodes of many worlds with one team: in compiled code, and with its actions given step by step."""
+
+    def __init__(self, kind: str, *, threads: int = 1) -> None:
+        self.worlds = envs.worlds(SCENARIO, N_WORLDS, observation=kind, autoreset="same-step", threads=threads)
+        policy = team_of(kind)
+        self.team = policy.for_brigades(self.worlds.n_brigades)
+        self.actions: list[Array] = []
+        self.begun, latest = self.start(), list(range(N_WORLDS))
+        for _ in range(N_EPISODE_STEPS):
+            decided = []
+            for index in range(N_WORLDS):
+                world = self.worlds.world(index)
+                world.step(policy)
+                decided.append(np.maximum(world.state.brigades.action, 0))
+            self.actions.append(np.array(decided))
+            ended = self.worlds.step(self.actions[-1])
+            for index in np.flatnonzero(ended.terminated | ended.truncated).tolist():
+                latest[index] = len(self.begun)
+                self.begun.append(self.worlds.world(index))
+        for index, number in enumerate(latest):  # of the last episodes only as much as was played
+            self.begun[number].n_steps_max = self.worlds.world(index).step_number
+
+    def start(self) -> list[World]:
+        """Let all worlds begin, and return them."""
+        self.worlds.reset(seed=0)
+        return [self.worlds.world(index) for index in range(N_WORLDS)]
+
+    def given(self, name: str) -> Contender:
+        """Return the steps in the environment."""
+
+        def run(_: object) -> None:
+            for actions in self.actions:
+                self.worlds.step(actions)
+
+        return Contender(name, run, lambda: self.worlds.reset(seed=0), parts=N_EPISODE_STEPS * N_WORLDS)
+
+    def compiled(self) -> Contender:
+        """Return the same steps, of whole episodes by the team itself."""
+
+        def run(worlds: list[World]) -> None:
+            for world in worlds:
+                world.run(self.team)
+
+        assert sum(world.copy().run(self.team) for world in self.begun) == N_EPISODE_STEPS * N_WORLDS, "other episodes"
+        parts = N_EPISODE_STEPS * N_WORLDS
+        return Contender("World.run", run, lambda: [world.copy() for world in self.begun], parts=parts)
+
+
 def rows(*, quick: bool) -> Iterator[Row]:
     """Yield the rows of environments."""
     built, seconds = build_scenario(load_scenario(SCENARIO)), 1.0 if quick else 10.0
@@ -98,6 +163,11 @@ def rows(*, quick: bool) -> Iterator[Row]:
         yield compare("envs", "a step of a world, features", size, in_batch(n, "features"), python, seconds=seconds)
     for kind in ("targets", "graph"):
         yield compare("envs", f"a step of a world, {kind}", size, in_batch(64, kind), python, seconds=seconds)
+    for kind in TEAMS:
+        one, two = Episodes(kind), Episodes(kind, threads=2)
+        what, worlds = f"a step of whole episodes, {kind}", f"{N_WORLDS} worlds"
+        yield compare("envs", what, worlds, one.given("in one call"), one.compiled(), seconds=seconds)
+        yield compare("envs", what, worlds, two.given("two threads"), one.given("one thread"), seconds=seconds)
     with tempfile.TemporaryDirectory() as folder:
         worlds = {"recorded": envs.worlds(SCENARIO, N_RECORDED, record=folder)}
         worlds["not recorded"] = envs.worlds(SCENARIO, N_RECORDED)

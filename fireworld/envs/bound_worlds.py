@@ -15,7 +15,7 @@ from fireworld.envs.views import fresh_batch, hide_absent
 from fireworld.kernels.addresses import address_row
 from fireworld.kernels.arrays import Array
 from fireworld.kernels.batch import BEGIN, SHOW, STEP_DECIDED, STEP_GIVEN, Result, View, work_on_worlds
-from fireworld.kernels.episode_arrays import LAST_STEP, SEED, STEP
+from fireworld.kernels.episode_arrays import HOLDS_AFTER, LAST_STEP, SEED, STEP
 from fireworld.policy.kernel import KernelPolicy, given
 from fireworld.simulation.built import BuiltScenario
 from fireworld.simulation.world import World
@@ -80,14 +80,14 @@ class BoundWorlds:
     def begin(self, index: int, playing: int, seed: int) -> None:
         """Let a world begin anew, with a scenario and a seed."""
         self._place(index, playing)
-        self._worlds[index].memory[:] = self._built[playing].start.packing.memory
+        self._set(index, self._built[playing].start.packing.memory)
         clock = self._bound[index].clock
         clock[SEED], clock[STEP], clock[LAST_STEP] = seed, 0, self._last_step(playing)
 
     def copy(self, source: int, target: int) -> None:
         """Bring one world into the state of another."""
         self._place(target, int(self.playing[source]))
-        self._worlds[target].memory[:] = self._worlds[source].memory
+        self._set(target, self._worlds[source].memory)
         self._bound[target].clock[:] = self._bound[source].clock
         for array in (self.result.action, self.result.target):
             array[target] = array[source]
@@ -142,7 +142,7 @@ class BoundWorlds:
             array[...] = held[name]
         for index, playing in enumerate(held["playing"].tolist()):
             self._place(index, playing)
-            self._worlds[index].memory[:] = held[f"world{index}"]
+            self._set(index, held[f"world{index}"])
             self._bound[index].clock[:] = held["clock"][index]
         self.show(np.arange(len(self.playing)), begun=True)
 
@@ -175,6 +175,11 @@ class BoundWorlds:
         self._worlds[index] = world = self._made(playing)
         self._bound[index] = world.bound(self._team)
         self.rows[index] = self._bound[index].row
+
+    def _set(self, index: int, memory: Array) -> None:
+        """Bring a world into a state; what kernels know of the one before holds no more."""
+        self._worlds[index].memory[:] = memory
+        self._bound[index].scratch.warmth.number[HOLDS_AFTER] = 0
 
     def _work(self, which: Array, what: int) -> None:
         """Let the kernel work on worlds, in threads if there are any."""

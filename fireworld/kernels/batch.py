@@ -26,7 +26,7 @@ from fireworld.kernels.arrays import (
     UInt8x2,
     UInt8x3,
 )
-from fireworld.kernels.episode_arrays import LAST_STEP, SEED, STEP, Episode
+from fireworld.kernels.episode_arrays import HOLDS_AFTER, LAST_STEP, SEED, STEP, Episode
 from fireworld.kernels.fire import is_over
 from fireworld.kernels.jit import inner, kernel
 from fireworld.kernels.observation import N_ACTIONS, can_choose, find_target, observe, site_place
@@ -108,7 +108,7 @@ def work_on_worlds(rows: Array, batch_row: Array, indices: Array, what: int) -> 
         if what == STEP_GIVEN:
             for brigade in range(len(brigades.action)):
                 follow(brigade, batch.actions[i, brigade], i, episode, batch)
-        if what >= BEGIN:
+        if what >= BEGIN and warmth.number[HOLDS_AFTER] != clock[STEP] + 1:
             begin(city.cover, world.fire, warmth)
         if what >= STEP_DECIDED:
             clock[STEP] += 1
@@ -117,6 +117,7 @@ def work_on_worlds(rows: Array, batch_row: Array, indices: Array, what: int) -> 
         if what >= BEGIN:
             note_decisions(i, brigades, batch.result)
             begin_step(city, world, warmth, clock[STEP] + 1)
+            warmth.number[HOLDS_AFTER] = clock[STEP] + 1
         show(i, episode, batch)
 
 

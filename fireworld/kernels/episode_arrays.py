@@ -42,7 +42,9 @@ class Ranks(NamedTuple):
 
 
 class Warmth(NamedTuple):
-    """Where heat is, or may come in a step; n buildings in blocks of 64. Every call of a kernel makes it anew.
+    """Where heat is, or may come in a step; n buildings in blocks of 64.
+
+    Every call of a kernel makes it anew, but for steps of worlds in a batch, whose state nobody else changes.
 
     How long the lists are is in `number`: `fireworld.kernels.warmth`.
     """
@@ -68,9 +70,10 @@ class Warmth(NamedTuple):
 
 N_BLOCKS, N_VISITS, N_KNOWN, ALL = 0, 1, 2, 3
 """What is where in `Warmth.number`: how long the lists are; how many buildings are known; 1 once all are listed."""
-BLOCKS_CHANGED, VISITS_CHANGED, SITES_CHANGED, SITES_KNOWN, AGE, NUMBERS = 4, 5, 6, 7, 8, 9
+BLOCKS_CHANGED, VISITS_CHANGED, SITES_CHANGED, SITES_KNOWN, AGE, HOLDS_AFTER, NUMBERS = 4, 5, 6, 7, 8, 9, 10
 """And, 0 or 1: whether more is to be listed; whether fire sites can be others than when they were found; whether they
-have been found since the call began. Then, steps since the call began. Last, how many numbers there are."""
+have been found since the lists began. Then, steps since they began; 1 + the step after which they hold, 0 if they are
+to begin anew. Last, how many numbers there are."""
 
 
 class Scratch(NamedTuple):

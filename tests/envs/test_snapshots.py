@@ -8,11 +8,13 @@ import json
 
 import numpy as np
 import pytest
+import yaml
 
 import fireworld as fw
 from fireworld import envs
 from fireworld.arguments import STEPS_MAX, ArgumentError
 from fireworld.errors import LogError
+from fireworld.scenario import parse_scenario
 from fireworld.training.seeds import Seeds
 from tests.envs.towns import HOT, LATER, SMALL, pickled
 
@@ -221,3 +223,20 @@ def test_foreign_snapshots_are_refused_and_change_nothing(name):
         worlds.restore(snapshot)
     assert worlds.digest() == before
     assert worlds.seeds == Seeds(6)
+
+
+def test_what_is_known_of_a_state_holds_for_no_other():
+    """Kernels go on with lists of what is warm: those of a fire in one corner miss a fire in the other."""
+    city = {"generated": {"columns": 32, "rows": 32}}
+    weak = {"parameters": {"brigades": {"power_litres": 1}}, "steps": 60}
+    corners = [{"city": city, "fires": [{"buildings": [building]}], **weak} for building in (40, 980)]
+    worlds = envs.worlds([parse_scenario(yaml.safe_dump(corner), source="corner") for corner in corners], 2)
+    worlds.reset(world_seeds=[1, 1])
+    actions = np.zeros((2, worlds.n_brigades), dtype=int)
+    for _ in range(10):
+        worlds.step(actions)
+    arrays = worlds._bound.arrays()
+    worlds._bound.take(arrays | {"world0": arrays["world1"]})
+    for _ in range(30):
+        worlds.step(actions)
+    assert worlds.world(0).digest() == worlds.world(1).digest()
