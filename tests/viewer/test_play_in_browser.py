@@ -17,6 +17,7 @@ from fireworld_viewer.story.series import choices_of
 
 from fireworld.records import ACTIVITIES, FIERYNESS, MemoryRecording
 from tests.viewer.browser import Browser, browser, executable
+from tests.viewer.conftest import make_recording
 from tests.viewer.pixels import decoded, n_near
 
 PATIENCE_SECONDS = 60.0
@@ -445,3 +446,28 @@ def test_it_is_fast(shown, big):
     )
     assert drawn_ms < 500 * 6, "machines that do other work too have time"
     assert np.median(frames_ms) < 8 * 3
+
+
+def test_it_opens_where_it_is_told_to(shown, small):
+    page = play_page([small], names=["small.mcap"], start=17)
+    shown.show(page)
+    assert shown.step() == 17
+    shown.show(page, at="#5")
+    assert shown.step() == 5, "the address goes before"
+
+
+def test_a_large_city_is_drawn_within_seconds(shown):
+    """Of a city of 40,000 buildings none has an edge, and each state is filled in paths of hundreds."""
+    large = make_recording(250, 160, 3)
+    shown.show(play_page([large], names=["large.mcap"]))
+    shown.run("const {view} = window.fireworldPage; view.zoom(0.02); return null")
+    seen = shown.run("return window.fireworldPage.maps[0].inSight().length")
+    assert seen > 6000
+    drawn_ms = shown.run(
+        "const begin = performance.now(); window.fireworldPage.draw(); document.querySelector('.map canvas')"
+        ".getContext('2d').getImageData(0, 0, 1, 1); return performance.now() - begin;"
+    )
+    assert drawn_ms < 10_000, "machines that do other work too have time"
+    box = shown.run("return document.querySelector('.map canvas').getBoundingClientRect().toJSON()")
+    rows, columns = (slice(int(box[a]), int(box[b])) for a, b in (("top", "bottom"), ("left", "right")))
+    assert n_near(decoded(shown.page.screenshot())[rows, columns], colors.FIERYNESS_RGB[0]) > 2_000
