@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 FORMAT: Final = "fireworld-comparison/1"
 FORMAT_OF_SEVERAL: Final = "fireworld-comparisons/1"
 OVER_ALL: Final = "over all"
-_MARKS: Final = {"better": "good", "worse": "bad", "cannot tell": "open", "the same policy": "open"}
-_CAPTION: Final = "mean (interquartile mean); B - A [95 % interval]; P: a run of B is the better one"
+_MARKS: Final = {"better": "good", "worse": "bad", "equal": "open", "cannot tell": "open", "the same policy": "open"}
+_CAPTION: Final = "means; B - A [95 % interval]; P: a run of B is the better one"
 
 
 @dataclass(frozen=True)
