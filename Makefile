@@ -89,13 +89,13 @@ format: install  ## Format the code and fix what the linter can fix.
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-docs: install  ## Renew what is made from the code in docs/, and the transcripts in the README.
+docs: install  ## Renew what is made from the code in docs/, and what the commands in the pages print.
 	$(BIN)/python -m tests.docs.log_format
 	$(BIN)/python -m tests.docs.foxglove_schema
 	$(BIN)/python -m tests.docs.scenario_reference
 	$(BIN)/python -m tests.docs.contested_table
 	$(BIN)/python -m tests.docs.cli_reference
-	$(BIN)/python -m tests.docs.transcripts
+	$(BIN)/python -m tests.docs.blocks --renew
 
 pictures: install  ## Draw the pictures of the docs again, from runs made again.
 	mkdir -p docs/pictures recordings
