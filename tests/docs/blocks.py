@@ -10,9 +10,9 @@ before a block, which a web page does not show, says more of it:
     <!-- long: trains a team -->     it is run by .ci/run only, where whole pages are run as they are written
     <!-- given: cp ... -->           commands that are run before it: what a reader has, and an empty folder does not
 
-Elsewhere commands that take minutes are given the options of SHORTER. Windows are not opened: `view` writes a file
-instead, and `--view` is left out. `python -m tests.docs.blocks` lists all
-that is not run; with `--renew` it first writes anew what consoles print.
+Elsewhere commands of `sh` blocks that take minutes are given the options of SHORTER. Windows are not opened: `view`
+writes a file instead, and `--view` is left out. `python -m tests.docs.blocks` lists all that is not run; with `--renew
+[PAGE]...` it first writes anew what consoles print.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ AS_WRITTEN = bool(os.environ.get("FIREWORLD_PAGES_AS_WRITTEN"))
 SHORTER = (
     (r"train .*--method search", "--set n_generations=1 --set n_candidates=4 --set n_best=2 --set n_fires=2"),
     (r"golden add (?!.*n_episodes_max).*--train", "--set n_episodes_max=3"),
-    (r"train ", "--set n_episodes_max=3"),
+    (r"train (?!.*--set n_)", "--set n_episodes_max=3"),
     (r"compare (?!.*--seeds)", "--seeds 2"),
     (r"scenarios (check|new) ", "--seeds 2"),
 )
@@ -111,7 +111,7 @@ class Reader:
         """Run a block; return its text as it should be. Raises whatever goes wrong, with page and line."""
         try:
             for line in (line for commands in block.given for line in commands.splitlines()):
-                run(line)
+                run(line, as_written=False)
             return self._do(block)
         except BaseException as error:
             error.add_note(f"in the block at {block.where}")
@@ -130,22 +130,24 @@ class Reader:
             return "".join(f"{line}\n{run(line[2:])}" for line in commands)
         elif block.language == "sh":
             for line in block.code.replace("\\\n", " ").splitlines():
-                run(line)
+                run(line, as_written=AS_WRITTEN)
         elif block.language != "text":
             raise AssertionError(f"a block of {block.language or 'no language'}: say in which file it is")
         return block.code
 
 
-def run(line: str) -> str:
+def run(line: str, *, as_written: bool = True) -> str:
     """Run one command and return what it prints on standard output; exit code 2 is a fault."""
     words = shlex.split(line.removesuffix(SILENT), comments=True)
     if not words or INSTALLS.match(line):
         return ""
     if "&&" in words:
-        return "".join(run(part) for part in line.split("&&"))
+        return "".join(run(part, as_written=as_written) for part in line.split("&&"))
     if words[0] != "fireworld" or SHELL.search(shlex.join(words[:1]) + line.partition("#")[0].removesuffix(SILENT)):
         return shell(line)
-    result = CliRunner().invoke(root, shorter(windowless(words[1:])), env={"COLUMNS": COLUMNS}, catch_exceptions=False)
+    called = windowless(words[1:])
+    called = called if as_written else shorter(called)
+    result = CliRunner().invoke(root, called, env={"COLUMNS": COLUMNS}, catch_exceptions=False)
     assert result.exit_code in ANSWERS, result.output
     shown = VERSION.sub(r"\1+...", result.stdout)
     return "" if line.endswith(SILENT) else "".join(f"{row.rstrip()}\n" for row in shown.splitlines())
@@ -171,8 +173,8 @@ def windowless(words: list[str]) -> list[str]:
 
 
 def shorter(words: list[str]) -> list[str]:
-    """Return a command that does less, if it is one that would take long and pages are not run as they are written."""
-    for pattern, more in () if AS_WRITTEN else SHORTER:
+    """Return a command that does less, if it is one that would take long."""
+    for pattern, more in SHORTER:
         if re.match(pattern, " ".join(words) + " "):
             return [*words, *more.split()]
     return words
@@ -208,8 +210,8 @@ def renewed(page: Path) -> str:
 
 
 if __name__ == "__main__":
-    if "--renew" in sys.argv:
-        for one in PAGES:
+    if sys.argv[1:2] == ["--renew"]:
+        for one in [Path(name).resolve() for name in sys.argv[2:]] or PAGES:
             if "```console" in one.read_text(encoding="utf-8"):
                 one.write_text(renewed(one), encoding="utf-8")
     for shown in (block for one in PAGES for block in blocks(one)):
