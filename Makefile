@@ -29,7 +29,7 @@ install: .venv/.installed  ## Make .venv with everything in it, and nothing else
 	@touch $@
 
 .venv/.installed: .venv/.demo
-	@echo "Installing what develops and tests fireworld, once: another 130 MB are downloaded, .5 GB of disk are taken."
+	@echo "Installing what develops and tests fireworld, once: another 150 MB are downloaded, .6 GB of disk are taken."
 	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --editable '.[view,figures,gym,minari,dev]'
 	@touch $@
 
@@ -102,7 +102,7 @@ site: .venv/.site  ## Make docs/ a web site that needs no network, reports/site.
 	@echo "open reports/site/index.html"
 
 .venv/.site: .venv/.demo
-	@echo "Installing what makes the site, once: another 10 MB are downloaded, 70 MB of disk are taken."
+	@echo "Installing what makes the site, once: another 30 MB are downloaded, 120 MB of disk are taken."
 	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --editable '.[view,docs]'
 	@touch $@
 
