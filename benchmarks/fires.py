@@ -15,9 +15,11 @@ from fireworld.city.city import Array, City, Plan
 from fireworld.city.generator import generate_plan
 from fireworld.kernels import fire as kernels
 from fireworld.kernels.arrays import CityArrays, FireConstants, FireState
+from fireworld.kernels.episode_arrays import Warmth
+from fireworld.kernels.warmth import fresh_warmth
 from fireworld.parameters import PAPER
 from fireworld.records import MATERIALS
-from fireworld.simulation.city_arrays import city_arrays, fire_constants
+from fireworld.simulation.city_arrays import air_shape, city_arrays, fire_constants
 from fireworld.simulation.state import fresh_fire
 from tests.reference import fire as plain
 
@@ -72,6 +74,7 @@ class Blaze:
     tables: CityArrays
     constants: FireConstants
     compiled_fire: FireState
+    warmth: Warmth
     rate: Array  # (n,)
 
     def plain_copy(self) -> plain.FireState:
@@ -90,7 +93,7 @@ class Blaze:
     def advance_compiled(self, fire: FireState, n_steps: int = STEPS_TIMED) -> None:
         """Advance the compiled engine in one call."""
         tables = self.tables
-        advance_steps(tables.buildings, tables.cover, tables.links, fire, self.constants, n_steps)
+        advance_steps(tables.buildings, tables.cover, tables.links, fire, self.constants, self.warmth, n_steps)
 
 
 def n_burning(fieryness: Array) -> int:
@@ -108,6 +111,7 @@ def kindle(size: int, chosen: Array, n_steps: int) -> Blaze:
         tables=tables,
         constants=fire_constants(PAPER.fire),
         compiled_fire=fresh_fire(city),
+        warmth=fresh_warmth(city.n_buildings, air_shape(city)),
         rate=np.full(city.n_buildings, BURN_RATE),
     )
     made.compiled_fire.rate[:] = BURN_RATE

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from fireworld.kernels.arrays import BuildingArrays, CoverArrays, FireConstants, FireState, LinkArrays
-from fireworld.kernels.fire import advance_fire
+from fireworld.kernels.episode_arrays import Warmth
+from fireworld.kernels.fire import burn_on
 from fireworld.kernels.jit import kernel
+from fireworld.kernels.warmth import begin
 
 
 @kernel
@@ -14,11 +16,13 @@ def advance_steps(
     links: LinkArrays,
     fire: FireState,
     constants: FireConstants,
+    warmth: Warmth,
     n_steps: int,
 ) -> None:
     """Advance the fire by some steps; `fire.rate` is that of all of them."""
+    begin(cover, fire, warmth)
     for _ in range(n_steps):
-        advance_fire(buildings, cover, links, fire, constants)
+        burn_on(buildings, cover, links, fire, constants, warmth)
 
 
 @kernel

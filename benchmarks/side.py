@@ -36,7 +36,9 @@ fires:
 civilians: {n: 10}
 steps: 100
 """
-SCENARIOS: Final = {"small.yaml": SMALL, "hot.yaml": HOT}
+CROWD: Final = HOT + "brigades: {n: 48}\n"
+LARGE: Final = SMALL.replace("columns: 32, rows: 32", "columns: 400, rows: 250").replace("525", "50200")
+SCENARIOS: Final = {"small.yaml": SMALL, "hot.yaml": HOT, "crowd.yaml": CROWD, "large.yaml": LARGE}
 
 
 class Work(NamedTuple):
@@ -164,8 +166,13 @@ ROWS: Final[dict[str, Callable[[], Work]]] = {
     f"fireworld {TRAIN}": lambda: command(*TRAIN.split()),
     "built.world(seed), test-1": lambda: starting("test-1"),
     "World.run, test-1, best": lambda: episodes("test-1", "best", n=5),
+    "World.run, test-2, best": lambda: episodes("test-2", "best", n=5),
+    "World.run, test-3, best": lambda: episodes("test-3", "best", n=5),
+    "World.run, 1024 buildings, hot, best": lambda: episodes("hot.yaml", "best", n=3),
+    "World.run, 1024 buildings, hot, best, 48 brigades": lambda: episodes("crowd.yaml", "best"),
     "World.run, 1024 buildings, hot, tables": lambda: episodes("hot.yaml", "paper-cooperative", n=3),
     "World.run, 1024 buildings, small fire": lambda: episodes("small.yaml", "nearest-to-me", n=10),
+    "World.run, 100000 buildings, small fire": lambda: episodes("large.yaml", "nearest-to-me", n=2),
     "World.step, 1024 buildings, small fire": lambda: stepping("small.yaml", "nearest-to-me"),
     "World.step, test-1, best": lambda: stepping("test-1", "best"),
     "World.step and record, test-1, best": lambda: stepping("test-1", "best", recorded=True),

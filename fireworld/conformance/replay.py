@@ -15,6 +15,7 @@ from fireworld.conformance.trace import Trace
 from fireworld.kernels.arrays import BrigadeState, CityArrays, FireState
 from fireworld.kernels.brigades import ACCEPTED, UNKNOWN_BRIGADE, distance_square, judge_request, refill, spray
 from fireworld.kernels.fire import advance_fire, ignite
+from fireworld.kernels.warmth import fresh_warmth
 from fireworld.parameters import BrigadeParameters, FireParameters
 from fireworld.simulation.city_arrays import air_inside, brigade_constants, city_arrays, fire_constants
 from fireworld.simulation.state import fresh_brigades, fresh_fire
@@ -65,6 +66,7 @@ def replay(city_file: CityFile, trace: Trace, city: City, parameters: FireParame
     """Run the engine through all steps of a trace and yield the state after each, step 0 first."""
     inputs, fire_is = city_file.inputs, fire_constants(parameters)
     tables, fire = city_arrays(city, parameters), fresh_fire(city)
+    warmth = fresh_warmth(city.n_buildings, fire.air.shape)
     crew = Crew(city_file, trace, tables, city) if inputs.brigade_id or inputs.requests else None
     rates = Rates(trace, city, parameters)
     for b in inputs.ignitions:
@@ -78,7 +80,7 @@ def replay(city_file: CityFile, trace: Trace, city: City, parameters: FireParame
             fire.watered[b] = 1
         results = crew.act(step, fire) if crew is not None else []
         fire.rate[:] = rates.take(fire.fieryness, step)
-        advance_fire(tables.buildings, tables.cover, tables.links, fire, fire_is)
+        advance_fire(tables.buildings, tables.cover, tables.links, fire, fire_is, warmth)
         yield _moment(step, city, fire, crew, results)
 
 

@@ -13,8 +13,9 @@ from fireworld.envs.setup import Setup
 from fireworld.envs.snapshots import fitting, within
 from fireworld.envs.views import fresh_batch, hide_absent
 from fireworld.kernels.addresses import address_row
-from fireworld.kernels.arrays import LAST_STEP, SEED, STEP, Array
+from fireworld.kernels.arrays import Array
 from fireworld.kernels.batch import BEGIN, SHOW, STEP_DECIDED, STEP_GIVEN, Result, View, work_on_worlds
+from fireworld.kernels.episode_arrays import LAST_STEP, SEED, STEP
 from fireworld.policy.kernel import KernelPolicy, given
 from fireworld.simulation.built import BuiltScenario
 from fireworld.simulation.world import World

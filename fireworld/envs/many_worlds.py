@@ -225,8 +225,8 @@ class Worlds:
         return {
             "x": ((city.geometry.x - frame[0]) / frame[2]).astype(np.float32),
             "y": ((city.geometry.y - frame[1]) / frame[3]).astype(np.float32),
-            **{f"link_{name}": array.copy() for name, array in city.links._asdict().items()},
-            **{f"near_{name}": array.copy() for name, array in city.near._asdict().items()},
+            **{f"link_{name}": getattr(city.links, name).copy() for name in ("ptr", "building", "share")},
+            **{f"near_{name}": getattr(start.city.near, name).astype(np.uint32) for name in ("ptr", "building")},
         }
 
     def snapshot(self) -> bytes:

@@ -15,8 +15,8 @@ from fireworld.envs.many_worlds import Stepped, Worlds, again
 from fireworld.envs.setup import Setup
 from fireworld.kernels.arrays import Array
 from fireworld.kernels.batch import look_again, take_turn
+from fireworld.kernels.deciding import decide_by_policy
 from fireworld.kernels.observation import N_FEATURES
-from fireworld.kernels.others import decide_by_policy
 from fireworld.policy.asking import begin
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.protocol import Policy

@@ -16,7 +16,8 @@ from fireworld.envs.bound_worlds import BoundWorlds
 from fireworld.envs.history import Histories, recorded
 from fireworld.envs.setup import Setup
 from fireworld.errors import OutputError, expected, one_line
-from fireworld.kernels.arrays import COUNTS, STEP, Array
+from fireworld.kernels.arrays import COUNTS, Array
+from fireworld.kernels.episode_arrays import STEP
 from fireworld.scenario import Scenario
 from fireworld.training.log.environment import ENVIRONMENT, Environment, PlayedTrainer, curriculum_played
 from fireworld.training.log.played import Played

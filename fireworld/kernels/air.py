@@ -9,7 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from fireworld.kernels.arrays import Array, BuildingArrays, CoverArrays, FireConstants, FireState
+from fireworld.kernels.episode_arrays import ALL, N_VISITS, Warmth
 from fireworld.kernels.jit import inner
+from fireworld.kernels.warmth import take_tiles
 
 ONE, TWO, THREE, FOUR = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(4)
 PADDING = 5
@@ -42,12 +44,13 @@ def put_row(mixed: Array, low: int, end: int, row: Array) -> None:
 
 
 @inner
-def spread_air(fire: FireState, constants: FireConstants) -> None:
+def spread_air(cover: CoverArrays, fire: FireState, constants: FireConstants, warmth: Warmth) -> None:
     """Mix every air cell with its eight neighbours and lose some heat; MODEL 2.5. Only the warm spans are touched.
 
     Heat reaches one cell farther than before, within the grid. So a row's span becomes that of the row and its two
     neighbours, one cell longer on either side; then it is drawn in to the cells that are not zero. Works in place: a
-    row is put back once the next one, which needs it as it was, is mixed.
+    row is put back once the next one, which needs it as it was, is mixed. The buildings over air that becomes warm are
+    listed.
     """
     air, warm, span_low, span_end = fire.air, fire.warm, fire.span[0], fire.span[1]
     if warm[1] <= warm[0]:
@@ -58,7 +61,7 @@ def spread_air(fire: FireState, constants: FireConstants) -> None:
     first, last = np.uint64(max(1, warm[0] - 1)), np.uint64(min(rows - 1, warm[1] + 1))
     west, east, south, north = last, first, edge, ONE  # the new box, of nothing yet
     low_before, end_before = span_low[first - ONE], span_end[first - ONE]
-    mixed, held, held_low, held_end = fire.scratch[0], fire.scratch[1], ONE, ONE
+    mixed, held, held_low, held_end = warmth.row[0], warmth.row[1], ONE, ONE
     for x in range(first, last):
         low = max(TWO, min(low_before, span_low[x], span_low[x + ONE])) - ONE
         end = max(low, min(edge, max(end_before, span_end[x], span_end[x + ONE]) + ONE))
@@ -71,6 +74,8 @@ def spread_air(fire: FireState, constants: FireConstants) -> None:
         while low < end and held[end - ONE] == 0.0:
             end -= ONE
         if low < end:
+            if warmth.number[ALL] == 0 and (low < span_low[x] or end > span_end[x]):
+                take_tiles(x, low, end, cover, warmth)
             span_low[x], span_end[x] = low, end
             west, east, south, north = min(west, np.uint64(x)), x + ONE, min(south, low), max(north, end)
         else:
@@ -102,14 +107,17 @@ def widen_spans(x0: int, x1: int, y0: int, y1: int, span_low: Array, span_end: A
 @inner
 def are_full(span_low: Array, span_end: Array, pitch: int) -> bool:
     """Return whether the spans hold all cells of the city, as they do where much burns: then none can be widened."""
-    edge, full = np.uint64(pitch - PADDING + 1), True
-    for x in range(ONE, np.uint64(len(span_low) - 1)):
-        full &= span_low[x] == ONE and span_end[x] >= edge
-    return full
+    edge = np.uint64(pitch - PADDING + 1)
+    for x in range(ONE, np.uint64(len(span_low) - 1)):  # noqa: SIM110 - a generator is slow in compiled code
+        if span_low[x] != ONE or span_end[x] < edge:
+            return False
+    return True
 
 
 @inner
-def exchange_with_air(buildings: BuildingArrays, cover: CoverArrays, fire: FireState, constants: FireConstants) -> None:
+def exchange_with_air(
+    buildings: BuildingArrays, cover: CoverArrays, fire: FireState, constants: FireConstants, warmth: Warmth
+) -> None:
     """Let each building in turn exchange heat with the air cells under it; MODEL 2.6.
 
     q = (T_cell - T_building) * weight; the cell loses q * cell_share, the building gains the sum. A building without
@@ -124,8 +132,8 @@ def exchange_with_air(buildings: BuildingArrays, cover: CoverArrays, fire: FireS
     if warm[0] < warm[1]:
         west, east, south, north = np.uint64(warm[0]), np.uint64(warm[1]), np.uint64(warm[2]), np.uint64(warm[3])
     full = are_full(span_low, span_end, pitch)
-    for k in range(len(buildings.order)):
-        b = buildings.order[k]
+    for k in range(np.uint64(warmth.number[N_VISITS])):
+        b = warmth.visit[k]
         heat = energy[b]
         x0 = np.uint64(cover.x0[b])
         if heat == 0.0 and (x0 >= east or x0 + cover.rows[b] <= west):  # far off: looked at no further

@@ -40,10 +40,10 @@ class BuildingArrays(NamedTuple):
     """What is fixed of each building, (n,); and the k fires that are lit later on."""
 
     building_id: Int64  # keys the building's random draws and breaks ties
-    order: UInt32  # in which the air exchange visits the buildings
     capacity: Float64  # energy per degree (a float32 number)
     initial_fuel: Float32  # energy
     ignition_point: Float64  # degrees above ambient
+    ignition_energy: Float64  # the least energy at which it is hot enough to burn
     emission: Float64  # energy radiated a step per K^4: wall_area * coefficient * Stefan-Boltzmann
     inflammable: UInt8
     later_step: Int64  # (k,), rising: the step in which each later fire is lit
@@ -59,14 +59,21 @@ class CoverArrays(NamedTuple):
     width: UInt32  # (n,), multiple of 4
     ptr: UInt32  # (n,), start in weight
     weight: Float64  # energy per degree of difference: flow * cover * cell size; 0 where not covered
+    order: UInt32  # (n,), in which the exchange visits the buildings
+    tile_ptr: UInt32  # (tiles+1,), which blocks reach into each tile of the padded grid, as CSR
+    tile_position: UInt32  # positions of their buildings in the order of visits
 
 
 class LinkArrays(NamedTuple):
-    """Radiation links as CSR over the emitting buildings."""
+    """Radiation links as CSR over the emitting buildings; lengths in millimetres."""
 
     ptr: UInt32  # (n+1,)
     building: UInt32
     share: Float64  # (a float32 number)
+    west: Float64  # (n,), bounding box of the centroids of what is inflammable among those a building is linked to
+    south: Float64  # turned inside out where there is none
+    east: Float64
+    north: Float64
 
 
 class FireConstants(NamedTuple):
@@ -94,8 +101,6 @@ class FireState(NamedTuple):
     warm: Int64  # (4,), box of the air that may differ from zero: first row, end, first cell, end
     span: UInt64x2  # (2, nx + 2), cells of each row of the air that may differ from zero: first, end
     rate: Float64  # (n,), burn rate of the step where a building burns
-    emitted: Float64  # (n,), scratch
-    scratch: Float64x2  # (2, pitch), scratch
 
 
 class GeometryArrays(NamedTuple):
@@ -113,10 +118,11 @@ class GeometryArrays(NamedTuple):
 
 
 class NearArrays(NamedTuple):
-    """Which buildings belong to one fire site when both burn, as CSR."""
+    """Which buildings belong to one fire site when both burn, as CSR; rising, in words of 64, a bit for each."""
 
     ptr: UInt32  # (n+1,)
-    building: UInt32
+    word: UInt32
+    bits: UInt64  # which buildings of that word
 
 
 class StreetArrays(NamedTuple):
@@ -358,33 +364,3 @@ class Seen(NamedTuple):
 
 BY_TABLE, BY_RANK = 0, 1
 """Where a choice's values come from; places in `Seen.valued`."""
-
-
-class Scratch(NamedTuple):
-    """What the steps of an episode write on; b brigades."""
-
-    features: Int64  # (8,)
-    action_before: Int32  # (b,)
-    target_before: Int32  # (b,)
-    values: Float64  # (5,)
-    described: Float64x2  # (n, 7); no rows where nobody ranks
-    described_at: Int64  # (n,), -1 at first
-    seen: Float64  # (17,)
-    work: Float64x2  # (2, w), w as `widest` says of the policy's network
-
-
-class Episode(NamedTuple):
-    """A world on its way, and all that takes part in it."""
-
-    city: CityArrays
-    constants: Constants
-    world: WorldState
-    policy: PolicyArrays
-    learner: Learner
-    seen: Seen
-    scratch: Scratch
-    clock: Int64  # (3,): seed, last step done, last step to do
-
-
-SEED, STEP, LAST_STEP = 0, 1, 2
-"""Places in the clock."""

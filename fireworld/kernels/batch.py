@@ -11,12 +11,8 @@ from typing import NamedTuple
 from fireworld.kernels.addresses import opener
 from fireworld.kernels.arrays import (
     BURNING,
-    LAST_STEP,
-    SEED,
-    STEP,
     Array,
     BrigadeState,
-    Episode,
     Float32x2,
     Float32x3,
     Float32x4,
@@ -30,11 +26,14 @@ from fireworld.kernels.arrays import (
     UInt8x2,
     UInt8x3,
 )
+from fireworld.kernels.episode_arrays import LAST_STEP, SEED, STEP, Episode
 from fireworld.kernels.fire import is_over
-from fireworld.kernels.jit import inlined, kernel
+from fireworld.kernels.jit import inner, kernel
 from fireworld.kernels.observation import N_ACTIONS, can_choose, find_target, observe, site_place
+from fireworld.kernels.outcome import score
 from fireworld.kernels.ranking import N_TARGET_FEATURES, OWN_TARGET, describe_building, see_target
-from fireworld.kernels.step import begin_step, finish_step, opened_episode
+from fireworld.kernels.step import begin_step, finish_step, opened_episode, sight_of
+from fireworld.kernels.warmth import begin
 
 
 class View(NamedTuple):
@@ -104,16 +103,20 @@ def work_on_worlds(rows: Array, batch_row: Array, indices: Array, what: int) -> 
     for k in range(len(indices)):
         i = indices[k]
         episode = opened_episode(rows[i])
-        clock, brigades = episode.clock, episode.world.brigades
+        city, world, clock, warmth = episode.city, episode.world, episode.clock, episode.scratch.warmth
+        brigades = world.brigades
         if what == STEP_GIVEN:
             for brigade in range(len(brigades.action)):
                 follow(brigade, batch.actions[i, brigade], i, episode, batch)
+        if what >= BEGIN:
+            begin(city.cover, world.fire, warmth)
         if what >= STEP_DECIDED:
             clock[STEP] += 1
-            finish_step(episode.city, episode.world, episode.constants, clock[SEED], clock[STEP])
+            finish_step(city, world, episode.constants, warmth, clock[SEED], clock[STEP])
+            score(world.fire, world.civilians, city.geometry, world.outcome)
         if what >= BEGIN:
             note_decisions(i, brigades, batch.result)
-            begin_step(episode.city, episode.world, clock[STEP] + 1)
+            begin_step(city, world, warmth, clock[STEP] + 1)
         show(i, episode, batch)
 
 
@@ -132,14 +135,14 @@ def look_again(row: Array, batch_row: Array, i: int, brigade: int) -> None:
     show_brigade(brigade, i, opened_episode(row), opened_batch(batch_row))
 
 
-@inlined
+@inner
 def note_decisions(i: int, brigades: BrigadeState, result: Result) -> None:
     """Write down what the brigades of world i did in the step just done."""
     for brigade in range(len(brigades.action)):
         result.action[i, brigade], result.target[i, brigade] = brigades.action[brigade], brigades.target[brigade]
 
 
-@inlined
+@inner
 def follow(brigade: int, action: int, i: int, episode: Episode, batch: Batch) -> None:
     """Write down what a brigade of world i decides; one that chooses nothing does nothing."""
     city, world = episode.city, episode.world
@@ -154,7 +157,7 @@ def follow(brigade: int, action: int, i: int, episode: Episode, batch: Batch) ->
     brigades.action[brigade], brigades.target[brigade] = action, target
 
 
-@inlined
+@inner
 def show(i: int, episode: Episode, batch: Batch) -> None:
     """Write what is seen of world i, in whose coming step the fire sites are found, and what its last step came to."""
     city, world, clock = episode.city, episode.world, episode.clock
@@ -183,7 +186,7 @@ def show(i: int, episode: Episode, batch: Batch) -> None:
         show_buildings(i, episode, view)
 
 
-@inlined
+@inner
 def show_brigade(brigade: int, i: int, episode: Episode, batch: Batch) -> None:
     """Write what a brigade of world i sees."""
     world, constants, view = episode.world, episode.constants, batch.shown
@@ -212,7 +215,7 @@ def show_brigade(brigade: int, i: int, episode: Episode, batch: Batch) -> None:
         show_position(brigade, i, episode, view)
 
 
-@inlined
+@inner
 def show_target(action: int, brigade: int, has_site: bool, i: int, episode: Episode, view: View) -> None:
     """Write the features of the building that an action names for a brigade; MODEL 7."""
     city, world, constants, scratch = episode.city, episode.world, episode.constants, episode.scratch
@@ -225,23 +228,14 @@ def show_target(action: int, brigade: int, has_site: bool, i: int, episode: Epis
         find_target(brigade, action, world.brigades, city.buildings, world.fire, city.geometry, world.sites),
         episode.clock[STEP] + 1,
         world.brigades.target,
-        scratch.described,
-        scratch.described_at,
-        world.brigades,
-        city.buildings,
-        city.links,
-        city.geometry,
-        world.fire,
-        world.sites,
-        constants.fire,
-        constants.brigades,
+        sight_of(city, world, constants, scratch),
         scratch.seen,
     )
     for k in range(N_TARGET_FEATURES):
         shown[k] = scratch.seen[k]
 
 
-@inlined
+@inner
 def show_position(brigade: int, i: int, episode: Episode, view: View) -> None:
     """Write the state of a brigade itself."""
     brigades, frame, shown = episode.world.brigades, view.frame[i], view.brigades[i, brigade]
@@ -253,7 +247,7 @@ def show_position(brigade: int, i: int, episode: Episode, view: View) -> None:
     shown[5] = brigades.driven[brigade] > 0
 
 
-@inlined
+@inner
 def show_buildings(i: int, episode: Episode, view: View) -> None:
     """Write the burning buildings of world i and their features, as many as there is room for."""
     city, world, sites, scratch = episode.city, episode.world, episode.world.sites, episode.scratch

@@ -14,7 +14,7 @@ from fireworld.kernels.arrays import (
     StreetArrays,
     WayState,
 )
-from fireworld.kernels.jit import inlined, inner, kernel
+from fireworld.kernels.jit import inner, kernel
 from fireworld.kernels.ways import NOWHERE, lines_to, next_street, way
 
 IDLE, DRIVING, SPRAYING, TO_REFUGE, REFILLING, DEAD = 0, 1, 2, 3, 4, 5
@@ -96,7 +96,7 @@ def stop_in_range(
     return goal
 
 
-@inlined
+@inner
 def drive(
     brigade: int,
     goal_building: int,
@@ -232,7 +232,7 @@ def fight(
     return 0
 
 
-@inlined
+@inner
 def seek_water(brigade: int, brigades: BrigadeState, streets: StreetArrays, ways: WayState) -> np.int64:
     """Let a brigade fill its tank at its refuge, or return the one to drive to; -1 for none."""
     if brigades.refuge[brigade] >= 0:

@@ -177,7 +177,7 @@ class KernelCache(_Cache):  # type: ignore[misc]  # numba is untyped
         if data is None:
             return None
         try:
-            return CompileResult._rebuild(target_context, *pickle.loads(data))  # noqa: S301, SLF001 - sealed, and ours
+            return self.rebuilt(target_context, pickle.loads(data))  # noqa: S301 - sealed, and ours
         except Exception:  # noqa: BLE001 - whatever is wrong with it, it can be compiled again
             return None
 
@@ -186,7 +186,16 @@ class KernelCache(_Cache):  # type: ignore[misc]  # numba is untyped
         if data.lifted or data.library.has_dynamic_globals:  # it holds addresses of this process
             return
         name, purpose = self._place(sig, data.codegen)
-        STORE.write(name, purpose, dumps(data._reduce()))  # noqa: SLF001 - as numba's own cache does
+        STORE.write(name, purpose, dumps(self.reduced(data)))
+
+    def reduced(self, result: Any) -> tuple[Any, ...]:
+        """Return what is kept of a compiled function."""
+        parts: tuple[Any, ...] = result._reduce()  # noqa: SLF001 - as numba's own cache does
+        return parts
+
+    def rebuilt(self, target_context: Any, parts: tuple[Any, ...]) -> Any:
+        """Return the compiled function again, of what was kept of it."""
+        return CompileResult._rebuild(target_context, *parts)  # noqa: SLF001 - the same
 
     def enable(self) -> None:
         """Do nothing: it is always on."""

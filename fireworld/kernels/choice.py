@@ -9,7 +9,7 @@ from fireworld.kernels.jit import inner, kernel
 from fireworld.kernels.observation import N_ACTIONS
 
 FIXED, RANDOM, TABLE, RANK_NAMED, RANK_ALL, GIVEN = 0, 1, 2, 3, 4, 5
-"""Kinds of policies. Two do not choose in a state but among targets, `fireworld.kernels.ranking`; of the last, whoever
+"""Kinds of policies. Two do not choose in a state but among targets, `fireworld.kernels.ranks`; of the last, whoever
 runs the step says what the brigade does."""
 
 

@@ -2,162 +2,18 @@
 
 from __future__ import annotations
 
-from fireworld.kernels.arrays import (
-    BURNING,
-    BY_RANK,
-    BY_TABLE,
-    LAST_STEP,
-    SEED,
-    STEP,
-    TOTAL,
-    Array,
-    Episode,
-    Seen,
-)
-from fireworld.kernels.choice import GIVEN, RANK_ALL, RANK_NAMED, TABLE, choose, explores, keeps_choice, table_state
-from fireworld.kernels.fire import is_over, light
-from fireworld.kernels.jit import inlined, inner, kernel
-from fireworld.kernels.learning import (
-    EXPLORED,
-    GREEDY,
-    KEPT,
-    NO_CHOICE,
-    choose_and_learn,
-    forget,
-    go_on_and_learn,
-    note_choice,
-    note_reward,
-    take_reward,
-    update,
-)
-from fireworld.kernels.observation import N_ACTIONS, can_choose, find_target, observe
-from fireworld.kernels.ranking import OWN_TARGET, rank
-from fireworld.kernels.sites import find_sites
-from fireworld.kernels.step import finish_step, opened_episode
+from fireworld.kernels.arrays import BURNING, TOTAL, Array
+from fireworld.kernels.deciding import decide_all
+from fireworld.kernels.episode_arrays import LAST_STEP, SEED, STEP
+from fireworld.kernels.fire import is_over
+from fireworld.kernels.jit import kernel
+from fireworld.kernels.learning import forget, note_reward, take_reward, update
+from fireworld.kernels.outcome import score
+from fireworld.kernels.step import begin_step, finish_step, opened_episode
+from fireworld.kernels.warmth import begin
 
-
-@inner
-def note_values(brigade: int, values: Array, source: int, seen: Seen) -> None:
-    """Note the values of the actions, (4,), by which a brigade chose; `source`: BY_TABLE or BY_RANK."""
-    seen.valued[source] = 1
-    for action in range(N_ACTIONS):
-        seen.action_values[brigade, action] = values[action]
-
-
-@inlined
-def run_steps(episode: Episode) -> None:  # noqa: C901, PLR0912, PLR0915 - to hand all arrays on costs more than the loop
-    """Run the steps of `run_episode`."""
-    city, world, constants, policy, learner = (
-        episode.city,
-        episode.world,
-        episode.constants,
-        episode.policy,
-        episode.learner,
-    )
-    seen, scratch, clock = episode.seen, episode.scratch, episode.clock
-    seed, last_step = clock[SEED], clock[LAST_STEP]
-    brigades, fire, sites, outcome = world.brigades, world.fire, world.sites, world.outcome
-    buildings, geometry = city.buildings, city.geometry
-    n_brigades = len(brigades.action)
-    features, before, known_before = scratch.features, scratch.action_before, scratch.target_before
-    values, described, described_at = scratch.values, scratch.described, scratch.described_at
-    learning, noting = learner.learning[0] != 0, len(seen.state) > 0
-    described_at[:] = -1
-    if learning:
-        forget(learner)
-    for step in range(clock[STEP] + 1, last_step + 2):
-        if step > last_step and not learning:
-            break
-        if step <= last_step:
-            light(buildings, fire, step)
-        find_sites(buildings, city.links, city.near, geometry, fire, world.civilians, brigades, sites)
-        for brigade in range(n_brigades):
-            before[brigade] = brigades.action[brigade]
-            known_before[brigade] = brigades.target[brigade]
-        in_turn = constants.observation.in_turn
-        shown, known = (brigades.action, brigades.target) if in_turn else (before, known_before)
-        if noting:
-            seen.valued[:] = 0
-        for brigade in range(n_brigades):
-            action, target, choice = -1, -1, NO_CHOICE
-            if noting:
-                seen.state[brigade] = observe(
-                    brigade, shown, brigades.site, sites, constants.observation, seen.features[brigade]
-                )
-                seen.action_values[brigade] = 0.0
-                seen.target_value[brigade] = 0.0
-            if learning:
-                note_choice(brigade, step - 1, -1, 0, NO_CHOICE, learner)
-            if can_choose(brigade, brigades.hp, brigades.refilling, sites.counts):
-                if keeps_choice(brigade, before[brigade], policy.commit[0], step):
-                    action, choice = before[brigade], KEPT
-                    if learning:
-                        state = -1
-                        if step > last_step:
-                            state = observe(brigade, shown, brigades.site, sites, constants.observation, features)
-                            row = table_state(state, policy.tables.shape[1])
-                            go_on_and_learn(brigade, policy.table_of[brigade], row, action, learner)
-                        note_choice(brigade, step - 1, state, action, choice, learner)
-                elif policy.kind[brigade] == GIVEN:
-                    action, choice = policy.action[brigade], GREEDY
-                    if action == OWN_TARGET:
-                        target = policy.table_of[brigade]
-                elif policy.kind[brigade] in (RANK_NAMED, RANK_ALL):
-                    own, choice = policy.kind[brigade] == RANK_ALL, GREEDY
-                    weights = policy.rankings[policy.table_of[brigade]]
-                    action, target = rank(
-                        brigade,
-                        own,
-                        step,
-                        known,
-                        weights,
-                        policy.network,
-                        described,
-                        described_at,
-                        brigades,
-                        buildings,
-                        city.links,
-                        geometry,
-                        fire,
-                        sites,
-                        constants.fire,
-                        constants.brigades,
-                        scratch.seen,
-                        scratch.work,
-                        values,
-                    )
-                    if noting:
-                        note_values(brigade, values, BY_RANK, seen)
-                        seen.target_value[brigade] = values[N_ACTIONS]
-                else:
-                    state = observe(brigade, shown, brigades.site, sites, constants.observation, features)
-                    action = choose(brigade, state, policy, seed, step)
-                    choice = EXPLORED if explores(brigade, policy, seed, step) else GREEDY
-                    if noting and policy.kind[brigade] == TABLE:
-                        row = table_state(state, policy.tables.shape[1])
-                        note_values(brigade, policy.tables[policy.table_of[brigade], row], BY_TABLE, seen)
-                    if learning:
-                        row = table_state(state, policy.tables.shape[1])
-                        choose_and_learn(brigade, policy.table_of[brigade], row, action, policy.epsilon[0], learner)
-                        note_choice(brigade, step - 1, state, action, choice, learner)
-                if target < 0:
-                    target = find_target(brigade, action, brigades, buildings, fire, geometry, sites)
-            brigades.action[brigade] = action
-            brigades.target[brigade] = target
-            if noting:
-                seen.choice[brigade], seen.explored[brigade] = choice, choice == EXPLORED
-        if step > last_step:
-            break
-        clock[STEP] = step
-        finish_step(city, world, constants, seed, step)
-        if learning:
-            take_reward(outcome.reward[TOTAL], learner)
-            note_reward(step - 1, outcome.reward, learner)
-        if is_over(outcome.counts[BURNING], buildings.later_step, step):
-            if learning:
-                for brigade in range(n_brigades):
-                    update(brigade, policy.table_of[brigade], 0.0, learner)
-            break
+NO_STEP = 0
+"""A step in which no fire is lit."""
 
 
 @kernel
@@ -171,4 +27,29 @@ def run_episode(row: Array) -> None:
     Args:
         row: (k,) int64, the address row of an `Episode`.
     """
-    run_steps(opened_episode(row))
+    episode = opened_episode(row)
+    city, world, constants, clock = episode.city, episode.world, episode.constants, episode.clock
+    learner, warmth, outcome = episode.learner, episode.scratch.warmth, episode.world.outcome
+    learning, last_step = learner.learning[0] != 0, clock[LAST_STEP]
+    episode.scratch.described_at[:] = -1
+    if learning:
+        forget(learner)
+    begin(city.cover, world.fire, warmth)
+    for step in range(clock[STEP] + 1, last_step + 2):
+        if step > last_step and not learning:
+            break
+        begin_step(city, world, warmth, step if step <= last_step else NO_STEP)
+        decide_all(step, episode)
+        if step > last_step:
+            break
+        clock[STEP] = step
+        finish_step(city, world, constants, warmth, clock[SEED], step)
+        if learning:
+            take_reward(outcome.reward[TOTAL], learner)
+            note_reward(step - 1, outcome.reward, learner)
+        if is_over(outcome.counts[BURNING], city.buildings.later_step, step):
+            if learning:
+                for brigade in range(len(learner.state)):
+                    update(brigade, episode.policy.table_of[brigade], 0.0, learner)
+            break
+    score(world.fire, world.civilians, city.geometry, outcome)

@@ -10,6 +10,7 @@ from numba.core.registry import CPUDispatcher
 
 from fireworld.interrupt import postponed, was_interrupted
 from fireworld.kernels.cache import OPEN, KernelCache
+from fireworld.kernels.inner_code import InnerCache, InnerCompiler
 
 ROOM: Final = __name__.rpartition(".")[0] + "."
 """Modules whose sources the name of the cache folder stands for; what is compiled elsewhere is not kept."""
@@ -29,11 +30,16 @@ class _Kernel(CPUDispatcher):  # type: ignore[misc]  # numba is untyped
 
 
 class _Closed(_Kernel):
-    """An inner function: compiled code without the entry that Python would need, where numba itself would crash."""
+    """An inner function: code for kernels, without the entry that Python would need, where numba itself would crash."""
 
     def __call__(self, *args: object, **kwargs: object) -> NoReturn:
         del args, kwargs
         raise TypeError(f"{self.py_func.__name__} is for kernels only; FIREWORLD_OPEN_KERNELS=1 opens it to Python")
+
+    def add_overload(self, result: Any) -> None:
+        """Keep a compiled form, for those that call it to link in."""
+        self.overloads[tuple(result.signature.args)] = result
+        self.targetctx.insert_user_function(result.entry_point, result.fndesc, [result.library])
 
 
 class _MakingArrays(_Kernel):
@@ -59,7 +65,8 @@ def _compiler(kind: type[_Kernel], **more: Any) -> Callable[[Callable[..., Any]]
             config.DISABLE_JIT = before
         compiled.__class__ = kind
         if function.__module__.startswith(ROOM):
-            compiled._cache = KernelCache(function)  # noqa: SLF001 - numba has no other way to give it a cache
+            kept = InnerCache if kind is _Closed else KernelCache
+            compiled._cache = kept(function)  # noqa: SLF001 - numba has no other way to give it a cache
         return compiled
 
     return decorate
@@ -70,15 +77,5 @@ def _compiler(kind: type[_Kernel], **more: Any) -> Callable[[Callable[..., Any]]
 kernel = _compiler(_Kernel, _nrt=False)
 making_arrays = _compiler(_MakingArrays)
 """For the few kernels that make arrays."""
-inner = kernel if OPEN else _compiler(_Closed, _nrt=False, no_cpython_wrapper=True)
-"""For functions that other kernels alone call: that spares a third of the compilation."""
-inlined = (
-    _compiler(_Kernel, _nrt=False, forceinline=True)
-    if OPEN
-    else _compiler(_Closed, _nrt=False, no_cpython_wrapper=True, forceinline=True)
-)
-"""As `inner`, but compiled into the code of those that call it, however long it is.
-
-For what is called often and hands groups of arrays on to what is called seldom. The compiler would leave it a function
-by itself, because of the many arrays, and to hand them over can take longer than the work.
-"""
+inner = kernel if OPEN else _compiler(_Closed, _nrt=False, no_cpython_wrapper=True, pipeline_class=InnerCompiler)
+"""For functions that other kernels alone call: that spares more than half of the compilation."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from fireworld.kernels.arrays import (
     BrigadeState,
     BuildingArrays,
@@ -12,43 +14,63 @@ from fireworld.kernels.arrays import (
     NearArrays,
     SiteState,
 )
-from fireworld.kernels.jit import inner, kernel
+from fireworld.kernels.codes import can_catch, is_alight
+from fireworld.kernels.episode_arrays import N_BLOCKS, SITES_CHANGED, SITES_KNOWN, Warmth
+from fireworld.kernels.jit import inner
+from fireworld.kernels.warmth import ONE, WORD_SHIFT, ZERO, bounds, clear_bit, has_bit, lowest_bit, set_bit
 
 FAR = 1e300
 NORTH, EAST, SOUTH, WEST = 1, 2, 4, 8
-NOWHERE, WAITING = -1, -2
-"""Places of buildings that do not burn, and of burning ones whose site is not known yet."""
+NOWHERE = -1
+"""Place of buildings that do not burn."""
 
 
 @inner
-def gather(fire: FireState, near: NearArrays, sites: SiteState) -> None:
+def put_out(fire: FireState, sites: SiteState, warmth: Warmth) -> None:
+    """Take what no longer burns out of the sites; in the first look of a call at everything, else at their members."""
+    known = warmth.number[SITES_KNOWN] != 0
+    for k in range(sites.counts[2] if known else len(sites.place)):
+        b = sites.member[k] if known else np.uint32(k)
+        sites.place[b] = NOWHERE
+        if not is_alight(fire.fieryness[b]):
+            sites.label[b] = 0
+    warmth.number[SITES_KNOWN] = 1
+
+
+@inner
+def gather(fire: FireState, near: NearArrays, sites: SiteState, warmth: Warmth) -> None:
     """Group the burning buildings into connected sets, in order of their lowest building index."""
-    place, member = sites.place, sites.member
-    n_burning = 0
-    for b in range(len(place)):
-        burning = 1 <= fire.fieryness[b] <= 3
-        place[b] = WAITING if burning else NOWHERE
-        n_burning += burning
-    n_sites, n_members = 0, 0
-    for b in range(len(place)):
-        if n_members == n_burning:
-            break
-        if place[b] != WAITING:
+    waiting, member, codes = warmth.waiting, sites.member, fire.fieryness
+    n_burning = ZERO
+    for k in range(warmth.number[N_BLOCKS]):
+        first, end = bounds(warmth.block[k], len(codes))
+        for b in range(first, end):
+            warmth.burning[n_burning] = b
+            n_burning += ONE if is_alight(codes[b]) else ZERO
+    for k in range(n_burning):
+        set_bit(warmth.burning[k], waiting)
+    n_sites, n_members = 0, ZERO
+    for k in range(n_burning):
+        b = warmth.burning[k]
+        if not has_bit(b, waiting):
             continue
+        clear_bit(b, waiting)
         sites.start[n_sites] = n_members
-        place[b] = n_sites
-        member[n_members] = b
+        sites.place[b], member[n_members] = n_sites, b
         head = n_members
-        n_members += 1
+        n_members += ONE
         while head < n_members < n_burning:
             here = member[head]
-            head += 1
-            for k in range(near.ptr[here], near.ptr[here + 1]):
-                there = near.building[k]
-                if place[there] == WAITING:
-                    place[there] = n_sites
-                    member[n_members] = there
-                    n_members += 1
+            head += ONE
+            for row in range(near.ptr[here], near.ptr[here + ONE]):
+                word = np.uint64(near.word[row])
+                found = waiting[word] & near.bits[row]
+                waiting[word] ^= found
+                while found != ZERO:
+                    there = (word << WORD_SHIFT) + lowest_bit(found)
+                    found &= found - ONE
+                    sites.place[there], member[n_members] = n_sites, there
+                    n_members += ONE
         n_sites += 1
     sites.start[n_sites] = n_members
     sites.counts[0] = n_sites
@@ -145,26 +167,30 @@ def assign_brigades(
 @inner
 def relabel(sites: SiteState) -> None:
     """Remember the site of every burning building for the next step."""
-    for b in range(len(sites.label)):
-        place = sites.place[b]
-        sites.label[b] = sites.number[place] if place >= 0 else 0
+    for k in range(sites.counts[2]):
+        b = sites.member[k]
+        sites.label[b] = sites.number[sites.place[b]]
 
 
 @inner
-def civilian_squares(civilians: CivilianState, fire: FireState, geometry: GeometryArrays, sites: SiteState) -> None:
+def civilian_squares(
+    civilians: CivilianState, fire: FireState, geometry: GeometryArrays, sites: SiteState, warmth: Warmth
+) -> None:
     """Find each burning building's squared distance to the nearest living civilian who is in no burning building."""
-    for k in range(sites.counts[2]):
-        sites.building_civilian_square[sites.member[k]] = FAR
+    n_members, member_x, member_y, squares = np.uint64(sites.counts[2]), warmth.x, warmth.y, warmth.square
+    for k in range(n_members):
+        b = sites.member[k]
+        member_x[k], member_y[k], squares[k] = geometry.x[b], geometry.y[b], FAR
     for civilian in range(len(civilians.hp)):
         inside = civilians.building[civilian]
-        if civilians.hp[civilian] <= 0 or (inside >= 0 and 1 <= fire.fieryness[inside] <= 3):
+        if civilians.hp[civilian] <= 0 or (inside >= 0 and is_alight(fire.fieryness[inside])):
             continue
         x, y = civilians.x[civilian], civilians.y[civilian]
-        for k in range(sites.counts[2]):
-            b = sites.member[k]
-            dx, dy = geometry.x[b] - x, geometry.y[b] - y
-            square = dx * dx + dy * dy
-            sites.building_civilian_square[b] = min(square, sites.building_civilian_square[b])
+        for k in range(n_members):
+            dx, dy = member_x[k] - x, member_y[k] - y
+            squares[k] = min(dx * dx + dy * dy, squares[k])
+    for k in range(n_members):
+        sites.building_civilian_square[sites.member[k]] = squares[k]
 
 
 @inner
@@ -203,31 +229,25 @@ def find_free_sides(
 ) -> None:
     """Find the sides over which a site can spread: the centroid of an unburnt linked building is beyond; MODEL 5.1.
 
-    Beyond some sides of a large fire there is nothing left to burn: the search ends once all others are found free.
+    Most buildings of a large site have no links that lead beyond a side that is not known to be free.
     """
-    low_x, low_y, high_x, high_y = FAR, FAR, -FAR, -FAR  # bounds of all that can still catch fire
-    for b in range(len(fire.fieryness)):
-        if (fire.fieryness[b] == 0 or fire.fieryness[b] == 4) and buildings.inflammable[b] != 0:
-            x, y = geometry.x[b], geometry.y[b]
-            low_x, low_y, high_x, high_y = min(low_x, x), min(low_y, y), max(high_x, x), max(high_y, y)
     for site in range(sites.counts[0]):
         west, south, east, north = sites.west[site], sites.south[site], sites.east[site], sites.north[site]
-        possible = sides_beyond(low_x, low_y, west, south, east, north)
-        possible |= sides_beyond(high_x, high_y, west, south, east, north)
         sides = 0
         for k in range(sites.start[site], sites.start[site + 1]):
-            if sides == possible:
-                break
             b = sites.member[k]
+            beyond = sides_beyond(links.west[b], links.south[b], west, south, east, north)
+            beyond |= sides_beyond(links.east[b], links.north[b], west, south, east, north)
+            if beyond & ~sides == 0:
+                continue
             for link in range(links.ptr[b], links.ptr[b + 1]):
                 there = links.building[link]
-                code = fire.fieryness[there]
-                if (code == 0 or code == 4) and buildings.inflammable[there] != 0:  # noqa: PLR1714
+                if can_catch(fire.fieryness[there]) and buildings.inflammable[there] != 0:
                     sides |= sides_beyond(geometry.x[there], geometry.y[there], west, south, east, north)
         sites.free_sides[site] = sides
 
 
-@kernel
+@inner
 def find_sites(
     buildings: BuildingArrays,
     links: LinkArrays,
@@ -237,12 +257,15 @@ def find_sites(
     civilians: CivilianState,
     brigades: BrigadeState,
     sites: SiteState,
+    warmth: Warmth,
 ) -> None:
     """Find and measure the fire sites of the moment and settle which brigade belongs to which."""
-    gather(fire, near, sites)
+    put_out(fire, sites, warmth)
+    gather(fire, near, sites, warmth)
     number_sites(sites)
     assign_brigades(brigades, buildings, geometry, sites)
     relabel(sites)
-    civilian_squares(civilians, fire, geometry, sites)
+    civilian_squares(civilians, fire, geometry, sites, warmth)
     measure_sites(geometry, sites)
     find_free_sides(buildings, links, geometry, fire, sites)
+    warmth.number[SITES_CHANGED] = 0

@@ -6,24 +6,24 @@ import numpy as np
 
 from fireworld.kernels.addresses import opener
 from fireworld.kernels.arrays import (
-    SEED,
-    STEP,
     Array,
     BrigadeState,
     CityArrays,
     CivilianState,
     Constants,
-    Episode,
     FireState,
     HealthConstants,
     WorldState,
 )
 from fireworld.kernels.brigades import act, shelter
-from fireworld.kernels.fire import advance_fire, draw_burn_rates, light
+from fireworld.kernels.episode_arrays import SEED, SITES_CHANGED, STEP, Episode, Scratch, Warmth
+from fireworld.kernels.fire import burn_on, draw_burn_rates, light
 from fireworld.kernels.health import harm
-from fireworld.kernels.jit import inlined, inner, kernel
-from fireworld.kernels.outcome import assess
+from fireworld.kernels.jit import inner, kernel
+from fireworld.kernels.outcome import count_living, reward_step, score
+from fireworld.kernels.ranking import Sight
 from fireworld.kernels.sites import find_sites
+from fireworld.kernels.warmth import begin, doubt, refresh
 
 FIRST_CIVILIAN = np.int64(0)
 """Entity number of the first civilian, for the draws; the brigades' follow."""
@@ -41,35 +41,78 @@ def look(row: Array) -> None:
         row: (k,) int64, the address row of an `Episode`, here and below.
     """
     episode = opened_episode(row)
-    begin_step(episode.city, episode.world, episode.clock[STEP] + 1)
+    city, world, warmth = episode.city, episode.world, episode.scratch.warmth
+    begin(city.cover, world.fire, warmth)
+    begin_step(city, world, warmth, episode.clock[STEP] + 1)
 
 
 @kernel
 def finish(row: Array) -> None:
     """Carry out what the brigades decided in the step of the clock."""
     episode = opened_episode(row)
-    finish_step(episode.city, episode.world, episode.constants, episode.clock[SEED], episode.clock[STEP])
+    city, world, warmth = episode.city, episode.world, episode.scratch.warmth
+    begin(city.cover, world.fire, warmth)
+    finish_step(city, world, episode.constants, warmth, episode.clock[SEED], episode.clock[STEP])
+    score(world.fire, world.civilians, city.geometry, world.outcome)
 
 
-@inlined
-def begin_step(city: CityArrays, world: WorldState, step: int) -> None:
-    """Light what is lit in a step, and find the fire sites."""
-    buildings = city.buildings
-    light(buildings, world.fire, step)
-    find_sites(
-        buildings, city.links, city.near, city.geometry, world.fire, world.civilians, world.brigades, world.sites
+@inner
+def sight_of(city: CityArrays, world: WorldState, constants: Constants, scratch: Scratch) -> Sight:
+    """Return what the brigades look at when they value targets."""
+    return Sight(
+        city.buildings,
+        city.links,
+        city.geometry,
+        world.fire,
+        world.brigades,
+        world.sites,
+        constants.fire,
+        constants.brigades,
+        scratch.described,
+        scratch.described_at,
     )
 
 
-@inlined
-def finish_step(city: CityArrays, world: WorldState, constants: Constants, seed: int, step: int) -> None:
-    """Act, burn, hurt, assess: carry out what the brigades decided, and compute what the step is worth."""
+@inner
+def begin_step(city: CityArrays, world: WorldState, warmth: Warmth, step: int) -> None:
+    """Light what is lit in a step, and find the fire sites if they can be others than before.
+
+    Before the first step of a call, the lists of what is warm `begin`; after the last one it has its `score`.
+    """
+    if light(city.buildings, world.fire, step) > 0:
+        begin(city.cover, world.fire, warmth)
+    if warmth.number[SITES_CHANGED] != 0:
+        find_sites(
+            city.buildings,
+            city.links,
+            city.near,
+            city.geometry,
+            world.fire,
+            world.civilians,
+            world.brigades,
+            world.sites,
+            warmth,
+        )
+
+
+@inner
+def finish_step(
+    city: CityArrays, world: WorldState, constants: Constants, warmth: Warmth, seed: int, step: int
+) -> None:
+    """Act, burn, hurt, reward: carry out what the brigades decided, and compute what the step is worth."""
     fire, people, brigades, outcome = world.fire, world.civilians, world.brigades, world.outcome
     outcome.water[0] += act(brigades, fire, city.streets, world.ways, city.geometry, constants.brigades)
-    outcome.draws[0] = draw_burn_rates(city.buildings, fire, constants.fire, seed, step)
-    advance_fire(city.buildings, city.cover, city.links, fire, constants.fire)
+    for brigade in range(len(brigades.sprayed)):
+        if brigades.sprayed[brigade] > 0:
+            doubt(brigades.target[brigade], warmth)
+    refresh(city.cover, warmth)
+    outcome.draws[0] = draw_burn_rates(city.buildings, fire, constants.fire, seed, step, warmth)
+    burn_on(city.buildings, city.cover, city.links, fire, constants.fire, warmth)
+    n_alive = count_living(people.hp)
     outcome.draws[1] = hurt(fire, people, brigades, constants.health, seed, step)
-    assess(fire, people, city.geometry, constants.reward, outcome)
+    if count_living(people.hp) != n_alive:  # sites are measured by the living
+        warmth.number[SITES_CHANGED] = 1
+    reward_step(warmth.n_of_code, people, constants.reward, outcome)
 
 
 @inner

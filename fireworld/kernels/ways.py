@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fireworld.kernels.arrays import GOAL, KNOWN, USED, WAYS, StreetArrays, WayState
-from fireworld.kernels.jit import inlined, inner, kernel
+from fireworld.kernels.jit import inner, kernel
 
 NOWHERE = np.int64(1) << 60
 """Length of a way that there is not, mm."""
@@ -116,7 +116,7 @@ def line_to(goal: int, street: int, beyond: int, streets: StreetArrays, ways: Wa
     return line
 
 
-@inlined
+@inner
 def lines_to(goal_street: int, street: int, streets: StreetArrays, ways: WayState) -> tuple[np.int64, np.int64]:
     """Return the lines that lead to the two ends of a street, ready for the whole way there from another one.
 

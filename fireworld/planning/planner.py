@@ -62,7 +62,7 @@ class Forecast:
         self._observation, self._copy, self._options = observation, copy, options
         self._policy = always(0).for_brigades(len(observation.world.brigades.action))
         city_row = np.concatenate((address_row(observation.city), address_row(observation.constants)))
-        self._bound = bind(city_row, address_row(copy), len(copy.fire.energy), self._policy)
+        self._bound = bind(city_row, address_row(copy), copy.fire, self._policy)
         self._values: dict[Assignment, float] = {}
 
     def value(self, assignment: Assignment) -> float:

@@ -23,7 +23,8 @@ from fireworld.kernels.choice import (
 )
 from fireworld.kernels.learning import EXPLORED, KEPT, NO_CHOICE
 from fireworld.kernels.network import widest
-from fireworld.kernels.ranking import N_OF_BUILDING, N_WEIGHTS, rank
+from fireworld.kernels.ranking import N_WEIGHTS
+from fireworld.kernels.ranks import fresh_ranks, rank
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
 from fireworld.records import ACTIONS
 
@@ -150,9 +151,7 @@ def noted_decisions(
 
 def _by_rank(observation: Observation, ready: PolicyArrays) -> Decision:
     """Choose the target that a brigade values most, by its ranking or network."""
-    brigade, city, world, constants = observation.brigade, observation.city, observation.world, observation.constants
-    n = len(world.fire.energy)
-    values = np.zeros(len(ACTIONS) + 1)
+    brigade, values = observation.brigade, np.zeros(len(ACTIONS) + 1)
     own = bool(ready.kind[brigade] == RANK_ALL)
     action, target = rank(
         brigade,
@@ -161,16 +160,8 @@ def _by_rank(observation: Observation, ready: PolicyArrays) -> Decision:
         observation.known_targets,
         ready.rankings[ready.table_of[brigade]],
         ready.network,
-        np.zeros((n, N_OF_BUILDING)),
-        np.full(n, -1),
-        world.brigades,
-        city.buildings,
-        city.links,
-        city.geometry,
-        world.fire,
-        world.sites,
-        constants.fire,
-        constants.brigades,
+        observation.sight,
+        fresh_ranks(len(ready.kind), len(observation.world.fire.energy)),
         np.zeros(N_WEIGHTS),
         np.zeros((2, widest(ready.network))),
         values,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fireworld.kernels.arrays import CityArrays, Constants, WorldState
 from fireworld.kernels.observation import find_target, site_place
-from fireworld.kernels.ranking import N_OF_BUILDING, N_TARGET_FEATURES, OWN_TARGET
+from fireworld.kernels.ranking import N_OF_BUILDING, N_TARGET_FEATURES, OWN_TARGET, Sight
 from fireworld.kernels.targets import describe_targets
 
 
@@ -87,24 +87,26 @@ class Observation:
     @cached_property
     def target_features(self) -> NDArray[np.float64]:
         """(4, 13) what the brigade sees of each of these targets, as rankings and networks do: docs/model.md, 7."""
-        n, out = len(self.world.fire.energy), np.zeros((len(self.targets), N_TARGET_FEATURES))
-        describe_targets(
-            self.brigade,
-            self.step,
-            self.known_targets,
-            np.zeros((n, N_OF_BUILDING)),
-            np.full(n, -1),
-            self.world.brigades,
+        out = np.zeros((len(self.targets), N_TARGET_FEATURES))
+        describe_targets(self.brigade, self.step, self.known_targets, self.sight, out)
+        return out
+
+    @property
+    def sight(self) -> Sight:
+        """What kernels take to value targets, with scratch of its own."""
+        n = len(self.world.fire.energy)
+        return Sight(
             self.city.buildings,
             self.city.links,
             self.city.geometry,
             self.world.fire,
+            self.world.brigades,
             self.world.sites,
             self.constants.fire,
             self.constants.brigades,
-            out,
+            np.zeros((n, N_OF_BUILDING)),
+            np.full(n, -1),
         )
-        return out
 
     @cached_property
     def burning(self) -> NDArray[np.uint32]:

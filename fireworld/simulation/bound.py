@@ -10,11 +10,14 @@ from typing import Final
 import numpy as np
 
 from fireworld.kernels.addresses import address_row
-from fireworld.kernels.arrays import LAST_STEP, SEED, STEP, Array, Learner, PolicyArrays, Scratch, Seen
+from fireworld.kernels.arrays import Array, FireState, Learner, PolicyArrays, Seen
 from fireworld.kernels.choice import RANK_ALL, RANK_NAMED
+from fireworld.kernels.episode_arrays import LAST_STEP, SEED, STEP, Scratch
 from fireworld.kernels.network import widest
 from fireworld.kernels.observation import N_ACTIONS, N_FEATURES
 from fireworld.kernels.ranking import N_OF_BUILDING, N_WEIGHTS
+from fireworld.kernels.ranks import fresh_ranks
+from fireworld.kernels.warmth import fresh_warmth
 from fireworld.simulation.state import NO_LEARNER
 
 
@@ -48,7 +51,7 @@ def _run_episode() -> Callable[[Array], None]:
 def bind(
     city_row: Array,
     state_row: Array,
-    n_buildings: int,
+    fire: FireState,
     policy: PolicyArrays,
     learner: Learner = NO_LEARNER,
     seen: Seen | None = None,
@@ -60,23 +63,26 @@ def bind(
     Args:
         city_row: address row of the city and the constants.
         state_row: of the world's state.
-        n_buildings: buildings of the city.
+        fire: of the world; its arrays are as long as those that kernels write on.
         policy: the team.
         learner: what learns.
         seen: where it is noted what the brigades see and choose; None: nowhere.
         describes: there is room for the features of buildings, even if the team does not rank them.
     """
-    ranks = describes or bool(np.isin(policy.kind, (RANK_NAMED, RANK_ALL)).any())
-    scratch, clock = fresh_scratch(policy, n_buildings if ranks else 0), np.zeros(3, dtype=np.int64)
+    scratch, clock = fresh_scratch(policy, fire, describes=describes), np.zeros(3, dtype=np.int64)
     noted = NOTHING_SEEN if seen is None else seen
-    rows = [address_row(group) for group in (policy, learner, noted, scratch)]
+    learner_row = _NO_LEARNER_ROW if learner is NO_LEARNER else address_row(learner)
+    noted_row = _NOTHING_SEEN_ROW if noted is NOTHING_SEEN else address_row(noted)
+    rows = address_row(policy), learner_row, noted_row, address_row(scratch)
     clock_row = clock.__array_interface__["data"][0], len(clock)
     return Bound(policy, learner, noted, scratch, clock, np.concatenate((city_row, state_row, *rows, clock_row)))
 
 
-def fresh_scratch(policy: PolicyArrays, n_described: int) -> Scratch:
-    """Return what the steps of a team write on; `n_described`: buildings of the city if it ranks them, else 0."""
-    n_brigades = len(policy.kind)
+def fresh_scratch(policy: PolicyArrays, fire: FireState, *, describes: bool) -> Scratch:
+    """Return what the steps of a team write on; arguments as of `bind`."""
+    n_brigades, ranks = len(policy.kind), bool(np.isin(policy.kind, (RANK_NAMED, RANK_ALL)).any())
+    n_buildings = len(fire.energy)
+    n_described = n_buildings if describes or ranks else 0
     return Scratch(
         features=np.zeros(N_FEATURES, dtype=np.int64),
         action_before=np.zeros(n_brigades, dtype=np.int32),
@@ -84,6 +90,8 @@ def fresh_scratch(policy: PolicyArrays, n_described: int) -> Scratch:
         values=np.zeros(N_ACTIONS + 1),
         described=np.zeros((n_described, N_OF_BUILDING)),
         described_at=np.full(n_described, -1),
+        ranks=fresh_ranks(n_brigades, n_buildings if ranks else 0),
+        warmth=fresh_warmth(n_buildings, fire.air.shape),
         seen=np.zeros(N_WEIGHTS),
         work=np.zeros((2, widest(policy.network))),
     )
@@ -103,3 +111,5 @@ def fresh_seen(n_brigades: int) -> Seen:
 
 
 NOTHING_SEEN: Final = fresh_seen(0)
+_NO_LEARNER_ROW: Final = address_row(NO_LEARNER)
+_NOTHING_SEEN_ROW: Final = address_row(NOTHING_SEEN)

@@ -22,6 +22,7 @@ from fireworld.kernels.arrays import (
     StreetArrays,
 )
 from fireworld.kernels.fire import STEFAN_BOLTZMANN
+from fireworld.kernels.warmth import TILE, WORD, tiles_of
 from fireworld.parameters import BrigadeParameters, FireParameters, HealthParameters
 
 CIVILIAN_LOW_M = 30.0
@@ -41,15 +42,27 @@ def building_arrays(city: City, fire: FireParameters) -> BuildingArrays:
     """Collect what the fire model needs of every building."""
     return BuildingArrays(
         building_id=city.footprints.building_id.astype(np.int64),
-        order=city.order.astype(np.uint32),
         capacity=city.heat_capacity.astype(np.float64),
         initial_fuel=city.initial_fuel.astype(np.float32),
         ignition_point=city.ignition_point.astype(np.float64),
+        ignition_energy=ignition_energy(city.heat_capacity.astype(np.float64), city.ignition_point.astype(np.float64)),
         emission=city.wall_area_m2 * single(fire.radiation_coefficient) * STEFAN_BOLTZMANN,
         inflammable=city.footprints.inflammable.astype(np.uint8),
         later_step=np.zeros(0, dtype=np.int64),
         later_building=np.zeros(0, dtype=np.int64),
     )
+
+
+def ignition_energy(capacity: Array, ignition_point: Array) -> Array:
+    """Return the least energy above 0 at which energy / capacity, rounded, is the ignition point; (n,) float64 all."""
+    least: Array = np.maximum(ignition_point * capacity, np.nextafter(0.0, 1.0))
+    lower = np.nextafter(least, 0.0)
+    while (enough := (lower > 0.0) & (lower / capacity >= ignition_point)).any():
+        least = np.where(enough, lower, least)
+        lower = np.nextafter(least, 0.0)
+    while (short := least / capacity < ignition_point).any():
+        least = np.where(short, np.nextafter(least, np.inf), least)
+    return least
 
 
 def cover_arrays(city: City, fire: FireParameters) -> CoverArrays:
@@ -64,14 +77,46 @@ def cover_arrays(city: City, fire: FireParameters) -> CoverArrays:
     weight = np.zeros(int(ptr[-1]))
     place = ptr[owner] + (air.x - west[owner]) * width[owner] + (air.y - south[owner])
     weight[place] = single(fire.air_to_building_flow) * (air.percent / 100.0) * air.cell_mm
+    west, south = west + BORDER, south + BORDER
+    tile_ptr, tile_position = tiles_over(west, south, rows, width, city.order, tiles_of(air_shape(city)))
     return CoverArrays(
-        x0=(west + BORDER).astype(np.uint32),
-        y0=(south + BORDER).astype(np.uint32),
+        x0=west.astype(np.uint32),
+        y0=south.astype(np.uint32),
         rows=rows.astype(np.uint32),
         width=width.astype(np.uint32),
         ptr=ptr[:-1].astype(np.uint32),
         weight=weight,
+        order=city.order.astype(np.uint32),
+        tile_ptr=tile_ptr,
+        tile_position=tile_position,
     )
+
+
+def tiles_over(
+    x0: Array, y0: Array, rows: Array, width: Array, order: Array, tiles: tuple[int, int]
+) -> tuple[Array, Array]:
+    """Return the positions in the order of visits of the blocks of air that reach into each tile, as CSR.
+
+    Args:
+        x0: (n,) first row of each block.
+        y0: (n,) its first cell.
+        rows: (n,) rows.
+        width: (n,) cells.
+        order: (n,) the order of visits.
+        tiles: rows and columns of tiles.
+    """
+    first_row, first_column = x0 // TILE, y0 // TILE
+    n_rows, n_columns = (x0 + rows - 1) // TILE + 1 - first_row, (y0 + width - 1) // TILE + 1 - first_column
+    sizes = n_rows * n_columns
+    block = np.repeat(np.arange(len(x0)), sizes)
+    k = np.arange(len(block)) - np.repeat(np.cumsum(sizes) - sizes, sizes)  # which of its block's tiles
+    row, column = first_row[block] + k // n_columns[block], first_column[block] + k % n_columns[block]
+    tile = row * tiles[1] + column
+    by_tile = np.argsort(tile, kind="stable")
+    position = np.empty(len(order), dtype=np.uint32)
+    position[order] = np.arange(len(order))
+    ptr = np.concatenate([[0], np.cumsum(np.bincount(tile, minlength=tiles[0] * tiles[1]))])
+    return ptr.astype(np.uint32), position[block[by_tile]]
 
 
 def geometry_arrays(city: City) -> GeometryArrays:
@@ -125,17 +170,45 @@ def city_arrays(city: City, fire: FireParameters) -> CityArrays:
         cover=cover_arrays(city, fire),
         links=link_arrays(city),
         geometry=geometry_arrays(city),
-        near=NearArrays(ptr=city.near.ptr.astype(np.uint32), building=city.near.building.astype(np.uint32)),
+        near=near_arrays(city.near.ptr, city.near.building),
         streets=street_arrays(city.streets, np.flatnonzero(city.footprints.refuge)),
+    )
+
+
+def near_arrays(ptr: Array, building: Array) -> NearArrays:
+    """Put near buildings, (n+1,) start of each one's and their numbers, rising, into words of bits."""
+    owner = np.repeat(np.arange(len(ptr) - 1), np.diff(ptr))
+    word = building.astype(np.int64) // WORD
+    is_first = np.ones(len(word), dtype=bool)
+    is_first[1:] = (owner[1:] != owner[:-1]) | (word[1:] != word[:-1])
+    first = np.flatnonzero(is_first)
+    bit = np.uint64(1) << (building.astype(np.uint64) % np.uint64(WORD))
+    sizes = np.bincount(owner[first], minlength=len(ptr) - 1)
+    return NearArrays(
+        ptr=np.concatenate([[0], np.cumsum(sizes)]).astype(np.uint32),
+        word=word[first].astype(np.uint32),
+        bits=np.bitwise_or.reduceat(bit, first) if len(first) else bit,
     )
 
 
 def link_arrays(city: City) -> LinkArrays:
     """Collect the radiation links."""
+    ptr, building = city.links.ptr, city.links.building
+    owner = np.repeat(np.arange(city.n_buildings), np.diff(ptr))
+    burns = city.footprints.inflammable[building] != 0
+    centroid = city.footprints.centroid_mm[building[burns]].astype(np.float64)
+    low, high = np.full((2, city.n_buildings), np.inf), np.full((2, city.n_buildings), -np.inf)
+    for axis in range(2):
+        np.minimum.at(low[axis], owner[burns], centroid[:, axis])
+        np.maximum.at(high[axis], owner[burns], centroid[:, axis])
     return LinkArrays(
-        ptr=city.links.ptr.astype(np.uint32),
-        building=city.links.building.astype(np.uint32),
+        ptr=ptr.astype(np.uint32),
+        building=building.astype(np.uint32),
         share=city.links.share.astype(np.float64),
+        west=low[0].copy(),
+        south=low[1].copy(),
+        east=high[0].copy(),
+        north=high[1].copy(),
     )
 
 

@@ -34,7 +34,7 @@ from fireworld.simulation.placement import Placement
 from fireworld.simulation.ways import another, fresh_ways
 
 NO_NODES: Final = np.zeros(0, dtype=np.int32)
-SCRATCH = {"fire.span", "fire.rate", "fire.emitted", "fire.scratch"} | {
+SCRATCH = {"fire.span", "fire.rate"} | {
     f"sites.{name}" for name in SiteState._fields if name not in {"counts", "label"}
 }
 """Arrays that no snapshot holds: what a step needs of them, it computes, or `restore_snapshot` makes it anew."""
@@ -70,8 +70,6 @@ def fresh_fire(city: City) -> FireState:
         warm=warm,
         span=warm_spans(warm, (rows, pitch)),
         rate=np.zeros(n),
-        emitted=np.zeros(n),
-        scratch=np.zeros((2, pitch)),
     )
 
 

@@ -13,18 +13,8 @@ import numpy as np
 
 from fireworld.city.city import City
 from fireworld.kernels.addresses import address_row
-from fireworld.kernels.arrays import (
-    BURNING,
-    SEED,
-    STEP,
-    Array,
-    CityArrays,
-    Constants,
-    Learner,
-    PolicyArrays,
-    Seen,
-    WorldState,
-)
+from fireworld.kernels.arrays import BURNING, Array, CityArrays, Constants, Learner, PolicyArrays, Seen, WorldState
+from fireworld.kernels.episode_arrays import SEED, STEP
 from fireworld.kernels.fire import ignite
 from fireworld.kernels.observation import can_choose, observe
 from fireworld.kernels.outcome import assess
@@ -108,7 +98,7 @@ def prepare_start(
     state = fresh_world(city, arrays.streets, parameters, placement)
     for building in placement.ignited.tolist():
         ignite(building, arrays.buildings, state.fire)
-    assess(state.fire, state.civilians, arrays.geometry, constants.reward, state.outcome)
+    assess(state.fire, state.civilians, arrays.geometry, constants.reward, state.outcome, np.zeros(9, dtype=np.int64))
     state.outcome.reward[:] = 0.0  # the start is not rewarded
     return Start(city, arrays, constants, state)
 
@@ -235,7 +225,7 @@ class World:
             policy: the team.
             describes: there is room for the features of buildings, whether the team needs them or not.
         """
-        return bind(self.start.row, self.row(), self.city.n_buildings, policy, describes=describes)
+        return bind(self.start.row, self.row(), self.state.fire, policy, describes=describes)
 
     def digest(self) -> str:
         """Return a digest of all that the rest of the run follows from: state, seed and step."""
@@ -248,7 +238,7 @@ class World:
         """Return what kernels take of this world and those who act in it, with the clock as it stands."""
         bound = self._bound
         if bound is None or bound.policy is not policy or bound.learner is not learner or bound.seen is not seen:
-            bound = self._bound = bind(self.start.row, self.row(), self.city.n_buildings, policy, learner, seen)
+            bound = self._bound = bind(self.start.row, self.row(), self.state.fire, policy, learner, seen)
         bound.clock[SEED], bound.clock[STEP] = self.seed, self.step_number
         return bound
 

@@ -11,6 +11,7 @@ from fireworld.city.build import build_city, with_links
 from fireworld.city.city import City, Plan
 from fireworld.kernels.brigades import act as act_kernel
 from fireworld.kernels.outcome import assess as assess_kernel
+from fireworld.kernels.ranking import N_OF_BUILDING, Sight
 from fireworld.parameters import PAPER, Parameters
 from fireworld.rewards import Reward
 from fireworld.simulation.placement import Placement
@@ -85,7 +86,8 @@ def make_world(
 def assess(world: World) -> None:
     """Compute what the moment is worth."""
     state = world.state
-    assess_kernel(state.fire, state.civilians, world.city_arrays.geometry, world.constants.reward, state.outcome)
+    geometry, reward = world.city_arrays.geometry, world.constants.reward
+    assess_kernel(state.fire, state.civilians, geometry, reward, state.outcome, np.zeros(9, dtype=np.int64))
 
 
 def act(world: World) -> None:
@@ -122,3 +124,20 @@ def site_numbers(world: World) -> dict[int, int]:
     """The number of the fire site of each burning building."""
     sites = world.state.sites
     return {int(b): int(sites.number[sites.place[b]]) for b in np.flatnonzero(sites.place >= 0)}
+
+
+def sight_of(world: World) -> Sight:
+    """What the brigades of a world look at when they value targets; nothing is described yet."""
+    city, state, constants, n = world.city_arrays, world.state, world.constants, world.city.n_buildings
+    return Sight(
+        city.buildings,
+        city.links,
+        city.geometry,
+        state.fire,
+        state.brigades,
+        state.sites,
+        constants.fire,
+        constants.brigades,
+        np.zeros((n, N_OF_BUILDING)),
+        np.full(n, -1),
+    )

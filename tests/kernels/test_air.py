@@ -10,6 +10,7 @@ import pytest
 from fireworld.city.build import build_city
 from fireworld.city.generator import generate_plan
 from fireworld.kernels.fire import advance_fire, ignite
+from fireworld.kernels.warmth import fresh_warmth
 from fireworld.parameters import PAPER
 from fireworld.simulation.city_arrays import city_arrays, fire_constants
 from fireworld.simulation.state import fresh_fire, restore_snapshot, take_snapshot, warm_spans
@@ -31,8 +32,9 @@ def kindled(*buildings):
 
 def burn_on(fire, n_steps=1, *, flush=0.001):
     constants = fire_constants(replace(PAPER.fire, flush_temperature=flush))
+    warmth = fresh_warmth(CITY.n_buildings, fire.air.shape)
     for _ in range(n_steps):
-        advance_fire(TABLES.buildings, TABLES.cover, TABLES.links, fire, constants)
+        advance_fire(TABLES.buildings, TABLES.cover, TABLES.links, fire, constants, warmth)
 
 
 def cell_by_cell(fire):

@@ -270,3 +270,29 @@ def test_ctrl_c_while_kernels_are_compiled(machine, after_seconds):
     assert process.returncode == 130, err
     assert "Traceback" not in err
     assert "ignored" not in err
+
+
+@pytest.mark.slow
+def test_a_kernel_takes_the_inner_functions_of_another_from_the_cache(machine):
+    machine.environment["FIREWORLD_OPEN_KERNELS"] = "0"
+    right, _ = machine.digest(machine.start())
+    (folder,) = machine.folder.parent.iterdir()
+    (episode,) = folder.glob("episode.run_episode-*")
+    inner = [path for path in folder.iterdir() if path != episode]
+    before = {path: path.read_bytes() for path in inner}
+    for path in inner:
+        os.utime(path, (0, 0))
+    episode.unlink()
+    assert machine.digest(machine.start())[0] == right
+    assert episode.exists()
+    assert [path for path in inner if path.stat().st_mtime or path.read_bytes() != before[path]] == []
+
+
+def test_inner_functions_have_no_machine_code():
+    command = (
+        "from fireworld.kernels.draws import hash_key; print(type(hash_key._cache).__name__); hash_key(1, 2, 3, 4)"
+    )
+    environment = dict(os.environ) | {"FIREWORLD_OPEN_KERNELS": "0"}
+    done = subprocess.run([sys.executable, "-c", command], env=environment, capture_output=True, text=True, check=False)
+    assert done.stdout == "InnerCache\n"
+    assert done.stderr.splitlines()[-1].startswith("TypeError: hash_key is for kernels only")

@@ -14,14 +14,15 @@ from fireworld.kernels.ranking import (
     OWN_TARGET,
     describe_building,
     describe_target,
-    rank,
+    others_at,
 )
+from fireworld.kernels.ranks import fresh_ranks, rank
 from fireworld.parameters import PAPER
 from fireworld.policy.kernel import NO_NETWORK
 from fireworld.policy.protocol import Action
 from fireworld.policy.teams.ranking_words import OF_BUILDING, WEIGHTS
 from fireworld.records import ACTION_NAMES, ACTIONS
-from tests.kernels.small import METRE, burn, make_city, make_world, square
+from tests.kernels.small import METRE, burn, make_city, make_world, sight_of, square
 
 NAMES = [weight.name for weight in WEIGHTS]
 POWER = PAPER.brigades.power_litres  # 2000 litres in a step
@@ -53,7 +54,8 @@ def see(world, name, *, b=0, brigade=0, known=None):
     known = np.full(world.n_brigades, -1, dtype=np.int32) if known is None else np.array(known, dtype=np.int32)
     described = np.array(list(describe(world, b).values()))
     range_square = world.constants.brigades.range_square
-    describe_target(brigade, b, known, described, arrays.brigades, tables.geometry, range_square, out)
+    here, near = others_at(b, brigade, known, tables.geometry)
+    describe_target(brigade, b, here, near, described, arrays.brigades, tables.geometry, range_square, out)
     return out[NAMES.index(name)]
 
 
@@ -249,11 +251,8 @@ def test_enough(steps, n_others, expected):
     assert see(world, "enough", b=1, known=[-1] * 5) == 0
 
 
-def ask(world, weighing, *, own, brigade=0, known=None, step=1, scratch=None):
+def ask(world, weighing, *, own, brigade=0, known=None, step=1, sight=None):
     """What the brigade puts first, and the five values."""
-    tables, arrays, constants = world.city_arrays, world.state, world.constants
-    n = len(arrays.fire.energy)
-    described, described_at = scratch or (np.zeros((n, N_OF_BUILDING)), np.full(n, -1))
     values = np.zeros(5)
     known = np.full(world.n_brigades, -1, dtype=np.int32) if known is None else np.array(known, dtype=np.int32)
     action, target = rank(
@@ -263,16 +262,8 @@ def ask(world, weighing, *, own, brigade=0, known=None, step=1, scratch=None):
         known,
         weighing,
         NO_NETWORK,
-        described,
-        described_at,
-        arrays.brigades,
-        tables.buildings,
-        tables.links,
-        tables.geometry,
-        arrays.fire,
-        arrays.sites,
-        constants.fire,
-        constants.brigades,
+        sight or sight_of(world),
+        fresh_ranks(world.n_brigades, world.city.n_buildings),
         np.full(N_WEIGHTS, np.nan),
         np.zeros((2, 0)),
         values,
@@ -354,9 +345,9 @@ def test_without_a_site_nothing_is_chosen(own):
 
 def test_what_is_known_of_a_building_is_worked_out_once_a_step():
     world = five_burn()
-    scratch = np.zeros((7, N_OF_BUILDING)), np.full(7, -1)
+    sight = sight_of(world)
     hot = weights(temperature=1.0)
-    assert ask(world, hot, own=True, scratch=scratch)[0] == (OWN_TARGET, 4)
+    assert ask(world, hot, own=True, sight=sight)[0] == (OWN_TARGET, 4)
     heat_up(world, 2, 2000)
-    assert ask(world, hot, own=True, brigade=1, scratch=scratch)[0] == (OWN_TARGET, 4), "the same step"
-    assert ask(world, hot, own=True, step=2, scratch=scratch)[0] == (OWN_TARGET, 2)
+    assert ask(world, hot, own=True, brigade=1, sight=sight)[0] == (OWN_TARGET, 4), "the same step"
+    assert ask(world, hot, own=True, step=2, sight=sight)[0] == (OWN_TARGET, 2)

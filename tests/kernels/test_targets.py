@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fireworld.kernels.ranking import N_OF_BUILDING, N_TARGET_FEATURES, N_WEIGHTS
+from fireworld.kernels.ranking import N_TARGET_FEATURES, N_WEIGHTS
 from fireworld.kernels.targets import describe_targets
 from fireworld.policy.kernel import from_rankings
 from fireworld.policy.protocol import Policy
-from tests.kernels.small import burn, make_city, make_world, square
+from tests.kernels.small import burn, make_city, make_world, sight_of, square
 from tests.simulation.town import begin, play, town_world
 
 
@@ -46,26 +46,10 @@ def test_they_are_what_rankings_weigh(seed):
 def test_without_a_site_nothing_is_written():
     world = make_world(make_city(square(0, 0), square(200, 0)), brigades=[0])
     burn(world, 1)
-    tables, arrays, constants = world.city_arrays, world.state, world.constants
     for site, is_seen in ((0, False), (1, True)):
-        arrays.brigades.site[0] = site
+        world.state.brigades.site[0] = site
         out = np.full((4, N_TARGET_FEATURES), -7.0)
-        assert is_seen == describe_targets(
-            0,
-            1,
-            np.full(1, -1, dtype=np.int32),
-            np.zeros((2, N_OF_BUILDING)),
-            np.full(2, -1),
-            arrays.brigades,
-            tables.buildings,
-            tables.links,
-            tables.geometry,
-            arrays.fire,
-            arrays.sites,
-            constants.fire,
-            constants.brigades,
-            out,
-        )
+        assert is_seen == describe_targets(0, 1, np.full(1, -1, dtype=np.int32), sight_of(world), out)
         assert (out == -7.0).any() != is_seen
 
 

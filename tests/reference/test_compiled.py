@@ -16,6 +16,7 @@ from fireworld.kernels import brigades as brigade_kernels
 from fireworld.kernels import fire as kernels
 from fireworld.kernels.draws import normal, uniform
 from fireworld.kernels.health import harm
+from fireworld.kernels.warmth import fresh_warmth
 from fireworld.parameters import OFFICIAL_2011, FireParameters, HealthParameters
 from fireworld.simulation.city_arrays import (
     air_inside,
@@ -68,7 +69,7 @@ def test_fire(city, parameters, seed):
         rate = random.normal(0.15, 0.02, n)
         state.rate[:] = rate
         fire.advance_fire(tables, expected, rate)
-        kernels.advance_fire(buildings, cover, links, state, constants)
+        kernels.advance_fire(buildings, cover, links, state, constants, fresh_warmth(n, state.air.shape))
         np.testing.assert_array_equal(state.fieryness, expected.fieryness, err_msg=f"step {step}")
         np.testing.assert_array_equal(state.fuel, expected.fuel)
         np.testing.assert_array_equal(state.water, expected.water)
@@ -85,8 +86,9 @@ def test_air_beyond_the_cells_stays_empty(city):
         cover_arrays(city, FireParameters()),
         link_arrays(city),
     )
+    warmth = fresh_warmth(city.n_buildings, state.air.shape)
     for _ in range(5):
-        kernels.advance_fire(buildings, cover, links, state, fire_constants(FireParameters()))
+        kernels.advance_fire(buildings, cover, links, state, fire_constants(FireParameters()), warmth)
     inside = state.air.copy()
     air_inside(city, inside)[:] = 0.0
     assert air_inside(city, state.air).all()

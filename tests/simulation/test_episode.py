@@ -9,7 +9,7 @@ from fireworld_recorder.chain import Digest
 from fireworld.errors import LogError
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.state import SCRATCH, copy_into, named_arrays, restore_snapshot, take_snapshot
-from tests.simulation.town import POLICIES, begin, play, policy_named, town_world
+from tests.simulation.town import POLICIES, Asked, begin, play, policy_named, town_world
 
 
 def assert_equal(world, other, *, scratch=True):
@@ -30,6 +30,16 @@ def test_the_episode_ends_in_the_same_arrays(name, seed, flush):
     assert run.run(policy_named(name).for_brigades(run.n_brigades)) == last
     assert_equal(run, stepped)
     assert 1 < last <= 60
+
+
+@pytest.mark.parametrize("choices", ["in-turn", "simultaneous"])
+@pytest.mark.parametrize("name", ["ranking-of-named", "ranking-of-all", "network-of-named", "network-of-all"])
+def test_a_crowd_ranks_alike_together_and_one_by_one(name, choices):
+    """In the episode brigades share what they make of the buildings; asked from Python, each begins anew."""
+    stepped, run = (town_world(seed=4, n_fires=9, n_brigades=13, choices=choices) for _ in range(2))
+    last = play(stepped, Asked(begin(policy_named(name), stepped)))
+    assert run.run(policy_named(name).for_brigades(run.n_brigades)) == last >= 4
+    assert_equal(run, stepped)
 
 
 def test_both_ends_of_an_episode_are_met():

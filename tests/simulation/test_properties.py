@@ -15,8 +15,10 @@ from fireworld.city.outlines import Building, assemble, centroid_mm
 from fireworld.draws import STEP, hash_key
 from fireworld.kernels.brigades import IDLE, REFILLING, SPRAYING, locate
 from fireworld.kernels.fire import draw_burn_rates
+from fireworld.kernels.warmth import begin as list_everything
+from fireworld.kernels.warmth import fresh_warmth
 from fireworld.parameters import PAPER
-from fireworld.simulation.city_arrays import air_inside, building_arrays, fire_constants
+from fireworld.simulation.city_arrays import air_inside, building_arrays, cover_arrays, fire_constants
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.state import copy_world, fresh_fire
 from tests.city.plans import rectangle, street_map
@@ -158,6 +160,13 @@ def block(*more):
     return build_city(plan, PAPER.fire, seed=1)
 
 
+def everything(city, fire):
+    """Lists of all buildings."""
+    warmth = fresh_warmth(city.n_buildings, fire.air.shape)
+    list_everything(cover_arrays(city, PAPER.fire), fire, warmth)
+    return warmth
+
+
 @given(seed=st.integers(0, 2**32 - 1), step=st.integers(1, 500))
 @settings(max_examples=30, deadline=None)
 def test_a_building_far_away_changes_no_draws(seed, step):
@@ -166,7 +175,7 @@ def test_a_building_far_away_changes_no_draws(seed, step):
     for city in (BLOCK, BLOCK_AND_FARM):
         fire, buildings = fresh_fire(city), building_arrays(city, PAPER.fire)
         fire.energy[:6] = buildings.capacity[:6] * 100.0
-        draw_burn_rates(buildings, fire, constants, seed, step)
+        draw_burn_rates(buildings, fire, constants, seed, step, everything(city, fire))
         rates.append(fire.rate[:6].tolist())
     assert rates[0] == rates[1]
     assert len(set(rates[0])) == 6
@@ -180,8 +189,8 @@ def test_the_draws_of_a_building_do_not_depend_on_what_else_burns():
     alone, together = fresh_fire(BLOCK), fresh_fire(BLOCK)
     alone.energy[3] = 1e6
     together.energy[:] = 1e6
-    total = draw_burn_rates(buildings, alone, constants, 4, 9)
-    draw_burn_rates(buildings, together, constants, 4, 9)
+    total = draw_burn_rates(buildings, alone, constants, 4, 9, everything(BLOCK, alone))
+    draw_burn_rates(buildings, together, constants, 4, 9, everything(BLOCK, together))
     assert alone.rate[3] == together.rate[3] == total
 
 

@@ -10,27 +10,13 @@ import pytest
 from fireworld.events import FIRE_EVENTS, NO_EVENT, fire_event
 from fireworld.kernels.arrays import DRAWS
 from fireworld.policy.asking import complete
-from fireworld.policy.protocol import Policy
 from fireworld.policy.words import FEATURES
 from fireworld.records import DTYPES, EVENT_KINDS, STEP_TOPICS, Draws, Observations, Rewards, Score, StepRecord, filled
 from fireworld.simulation.choices import Choices
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.state import REWARDS, SCORE, copy_world
 from tests.reference.observer import expected_fields
-from tests.simulation.town import POLICIES, begin, policy_named, town_world
-
-
-class Asked(Policy):
-    """Asks a policy that kernels could follow, brigade by brigade."""
-
-    def __init__(self, policy):
-        self._policy = policy
-
-    def decide(self, observation):
-        return self._policy.decide(observation)
-
-    def keeps(self, brigade, last_action, step):
-        return self._policy.keeps(brigade, last_action, step)
+from tests.simulation.town import POLICIES, Asked, begin, policy_named, town_world
 
 
 def assert_recorded(record, expected):

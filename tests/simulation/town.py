@@ -13,7 +13,9 @@ from fireworld.city.generator import generate_plan
 from fireworld.kernels.arrays import CityArrays
 from fireworld.parameters import PAPER, Parameters
 from fireworld.policy.kernel import KernelPolicy, always, at_random, each_another, from_rankings, from_tables
+from fireworld.policy.protocol import Policy
 from fireworld.rewards import Reward
+from fireworld.scenario.document import Choices
 from fireworld.simulation.city_arrays import city_arrays
 from fireworld.simulation.placement import Placement
 from fireworld.simulation.world import World, prepare_start
@@ -65,6 +67,19 @@ def policy_named(name: str) -> KernelPolicy:
     }[name]()
 
 
+class Asked(Policy):
+    """Asks a policy that kernels could follow, brigade by brigade."""
+
+    def __init__(self, policy):
+        self._policy = policy
+
+    def decide(self, observation):
+        return self._policy.decide(observation)
+
+    def keeps(self, brigade, last_action, step):
+        return self._policy.keeps(brigade, last_action, step)
+
+
 def town_world(
     *,
     seed: int,
@@ -73,6 +88,7 @@ def town_world(
     n_brigades: int = 3,
     flush: bool = True,
     reward: Reward | None = None,
+    choices: Choices = "in-turn",
     n_steps_max: int = 60,
 ) -> World:
     """A world whose fires and people lie where the seed says."""
@@ -88,7 +104,8 @@ def town_world(
         civilian_mm=city.footprints.centroid_mm[people],
         brigade_refuge=refuges[np.arange(n_brigades) % len(refuges)],
     )
-    start = prepare_start(city, small_tanks(flush=flush), placement, reward=reward, arrays=town_tables())
+    parameters = small_tanks(flush=flush)
+    start = prepare_start(city, parameters, placement, reward=reward, choices=choices, arrays=town_tables())
     return World(start, seed=seed, n_steps_max=n_steps_max)
 
 

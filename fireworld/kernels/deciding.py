@@ -1,0 +1,180 @@
+"""How the brigades of a team decide, one after another, in a step that has begun."""
+
+from __future__ import annotations
+
+from fireworld.kernels.arrays import BY_RANK, BY_TABLE, Array, Seen
+from fireworld.kernels.choice import GIVEN, RANK_ALL, RANK_NAMED, TABLE, choose, explores, keeps_choice, table_state
+from fireworld.kernels.episode_arrays import LAST_STEP, SEED, STEP, Episode
+from fireworld.kernels.jit import inner, kernel
+from fireworld.kernels.learning import (
+    EXPLORED,
+    GREEDY,
+    KEPT,
+    NO_CHOICE,
+    choose_and_learn,
+    go_on_and_learn,
+    note_choice,
+)
+from fireworld.kernels.observation import N_ACTIONS, can_choose, find_target, observe
+from fireworld.kernels.ranking import OWN_TARGET
+from fireworld.kernels.ranks import hear, line_up, line_up_before, rank_targets
+from fireworld.kernels.step import opened_episode, sight_of
+
+
+@kernel
+def decide_by_policy(row: Array, chosen: Array, before: Array, target_before: Array) -> None:
+    """Let some brigades decide, one after another; somebody else decides for the rest, in their turns.
+
+    Args:
+        row: (k,) int64, the address row of an `Episode`.
+        chosen: (m,) int64, their numbers.
+        before: (b,) int32, what all brigades did in the last step.
+        target_before: (b,) int32, what they went for.
+    """
+    episode = opened_episode(row)
+    in_turn, brigades = episode.constants.observation.in_turn, episode.world.brigades
+    shown, known = (brigades.action, brigades.target) if in_turn else (before, target_before)
+    for k in range(len(chosen)):
+        if len(episode.scratch.ranks.value) > 0:
+            line_up_before(chosen[k], known, episode.city.geometry, episode.world.sites, episode.scratch.ranks)
+        decide(chosen[k], episode.clock[STEP] + 1, before, shown, known, episode)
+
+
+@inner
+def decide_all(step: int, episode: Episode) -> None:
+    """Let all brigades decide."""
+    brigades, sites, scratch, seen = episode.world.brigades, episode.world.sites, episode.scratch, episode.seen
+    before, target_before, ranks = scratch.action_before, scratch.target_before, scratch.ranks
+    for brigade in range(len(brigades.action)):
+        before[brigade] = brigades.action[brigade]
+        target_before[brigade] = brigades.target[brigade]
+    if len(seen.state) > 0:
+        seen.valued[:] = 0
+    in_turn, ranking = episode.constants.observation.in_turn, len(ranks.value) > 0
+    shown, known = (brigades.action, brigades.target) if in_turn else (before, target_before)
+    if ranking:
+        line_up(known, episode.city.geometry, sites, ranks)
+    for brigade in range(len(brigades.action)):
+        decide(brigade, step, before, shown, known, episode)
+        if ranking:
+            hear(brigade, target_before[brigade], known[brigade], episode.city.geometry, sites, ranks)
+
+
+@inner
+def decide(brigade: int, step: int, before: Array, shown: Array, known: Array, episode: Episode) -> None:
+    """Let a brigade decide; after the last step, it only learns from that.
+
+    Args:
+        brigade: its number.
+        step: the one that has begun.
+        before: (b,) int32, what all brigades did in the last step.
+        shown: (b,) int32, what they do as far as this one knows, -1 nothing.
+        known: (b,) int32, what they go for as far as this one knows, -1 nothing.
+        episode: the world, the team, and where it is noted.
+    """
+    city, world, learner, seen = episode.city, episode.world, episode.learner, episode.seen
+    brigades, sites = world.brigades, world.sites
+    action, target, choice = -1, -1, NO_CHOICE
+    if len(seen.state) > 0:
+        seen.state[brigade] = state_of(brigade, shown, episode, seen.features[brigade])
+        seen.action_values[brigade] = 0.0
+        seen.target_value[brigade] = 0.0
+    if learner.learning[0] != 0:
+        note_choice(brigade, step - 1, -1, 0, NO_CHOICE, learner)
+    if can_choose(brigade, brigades.hp, brigades.refilling, sites.counts):
+        action, target, choice = decide_by_kind(brigade, step, before, shown, known, episode)
+        if target < 0:
+            target = find_target(brigade, action, brigades, city.buildings, world.fire, city.geometry, sites)
+    brigades.action[brigade], brigades.target[brigade] = action, target
+    if len(seen.state) > 0:
+        seen.choice[brigade], seen.explored[brigade] = choice, choice == EXPLORED
+
+
+@inner
+def decide_by_kind(
+    brigade: int, step: int, before: Array, shown: Array, known: Array, episode: Episode
+) -> tuple[int, int, int]:
+    """Return the action of a brigade that can choose, its target if it names one, else -1, and how it came to it."""
+    policy = episode.policy
+    kind, target = policy.kind[brigade], -1
+    if keeps_choice(brigade, before[brigade], policy.commit[0], step):
+        action, choice = before[brigade], KEPT
+        if episode.learner.learning[0] != 0:
+            learn_from_kept(brigade, action, step, shown, episode)
+    elif kind == GIVEN:
+        action, choice = policy.action[brigade], GREEDY
+        if action == OWN_TARGET:
+            target = policy.table_of[brigade]
+    elif kind in (RANK_NAMED, RANK_ALL):
+        choice = GREEDY
+        action, target = decide_by_worth(brigade, step, known, episode)
+    else:
+        action, choice = decide_by_state(brigade, step, shown, episode)
+    return action, target, choice
+
+
+@inner
+def state_of(brigade: int, shown: Array, episode: Episode, features: Array) -> int:
+    """Return the state that a brigade sees, and write the (8,) features that it stands for."""
+    brigades, observation = episode.world.brigades, episode.constants.observation
+    return observe(brigade, shown, brigades.site, episode.world.sites, observation, features)
+
+
+@inner
+def decide_by_state(brigade: int, step: int, shown: Array, episode: Episode) -> tuple[int, int]:
+    """Return the action of a brigade that decides by the state it sees, and how it came to it; it learns if it may."""
+    policy, learner, seen, seed = episode.policy, episode.learner, episode.seen, episode.clock[SEED]
+    state = state_of(brigade, shown, episode, episode.scratch.features)
+    action = choose(brigade, state, policy, seed, step)
+    choice = EXPLORED if explores(brigade, policy, seed, step) else GREEDY
+    row, table = table_state(state, policy.tables.shape[1]), policy.table_of[brigade]
+    if len(seen.state) > 0 and policy.kind[brigade] == TABLE:
+        note_values(brigade, policy.tables[table, row], BY_TABLE, seen)
+    if learner.learning[0] != 0:
+        choose_and_learn(brigade, table, row, action, policy.epsilon[0], learner)
+        note_choice(brigade, step - 1, state, action, choice, learner)
+    return action, choice
+
+
+@inner
+def learn_from_kept(brigade: int, action: int, step: int, shown: Array, episode: Episode) -> None:
+    """Note that a brigade keeps its choice; after the last step, learn from it."""
+    policy, learner, state = episode.policy, episode.learner, -1
+    if step > episode.clock[LAST_STEP]:
+        state = state_of(brigade, shown, episode, episode.scratch.features)
+        go_on_and_learn(brigade, policy.table_of[brigade], table_state(state, policy.tables.shape[1]), action, learner)
+    note_choice(brigade, step - 1, state, action, KEPT, learner)
+
+
+@inner
+def decide_by_worth(brigade: int, step: int, known: Array, episode: Episode) -> tuple[int, int]:
+    """Return the action and the target of a brigade that decides by what targets are worth to it."""
+    policy, scratch, seen = episode.policy, episode.scratch, episode.seen
+    noting, ranking = len(seen.state) > 0, policy.table_of[brigade]
+    action, target = rank_targets(
+        brigade,
+        policy.kind[brigade] == RANK_ALL,
+        noting,
+        ranking,
+        step,
+        known,
+        policy.rankings[ranking],
+        policy.network,
+        sight_of(episode.city, episode.world, episode.constants, scratch),
+        scratch.ranks,
+        scratch.seen,
+        scratch.work,
+        scratch.values,
+    )
+    if noting:
+        note_values(brigade, scratch.values, BY_RANK, seen)
+        seen.target_value[brigade] = scratch.values[N_ACTIONS]
+    return action, target
+
+
+@inner
+def note_values(brigade: int, values: Array, source: int, seen: Seen) -> None:
+    """Note the values of the actions, (4,), by which a brigade chose; `source`: BY_TABLE or BY_RANK."""
+    seen.valued[source] = 1
+    for action in range(N_ACTIONS):
+        seen.action_values[brigade, action] = values[action]

@@ -1,0 +1,105 @@
+"""The arrays of an episode: a world on its way, and what its steps write on; n buildings, b brigades."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from fireworld.kernels.arrays import (
+    CityArrays,
+    Constants,
+    Float64,
+    Float64x2,
+    Int32,
+    Int64,
+    Learner,
+    PolicyArrays,
+    Seen,
+    UInt8,
+    UInt8x2,
+    UInt32,
+    UInt64,
+    WorldState,
+)
+
+
+class Ranks(NamedTuple):
+    """What the brigades that value targets make of the burning buildings in a step, in the order of `SiteState.member`.
+
+    n buildings, b brigades. It begins anew with every step: `fireworld.kernels.ranks.line_up`.
+    """
+
+    x: Float64  # (n,), mm
+    y: Float64
+    needed: Float64  # (n,), brigades that would put it out in one step
+    worth: Float64  # (n,), weighted sum of what all see alike of it
+    n_here: Float64  # (n,), brigades that go for it
+    nearness: Float64x2  # (b, n), how near it is to what each brigade goes for, 0 to 1
+    near_before: Float64  # (n,), that of the brigades before the one that chooses, added up
+    near: Float64  # (n,), that of all others
+    value: Float64  # (n,), of the brigade that chooses
+    position: Int32  # (n,), by building: where it stands
+    weighed: Int32  # (n,), the ranking of `worth`, -1 none
+
+
+class Warmth(NamedTuple):
+    """Where heat is, or may come in a step; n buildings in blocks of 64. Every call of a kernel makes it anew.
+
+    How long the lists are is in `number`: `fireworld.kernels.warmth`.
+    """
+
+    number: Int64  # (NUMBERS,), named below
+    n_of_code: Int64  # (9,), buildings of each code
+    block: UInt32  # (blocks,), rising: blocks in which something is or may become warm, or changes its code
+    visit: UInt32  # (n,), buildings over air that may be warm, in the order of visits
+    block_bits: UInt64  # a bit for each block: in `block`
+    visit_bits: UInt64  # a bit for each position in the order of visits: in `visit`
+    is_doubtful: UInt8  # (blocks,), 1: codes in it may change without heat enough to burn
+    unknown: Float64  # (n,), 0 where all that a building's heat can reach is listed; else 1
+    tile: UInt8x2  # (tile rows, tiles in a row), 1: the buildings over that tile of air are listed
+    waiting: UInt64  # a bit for each building: it burns, and no site has it yet; 0 but while that is found
+    burning: UInt32  # (n,), scratch
+    x: Float64  # (n,), scratch
+    y: Float64  # (n,), scratch
+    square: Float64  # (n,), scratch
+    emitted: Float64  # (n,), scratch
+    code: UInt8  # (n,), scratch
+    row: Float64x2  # (2, pitch), scratch
+
+
+N_BLOCKS, N_VISITS, N_KNOWN, ALL = 0, 1, 2, 3
+"""What is where in `Warmth.number`: how long the lists are; how many buildings are known; 1 once all are listed."""
+BLOCKS_CHANGED, VISITS_CHANGED, SITES_CHANGED, SITES_KNOWN, AGE, NUMBERS = 4, 5, 6, 7, 8, 9
+"""And, 0 or 1: whether more is to be listed; whether fire sites can be others than when they were found; whether they
+have been found since the call began. Then, steps since the call began. Last, how many numbers there are."""
+
+
+class Scratch(NamedTuple):
+    """What the steps of an episode write on; b brigades."""
+
+    features: Int64  # (8,)
+    action_before: Int32  # (b,)
+    target_before: Int32  # (b,)
+    values: Float64  # (5,)
+    described: Float64x2  # (n, 7); no rows where nobody ranks or sees them
+    described_at: Int64  # (n,), -1 at first
+    ranks: Ranks  # of n buildings, 0 where nobody ranks
+    warmth: Warmth
+    seen: Float64  # (17,)
+    work: Float64x2  # (2, w), w as `widest` says of the policy's network
+
+
+class Episode(NamedTuple):
+    """A world on its way, and all that takes part in it."""
+
+    city: CityArrays
+    constants: Constants
+    world: WorldState
+    policy: PolicyArrays
+    learner: Learner
+    seen: Seen
+    scratch: Scratch
+    clock: Int64  # (3,): seed, last step done, last step to do
+
+
+SEED, STEP, LAST_STEP = 0, 1, 2
+"""Places in the clock."""
