@@ -217,7 +217,9 @@ def _by_name(text: str, more: Parameters) -> NamedPolicy:
         policy = make(**values)
         return NamedPolicy(name, policy.digest, policy, given=name)
     if ":" not in text and "." not in text:
-        raise _unknown(text)
+        if not Path(f"{text}{CODE_SUFFIX}").is_file():
+            raise _unknown(text)
+        source = f"{text}{CODE_SUFFIX}"
     module = import_source(source)
     thing = find_in(module, target or "", where=f"--policy: {source}")
     policy = make_policy(thing, values, where=where)
@@ -261,7 +263,5 @@ def _unknown(name: str) -> PolicyError:
     """Return the error for a name that no policy has."""
     names, meant = [*BUILT_IN, *PLANNERS, *team_names()], name.lower()
     near = [known for known in names if meant and meant in known] or get_close_matches(meant, names, n=1)
-    if name and Path(f"{name}{CODE_SUFFIX}").is_file():
-        near = [f"{name}{CODE_SUFFIX}"]
     hint = "try " + " or ".join(near) if near else "FILE.py:CLASS or MODULE:CLASS names one of your own"
     return PolicyError(expected("--policy", "", "one of " + ", ".join(names), name, hint))
