@@ -190,6 +190,14 @@ class ObservationConstants(NamedTuple):
     civilian_medium_square: float
     unit_volume: float
     in_turn: bool  # brigades see what those before them chose in this step; if not, what all chose in the last
+    volume_growth: float  # of the thresholds of the volume, one after another
+    own_flags: bool  # the flags tell of the brigade itself, too
+    flags: int  # what they tell: 0 the action, 1 the target, 2 the target that is sprayed
+    edge_by_city: bool  # a side is free where the city goes on beyond it
+    west: float  # mm, of the centroids of all that can burn
+    south: float
+    east: float
+    north: float
 
 
 class Constants(NamedTuple):

@@ -26,10 +26,11 @@ from fireworld.kernels.arrays import (
     UInt8x2,
     UInt8x3,
 )
+from fireworld.kernels.deciding import state_of
 from fireworld.kernels.episode_arrays import HOLDS_AFTER, LAST_STEP, SEED, STEP, Episode
 from fireworld.kernels.fire import is_over
 from fireworld.kernels.jit import inner, kernel
-from fireworld.kernels.observation import N_ACTIONS, can_choose, find_target, observe, site_place
+from fireworld.kernels.observation import N_ACTIONS, can_choose, find_target, site_place
 from fireworld.kernels.outcome import score
 from fireworld.kernels.ranking import N_TARGET_FEATURES, OWN_TARGET, describe_building, see_target
 from fireworld.kernels.step import begin_step, finish_step, opened_episode, sight_of
@@ -182,6 +183,8 @@ def show(i: int, episode: Episode, batch: Batch) -> None:
     team[4] = outcome.counts[3] / n_civilians
     team[5] = outcome.score[0] / outcome.score[1]
     for brigade in range(len(world.brigades.action)):
+        episode.scratch.target_before[brigade] = world.brigades.target[brigade]
+    for brigade in range(len(world.brigades.action)):
         show_brigade(brigade, i, episode, batch)
     if len(view.burning):
         show_buildings(i, episode, view)
@@ -190,11 +193,9 @@ def show(i: int, episode: Episode, batch: Batch) -> None:
 @inner
 def show_brigade(brigade: int, i: int, episode: Episode, batch: Batch) -> None:
     """Write what a brigade of world i sees."""
-    world, constants, view = episode.world, episode.constants, batch.shown
+    world, view = episode.world, batch.shown
     brigades, sites = world.brigades, world.sites
-    view.state[i, brigade] = observe(
-        brigade, brigades.action, brigades.site, sites, constants.observation, view.features[i, brigade]
-    )
+    view.state[i, brigade] = state_of(brigade, brigades.action, episode, view.features[i, brigade])
     chooses = can_choose(brigade, brigades.hp, brigades.refilling, sites.counts)
     view.alive[i, brigade], view.chooses[i, brigade] = brigades.hp[brigade] > 0, chooses
     mask, own = view.mask[i, brigade], view.own[i, brigade]

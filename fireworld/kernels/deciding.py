@@ -15,7 +15,7 @@ from fireworld.kernels.learning import (
     go_on_and_learn,
     note_choice,
 )
-from fireworld.kernels.observation import N_ACTIONS, can_choose, find_target, observe
+from fireworld.kernels.observation import BY_ACTION, N_ACTIONS, can_choose, find_target, flag_targets, observe
 from fireworld.kernels.ranking import OWN_TARGET
 from fireworld.kernels.ranks import hear, line_up, line_up_before, rank_targets
 from fireworld.kernels.step import opened_episode, sight_of
@@ -33,6 +33,8 @@ def decide_by_policy(row: Array, chosen: Array, before: Array, target_before: Ar
     """
     episode = opened_episode(row)
     in_turn, brigades = episode.constants.observation.in_turn, episode.world.brigades
+    for brigade in range(len(target_before)):
+        episode.scratch.target_before[brigade] = target_before[brigade]
     shown, known = (brigades.action, brigades.target) if in_turn else (before, target_before)
     for k in range(len(chosen)):
         if len(episode.scratch.ranks.value) > 0:
@@ -116,8 +118,13 @@ def decide_by_kind(
 @inner
 def state_of(brigade: int, shown: Array, episode: Episode, features: Array) -> int:
     """Return the state that a brigade sees, and write the (8,) features that it stands for."""
-    brigades, observation = episode.world.brigades, episode.constants.observation
-    return observe(brigade, shown, brigades.site, episode.world.sites, observation, features)
+    world, constants = episode.world, episode.constants.observation
+    brigades, sites, city = world.brigades, world.sites, episode.city
+    state = observe(brigade, shown, brigades.site, sites, constants, features)
+    if constants.flags == BY_ACTION:
+        return state
+    known = brigades.target if constants.in_turn else episode.scratch.target_before
+    return flag_targets(brigade, known, brigades, city.buildings, world.fire, city.geometry, sites, constants, features)
 
 
 @inner

@@ -12,6 +12,14 @@ from fireworld.kernels.observation import N_ACTIONS
 SARSA, EXPECTED_SARSA, Q_LEARNING = 0, 1, 2
 NO_CHOICE, GREEDY, EXPLORED, KEPT = 0, 1, 2, 3
 """Positions in fireworld.records.CHOICES."""
+UNTRIED = -1e300
+"""The value of what was never tried, where the greedy choice leaves that out: its first visit sets it."""
+
+
+@inner
+def known(value: float) -> float:
+    """Return what is known of a value: nothing, 0, of what was never tried."""
+    return 0.0 if value == UNTRIED else value
 
 
 @inner
@@ -22,11 +30,12 @@ def value_of(rule: int, values: Array, action: int, epsilon: float) -> float:
     highest.
     """
     if rule == SARSA:
-        return values[action]
+        return known(values[action])
     best, total = values[0], 0.0
     for k in range(N_ACTIONS):
         best = max(best, values[k])
-        total += values[k]
+        total += known(values[k])
+    best = known(best)
     return best if rule == Q_LEARNING else (1.0 - epsilon) * best + epsilon * total / N_ACTIONS
 
 
@@ -41,10 +50,14 @@ def update(brigade: int, table: int, next_value: float, learner: Learner) -> Non
     state, action = learner.state[brigade], learner.action[brigade]
     if state < 0:
         return
-    error = learner.reward[brigade] + learner.discount[brigade] * next_value - learner.tables[table, state, action]
+    before = learner.tables[table, state, action]
+    error = learner.reward[brigade] + learner.discount[brigade] * next_value - known(before)
     visits = learner.visits[table, state, action]
     learner.visits[table, state, action] = visits + 1
-    learner.tables[table, state, action] += learner.alpha[0] / (1.0 + learner.alpha_decay[0] * visits) * error
+    if before == UNTRIED:
+        learner.tables[table, state, action] = error
+    else:
+        learner.tables[table, state, action] += learner.alpha[0] / (1.0 + learner.alpha_decay[0] * visits) * error
     learner.td_error[brigade] = error
 
 
@@ -64,7 +77,7 @@ def go_on_and_learn(brigade: int, table: int, state: int, action: int, learner: 
     It would repeat that action, so what comes next is worth the action's value where the brigade is by now: by any
     rule, for there is nothing to choose.
     """
-    update(brigade, table, learner.tables[table, state, action], learner)
+    update(brigade, table, known(learner.tables[table, state, action]), learner)
 
 
 @kernel

@@ -16,6 +16,8 @@ from fireworld.kernels.jit import inner, kernel
 N_ACTIONS = 4
 EASIEST, NEAREST_TO_CIVILIAN, NEAREST_TO_CENTER, NEAREST_TO_ME = 0, 1, 2, 3
 N_FEATURES = 8
+BY_ACTION, BY_TARGET, BY_SPRAY = 0, 1, 2
+"""What the flags tell: what is chosen; which of the four targets is gone for; or sprayed."""
 
 
 @inner
@@ -27,15 +29,26 @@ def level(square: float, low: float, medium: float) -> int:
 
 
 @inner
-def volume_class(volume: float, unit: float) -> int:
-    """Class a burning volume: thresholds 1, 2, 4, 8, 16 times the unit volume."""
+def volume_class(volume: float, unit: float, growth: float) -> int:
+    """Class a burning volume: the thresholds are the unit volume, and 4 more, each `growth` times the one before."""
     found = 0
     bound = unit
     for _ in range(5):
         if volume >= bound:
             found += 1
-        bound *= 2.0
+        bound *= growth
     return found
+
+
+@inner
+def sides_in_city(site: int, sites: SiteState, constants: ObservationConstants) -> int:
+    """Return beyond how many sides of a site's box the city goes on."""
+    return (
+        (sites.north[site] < constants.north)
+        + (sites.east[site] < constants.east)
+        + (sites.south[site] > constants.south)
+        + (sites.west[site] > constants.west)
+    )
 
 
 @inner
@@ -82,11 +95,13 @@ def observe(
         return -1
     sides = sites.free_sides[site]
     features[0] = (sides & 1) + (sides >> 1 & 1) + (sides >> 2 & 1) + (sides >> 3 & 1)
+    if constants.edge_by_city:
+        features[0] = sides_in_city(site, sites, constants)
     features[1] = level(sites.center_square[site], constants.center_low_square, constants.center_medium_square)
     features[2] = level(sites.civilian_square[site], constants.civilian_low_square, constants.civilian_medium_square)
-    features[3] = volume_class(sites.volume[site], constants.unit_volume)
+    features[3] = volume_class(sites.volume[site], constants.unit_volume, constants.volume_growth)
     for other in range(len(actions)):
-        if other != brigade and 0 <= actions[other] < N_ACTIONS:
+        if (other != brigade or constants.own_flags) and 0 <= actions[other] < N_ACTIONS:
             features[4 + actions[other]] = 1
     return state_index(features)
 
@@ -124,6 +139,35 @@ def find_target(
         ):
             best, best_measure = b, measure
     return best
+
+
+@kernel
+def flag_targets(
+    brigade: int,
+    known: Array,
+    brigades: BrigadeState,
+    buildings: BuildingArrays,
+    fire: FireState,
+    geometry: GeometryArrays,
+    sites: SiteState,
+    constants: ObservationConstants,
+    features: Array,
+) -> int:
+    """Write the flags anew where they tell of targets: does another go for what the action would name for me?
+
+    `known` (b,) are the targets of the brigades as far as this one knows, -1 none; `features` (8,) are those of
+    `observe`. Returns the state, -1 without a site.
+    """
+    if site_place(brigade, brigades.site, sites) < 0:
+        return -1
+    for action in range(N_ACTIONS):
+        target, flag = find_target(brigade, action, brigades, buildings, fire, geometry, sites), 0
+        for other in range(len(known)):
+            told = (other != brigade or constants.own_flags) and known[other] == target
+            if told and (constants.flags == BY_TARGET or brigades.sprayed[other] > 0):
+                flag = 1
+        features[4 + action] = flag
+    return state_index(features)
 
 
 @kernel

@@ -16,13 +16,13 @@ from msgspec import Meta, Struct
 
 from fireworld import rewards
 from fireworld.parameters import PRESETS, BrigadeParameters, FireParameters, HealthParameters, Parameters
+from fireworld.scenario.observed import Fraction, Metres, Observed
 
 Preset = Literal["official-2011", "official-2013", "paper"]
 Choices = Literal["in-turn", "simultaneous"]
 Direction = Literal["N", "E", "S", "W"]
 DIRECTIONS: Final[tuple[Direction, ...]] = ("N", "E", "S", "W")
 
-Fraction = Annotated[float, Meta(ge=0, le=1)]
 Point = tuple[Fraction, Fraction]
 """A place as fractions of the city's bounding box: x from west to east, y from south to north."""
 LOTS_MAX: Final = 500_000
@@ -30,7 +30,6 @@ LOTS_MAX: Final = 500_000
 SIDE_MAX: Final = 10_000
 Seed = Annotated[int, Meta(ge=0, le=2**32 - 1)]
 BuildingIds = Annotated[tuple[int, ...], Meta(min_length=1)]
-Metres = Annotated[float, Meta(ge=0, le=1e6)]
 
 POSITIVE: Final = Meta(gt=0, le=1e9)
 SHARE: Final = Meta(ge=0, le=1)
@@ -261,6 +260,9 @@ class Document(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Annotated[float, POSITIVE] | None,
         Meta(description="Unit of the burning volume a brigade sees; null is twice the mean building volume."),
     ] = None
+    observation: Annotated[
+        Observed | None, Meta(description="What brigades see, where it is not as in the model; null: as there.")
+    ] = None
 
 
 DocumentT = TypeVar("DocumentT", bound=Document)
@@ -312,6 +314,10 @@ def broken_rules(document: Document) -> Iterator[tuple[str, str, object]]:
     if civilians.to_m is not None and civilians.to_m < civilians.from_m:
         yield "civilians.to_m", f"at least from_m ({civilians.from_m})", civilians.to_m
     yield from _repeated("civilians.directions", civilians.directions)
+    for key in ("center_shares", "civilian_m"):
+        low, high = getattr(document.observation, key, None) or (0.0, 0.0)
+        if low > high:
+            yield f"observation.{key}", "the lower threshold before the higher", f"the list {[low, high]}"
     if not any(resolve_reward(document).weights):
         names = ", ".join(term.name for term in rewards.TERMS)
         yield "reward", f"a weight other than 0 for one of {names}", "none of them"

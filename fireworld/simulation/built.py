@@ -46,6 +46,7 @@ class BuiltScenario:
             reward=resolve_reward(scenario),
             choices=scenario.choices,
             unit_volume_m3=scenario.unit_volume_m3,
+            observed=scenario.observation,
             arrays=self.city_arrays,
         )
 

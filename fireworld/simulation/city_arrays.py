@@ -24,6 +24,7 @@ from fireworld.kernels.arrays import (
 from fireworld.kernels.fire import STEFAN_BOLTZMANN
 from fireworld.kernels.warmth import TILE, WORD, tiles_of
 from fireworld.parameters import BrigadeParameters, FireParameters, HealthParameters
+from fireworld.scenario.observed import FLAGS, Observed
 
 CIVILIAN_LOW_M = 30.0
 CIVILIAN_MEDIUM_M = 80.0
@@ -260,18 +261,34 @@ def brigade_constants(brigades: BrigadeParameters) -> BrigadeConstants:
     )
 
 
-def observation_constants(city: City, unit_volume_m3: float | None, *, in_turn: bool) -> ObservationConstants:
+def observation_constants(
+    city: City, unit_volume_m3: float | None, *, in_turn: bool, observed: Observed | None = None
+) -> ObservationConstants:
     """Derive the thresholds of the features: thirds of the half diagonal, 30 and 80 m, the unit volume."""
+    seen = Observed() if observed is None else observed
     third = city.half_diagonal_mm / 3.0
+    near, far = third * third, 4.0 * third * third
+    if seen.center_shares is not None:
+        near, far = ((share * city.half_diagonal_mm) ** 2 for share in seen.center_shares)
     mean_volume = math.fsum(city.volume_m3.tolist()) / city.n_buildings
-    low, medium = CIVILIAN_LOW_M * 1000.0, CIVILIAN_MEDIUM_M * 1000.0
+    low, medium = (length * 1000.0 for length in seen.civilian_m or (CIVILIAN_LOW_M, CIVILIAN_MEDIUM_M))
+    places, burns = city.footprints.centroid_mm, city.footprints.inflammable != 0
+    places = places[burns] if burns.any() else places
     return ObservationConstants(
-        center_low_square=third * third,
-        center_medium_square=4.0 * third * third,
+        center_low_square=near,
+        center_medium_square=far,
         civilian_low_square=low * low,
         civilian_medium_square=medium * medium,
         unit_volume=float(unit_volume_m3) if unit_volume_m3 is not None else 2.0 * mean_volume,
         in_turn=in_turn,
+        volume_growth=2.0 if seen.volume_growth is None else float(seen.volume_growth),
+        own_flags=seen.flags_of == "all",
+        flags=FLAGS.index(seen.flags or "action"),
+        edge_by_city=seen.free_edges == "city",
+        west=float(places[:, 0].min()),
+        south=float(places[:, 1].min()),
+        east=float(places[:, 0].max()),
+        north=float(places[:, 1].max()),
     )
 
 

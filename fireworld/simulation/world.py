@@ -16,7 +16,7 @@ from fireworld.kernels.addresses import address_row
 from fireworld.kernels.arrays import BURNING, Array, CityArrays, Constants, Learner, PolicyArrays, Seen, WorldState
 from fireworld.kernels.episode_arrays import SEED, STEP
 from fireworld.kernels.fire import ignite
-from fireworld.kernels.observation import can_choose, observe
+from fireworld.kernels.observation import BY_ACTION, can_choose, flag_targets, observe
 from fireworld.kernels.outcome import assess
 from fireworld.kernels.step import finish, look
 from fireworld.outcome import Outcome, outcome_at
@@ -26,6 +26,7 @@ from fireworld.policy.kernel import KernelPolicy, given
 from fireworld.policy.protocol import Action, Decision, Observation, Policy, named_target
 from fireworld.rewards import Reward, reward_of
 from fireworld.scenario import document
+from fireworld.scenario.observed import Observed
 from fireworld.simulation.bound import NOTHING_SEEN, Bound, bind, fresh_seen
 from fireworld.simulation.choices import Choices, NotedChoices
 from fireworld.simulation.city_arrays import (
@@ -78,6 +79,7 @@ def prepare_start(
     reward: Reward | None = None,
     choices: document.Choices = "in-turn",
     unit_volume_m3: float | None = None,
+    observed: Observed | None = None,
     arrays: CityArrays | None = None,
 ) -> Start:
     """Place everybody in a city and set it on fire; arguments are named as in a scenario.
@@ -92,7 +94,7 @@ def prepare_start(
         fire=fire_constants(parameters.fire),
         health=health_constants(parameters.health),
         brigades=brigade_constants(parameters.brigades),
-        observation=observation_constants(city, unit_volume_m3, in_turn=choices == "in-turn"),
+        observation=observation_constants(city, unit_volume_m3, in_turn=choices == "in-turn", observed=observed),
         reward=reward if reward is not None else reward_of("stock"),
     )
     state = fresh_world(city, arrays.streets, parameters, placement)
@@ -165,7 +167,7 @@ class World:
         brigades, sites, features = ahead.state.brigades, ahead.state.sites, np.zeros(8, dtype=np.int64)
         known, seen = brigades.target.copy(), list[Observation | None]()
         for brigade in range(self.n_brigades):
-            state = int(observe(brigade, brigades.action, brigades.site, sites, self.constants.observation, features))
+            state = ahead._see(brigade, brigades.action, known, features)  # noqa: SLF001
             decides = can_choose(brigade, brigades.hp, brigades.refilling, sites.counts)
             seen.append(ahead._observation(brigade, features, state, known) if decides else None)  # noqa: SLF001
         return tuple(seen)
@@ -268,7 +270,7 @@ class World:
         """
         brigades, sites, thresholds = self.state.brigades, self.state.sites, self.constants.observation
         shown, known = (brigades.action, brigades.target) if thresholds.in_turn else (before, target_before)
-        state = int(observe(brigade, shown, brigades.site, sites, thresholds, features))
+        state = self._see(brigade, shown, known, features)
         decision, target = NO_DECISION, -1
         if can_choose(brigade, brigades.hp, brigades.refilling, sites.counts):
             last = Decision(int(before[brigade]), target=int(target_before[brigade]))
@@ -279,6 +281,16 @@ class World:
             target = self._target(brigade, decision)
         brigades.action[brigade], brigades.target[brigade] = decision.action, target
         return state, decision
+
+    def _see(self, brigade: int, shown: Array, known: Array, features: Array) -> int:
+        """Write the (8,) features that a brigade sees and return its state; (b,) actions and targets that it knows."""
+        brigades, sites, fire = self.state.brigades, self.state.sites, self.state.fire
+        constants, city = self.constants.observation, self.city_arrays
+        state = observe(brigade, shown, brigades.site, sites, constants, features)
+        if constants.flags != BY_ACTION:
+            where = brigades, city.buildings, fire, city.geometry, sites
+            state = flag_targets(brigade, known, *where, constants, features)
+        return int(state)
 
     def _can_keep(self, brigade: int, last: Decision) -> bool:
         """Return whether a choice can be repeated: a target of its own only while it burns in the brigade's site."""

@@ -283,6 +283,15 @@ def train_all(trainings: Sequence[Training], *, jobs: int | None = None, callbac
                 raise training.error
 
 
+SINCE: Final[Mapping[str, Any]] = {
+    "epsilon_first": 1.0,
+    "epsilon_schedule": "scenario",
+    "untried": "best",
+    "draw_last": False,
+}
+"""Hyperparameters that older files do not have, and what they were by then."""
+
+
 def check_same(found: Mapping[str, Any], identity: Mapping[str, Any], path: Path) -> None:
     """Check that work was begun with what is asked for now; name the first key that differs.
 
@@ -296,6 +305,8 @@ def check_same(found: Mapping[str, Any], identity: Mapping[str, Any], path: Path
     """
     for key, wanted in identity.items():
         got = found.get(key)
+        if key == "method" and isinstance(got, dict):
+            got = {name: value for name, value in SINCE.items() if name in wanted} | got
         if got == wanted:
             continue
         if isinstance(got, dict) and isinstance(wanted, dict):

@@ -57,7 +57,7 @@ def test_levels_begin_at_their_thresholds(square_, expected):
     [(0, 0), (9.99, 0), (10, 1), (19.99, 1), (20, 2), (40, 3), (79.99, 3), (80, 4), (159.99, 4), (160, 5), (1e9, 5)],
 )
 def test_volume_thresholds_double(volume, expected):
-    assert volume_class(float(volume), 10.0) == expected
+    assert volume_class(float(volume), 10.0, 2.0) == expected
 
 
 @pytest.mark.parametrize(

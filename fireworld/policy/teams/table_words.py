@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from fireworld.kernels.learning import UNTRIED
 from fireworld.policy.teams.team import TeamDifference
 from fireworld.policy.words import FEATURES, N_OWN, N_STATES, describe_state, features_of, short_state
 from fireworld.records import ACTIONS
@@ -161,4 +162,6 @@ def describe_choices(text: str, chosen: Sequence[Sequence[Choice]], *, n_states:
 
 
 def _number(value: float) -> str:
+    if value == UNTRIED:
+        return "never tried"
     return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.4g}"

@@ -14,7 +14,7 @@ from fireworld.draws import TABLE, below
 from fireworld.errors import LogError, TrainingError, expected
 from fireworld.executors import Workers
 from fireworld.kernels.arrays import Array, Learner, PolicyArrays, Trace
-from fireworld.kernels.learning import learn_again
+from fireworld.kernels.learning import UNTRIED, learn_again
 from fireworld.policy.kernel import from_tables
 from fireworld.policy.teams.table_team import COMMIT_MAX, TableTeam, agreement, tables_digest
 from fireworld.policy.teams.team import Team
@@ -31,6 +31,7 @@ from fireworld.training.method import Count, Limits, Method, NotNegative, Play, 
 from fireworld.training.seeds import episode_seed
 
 Rule = Literal["sarsa", "expected-sarsa", "q-learning"]
+EpsilonSchedule = Literal["scenario", "compounding", "training"]
 REPORTED: Final = (
     "episode", "epsilon", "n_steps", "score", "score_max", "total_reward", "n_burnt_out", "n_changed", "n_unchanged",
     "converged",
@@ -59,8 +60,14 @@ class Sarsa(Method):
     """The n-th visit of a state and action learns at alpha / (1 + alpha_decay * (n - 1))."""
     gamma: Share = 0.5
     """Discount of the next step."""
+    epsilon_first: Share = 1.0
+    """Probability of exploring in the first episode."""
     epsilon_decay: Share = 0.9
-    """Episode k of a scenario explores with probability epsilon_decay ** k, k from 0."""
+    """Episode k explores with probability epsilon_first * epsilon_decay ** k, k from 0."""
+    epsilon_schedule: EpsilonSchedule = "scenario"
+    """How k counts: anew in every `scenario`, `compounding` to k (k + 1) / 2, or on through the whole `training`."""
+    untried: Literal["best", "ignored"] = "best"
+    """Values begin at 0, above all that was tried; or the greedy choice ignores them, and the first visit sets them."""
     n_episodes_max: Count = 130
     """Episodes of a scenario at most."""
     n_episodes_unchanged: Count = 20
@@ -75,6 +82,18 @@ class Sarsa(Method):
     """Whether brigades see what those before them chose in this step."""
     commit: Commit = 1
     """Steps that a choice is kept for."""
+    draw_last: bool = False
+    """After the last scenario, too, one table is drawn for all: brigades are tested with the same one."""
+
+    def epsilon(self, episode: int, *, before: int) -> float:
+        """Return the probability of exploring.
+
+        Args:
+            episode: its number in the scenario, from 0.
+            before: episodes of the training before that scenario.
+        """
+        counts = {"scenario": episode, "compounding": episode * (episode + 1) // 2, "training": before + episode}
+        return self.epsilon_first * _power(self.epsilon_decay, counts[self.epsilon_schedule])
 
     def trainer(self, curriculum: Curriculum, *, seed: int, cities: CityCache | None = None) -> SarsaTrainer:
         """Return what trains one team; see `Method.trainer`."""
@@ -143,6 +162,8 @@ class Progress:
     n_unchanged: int = 0
     tables: Array = field(default_factory=lambda: np.zeros((1, N_STATES_ALONE, 4)))
     visits: Array = field(default_factory=lambda: np.zeros((1, N_STATES_ALONE, 4), dtype=np.int64))
+    n_before: int = 0
+    """Episodes of the scenarios before."""
 
 
 class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
@@ -181,7 +202,8 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         self._cities = cities if cities is not None else CityCache()
         self._plan = [(stage, scenario) for stage in curriculum.stages for scenario in stage.scenarios]
         shape = self.shape(0)
-        untrained = Progress(tables=np.zeros(shape), visits=np.zeros(shape, dtype=np.int64))
+        first_values = np.full(shape, UNTRIED if method.untried == "ignored" else 0.0)
+        untrained = Progress(tables=first_values, visits=np.zeros(shape, dtype=np.int64))
         self.progress = progress if progress is not None else untrained
         self._last_built: tuple[int, BuiltScenario] | None = None
         self._records: list[Any] = []
@@ -219,23 +241,29 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         return TableTeam(tables=progress.tables.copy(), visits=progress.visits.copy(), provenance=provenance)
 
     def state(self) -> dict[str, Array]:
-        """Return `place`: [scenario, episode, episodes without a change]."""
+        """Return `place`: [scenario, episode, episodes without a change, episodes of the scenarios before]."""
         progress = self.progress
-        return {"place": np.array([progress.scenario_number, progress.episode, progress.n_unchanged], dtype=np.int64)}
+        place = progress.scenario_number, progress.episode, progress.n_unchanged, progress.n_before
+        return {"place": np.array(place, dtype=np.int64)}
 
     def restore(self, team: Team, state: Mapping[str, Array], *, source: str) -> None:
         """Continue where another trainer stood; see `Trainer.restore`."""
         place = state.get("place")
-        if not isinstance(team, TableTeam) or place is None or place.shape != (3,) or place.dtype != np.int64:
+        if (
+            not isinstance(team, TableTeam)
+            or place is None
+            or place.shape not in ((3,), (4,))
+            or place.dtype != np.int64
+        ):
             raise TrainingError(expected(source, "", "a checkpoint", "a team file without a place in its training"))
-        number, episode, n_unchanged = (int(value) for value in place)
+        number, episode, n_unchanged, n_before = (*(int(value) for value in place), 0)[:4]
         in_curriculum = 0 <= number < len(self._plan) or (number, episode) == (len(self._plan), 0)
-        if not (in_curriculum and 0 <= n_unchanged <= episode < self.method.n_episodes_max):
-            wanted = "[scenario, episode, episodes without a change] within the curriculum"
+        if not (in_curriculum and 0 <= n_unchanged <= episode < self.method.n_episodes_max and n_before >= 0):
+            wanted = "[scenario, episode, episodes without a change, before] within the curriculum"
             raise TrainingError(expected(source, "place", wanted, str(place.tolist())))
         if team.tables.shape != self.shape(number):
             raise TrainingError(expected(source, "tables", f"shape {self.shape(number)}", str(team.tables.shape)))
-        self.progress = Progress(number, episode, n_unchanged, team.tables, team.visits)
+        self.progress = Progress(number, episode, n_unchanged, team.tables, team.visits, n_before)
 
     def records(self) -> list[Any]:
         """Return the last episode, and the tables after the last one of a scenario and after every 50th."""
@@ -345,7 +373,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
     def _run_episode(self, built: BuiltScenario) -> EpisodeReport:
         method, progress = self.method, self.progress
         number, episode = progress.scenario_number, progress.episode
-        epsilon = _power(method.epsilon_decay, episode)
+        epsilon = method.epsilon(episode, before=progress.n_before)
         seed = episode_seed(self.seed, number, 0 if method.fixed_noise else episode)
         world = built.world(seed=seed)
         traced = self.recording or self.watched
@@ -378,7 +406,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
             n_visited=int(progress.visits.any(axis=2).sum()) if self.recording else 0,
             converged=converged,
             ended=ended,
-            drawn=self._draw_table() if ended and number + 1 < len(self._plan) else -1,
+            drawn=self._draw_table() if ended and (method.draw_last or number + 1 < len(self._plan)) else -1,
             tables_digest=tables_digest(progress.tables) if self.recording else b"",
             **trace_columns(trace, n_steps, terminated=world.terminated),
         )
@@ -419,9 +447,10 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
     def _next_scenario(self, drawn: int) -> None:
         """Begin the next scenario with the table that was drawn, for all brigades."""
         progress = self.progress
+        progress.n_before += progress.episode
         progress.scenario_number, progress.episode, progress.n_unchanged = progress.scenario_number + 1, 0, 0
         self.graduate = self.team()
-        if self.done:
+        if self.done and not self.method.draw_last:
             return
         n_tables, n_states, _ = self.shape(progress.scenario_number)
         if not 0 <= drawn < len(progress.tables):
