@@ -19,7 +19,17 @@ from fireworld.reproduction.paper_tables import (
     TeamComparison,
     cells_of,
 )
-from fireworld.reproduction.study import NO_WATER, Study
+from fireworld.reproduction.study import (
+    ALONE,
+    DIFFERENT_ALONE,
+    NO_WATER,
+    RANDOM_ALONE,
+    RANDOM_ALONE_FOR_ALL,
+    RANDOM_TABLES,
+    TOGETHER,
+    TOGETHER_WITHOUT_FLAGS,
+    Study,
+)
 from fireworld.shown import text_table
 
 Answer = Literal["reproduced", "partly", "not reproduced", "open", "yes", "no"]
@@ -46,6 +56,7 @@ def findings(study: Study, tables: PaperTables) -> list[Finding]:
             Finding(_sentence(row.question).rstrip("."), _answer(row.difference), _sentence(_difference(row)))
             for row in tables.comparisons[1:]
         ),
+        _parts(tables),
         _uncontrolled(study, tables),
         _more_brigades(tables),
         _convergence(tables),
@@ -94,6 +105,24 @@ def _cooperation(tables: PaperTables) -> Finding:
         "reproduced" if main.difference.above_zero else "open" if unsure else "not reproduced",
         f"Share of the greatest score, mean over the three tests: {_difference(main)}; in the paper it is "
         f"{theirs:+.2f}. {_directions(tables.tests)} {_sentence(tally(cells_of(tables.tests)))}",
+    )
+
+
+def _parts(tables: PaperTables) -> Finding:
+    """Compare how much comes of brigades that differ, of the flags, and of what was learned."""
+    found = {(row.team, row.other): row.difference for row in tables.comparisons}
+    differ = found[RANDOM_ALONE, RANDOM_ALONE_FOR_ALL]
+    flags, learned = found[TOGETHER, TOGETHER_WITHOUT_FLAGS], found[TOGETHER, RANDOM_TABLES]
+    largest = max(flags.mean, learned.mean) < differ.mean
+    return Finding(
+        "Does more come of brigades that differ than of flags and learning?",
+        "open" if not (differ.above_zero or differ.below_zero) else "yes" if differ.above_zero and largest else "no",
+        f"Share of the greatest score: that brigades differ at all, by tables drawn at random, adds "
+        f"{differ.text(sign=True)}; the flags add {flags.text(sign=True)} to what is learned in the team, and "
+        f"{found[RANDOM_TABLES, RANDOM_ALONE].text(sign=True)} to tables drawn at random; what the cooperative team "
+        f"learned adds {learned.text(sign=True)} to such tables, what one brigade learned alone "
+        f"{found[ALONE, RANDOM_ALONE_FOR_ALL].text(sign=True)}; four different ones of those add "
+        f"{found[DIFFERENT_ALONE, ALONE].text(sign=True)} to four copies of one.",
     )
 
 

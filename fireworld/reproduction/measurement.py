@@ -8,15 +8,35 @@ from functools import cached_property, lru_cache, partial
 from threading import Event, Lock
 from typing import Any
 
-from fireworld.evaluation.runs import evaluate
+import numpy as np
+
+from fireworld.evaluation.runs import Outcomes, evaluate, row_of
 from fireworld.executors import AnyExecutor, in_this_process, workers_for
 from fireworld.interrupt import Interrupted
+from fireworld.planning.planner import Planner
 from fireworld.policy.kernel import KernelPolicy, at_random, from_tables
 from fireworld.policy.names import BUILT_IN
+from fireworld.policy.protocol import Policy
+from fireworld.policy.teams.table_team import TableTeam
+from fireworld.policy.words import N_STATES_ALONE
 from fireworld.reproduction import paper
 from fireworld.reproduction.folder import ReproductionFolder
 from fireworld.reproduction.repetitions import Repetition, n_scenarios, random_tables, train_repetition
-from fireworld.reproduction.study import LEARNED, NO_WATER, RANDOM_TABLES, RULES, TEAMS, Study, Tested
+from fireworld.reproduction.study import (
+    ALONE,
+    DIFFERENT_ALONE,
+    LEARNED,
+    NO_WATER,
+    PLANNER,
+    RANDOM_ALONE,
+    RANDOM_ALONE_FOR_ALL,
+    RANDOM_TABLES,
+    RULES,
+    TEAMS,
+    UNTAUGHT,
+    Study,
+    Tested,
+)
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.training.curriculum import Curriculum
@@ -78,7 +98,7 @@ class Measurement:
     @cached_property
     def testing_parts(self) -> Parts:
         """Tests of policies that are done."""
-        n_policies = self.n_repetitions * len(LEARNED) + len(RULES)
+        n_policies = self.n_repetitions * (len(LEARNED) + 1) + len(UNTAUGHT)
         return Parts("testing", len(self.tests) * n_policies, self.on_progress)
 
     @property
@@ -108,22 +128,33 @@ class Measurement:
         def on_result(_: int, result: tuple[Repetition | None, Tested]) -> None:
             if not in_this_process(executor):  # the parts were done where nobody counts
                 training.done(n_scenarios(self.curriculum) if result[0] else 0)
-                testing.done(len(self.tests) * len(LEARNED if result[0] else RULES))
+                testing.done(sum(map(len, result[1].values())))
 
         repeat: list[Task] = [partial(self.repetition, number + 1) for number in range(self.n_repetitions)]
-        tasks = [*repeat, self.rules]  # the rules are short and fill up the end
-        done = workers_for(executor, stop=self.stop).run(tasks, on_result)
+        tasks = [self.planner, *repeat, self.rules]  # the rules are short and fill up the end
+        workers = workers_for(executor, stop=self.stop)
+        done = workers.run(tasks, on_result)
         if done is None:
             raise Interrupted("interrupted")
         repetitions = [repetition for repetition, _ in done if repetition is not None]
-        *of_repetitions, of_rules = (tested for _, tested in done)
+        of_planner, *of_repetitions, of_rules = (tested for _, tested in done)
+        alone = [repetition.teams[ALONE] for repetition in repetitions]
+        mix: list[Task] = [partial(self.different, n + 1, [*alone[n:], *alone[:n]]) for n in range(len(alone))]
+        mixed = workers.run(mix, on_result)
+        if mixed is None:
+            raise Interrupted("interrupted")
+        of_untaught = {test: {**of_rules[test], **of_planner[test]} for test in of_rules}
+        of_each = [
+            {test: {**tested[test], **different[test]} for test in tested}
+            for tested, (_, different) in zip(of_repetitions, mixed, strict=True)
+        ]
         study = Study(
             n_repetitions=self.n_repetitions,
             seeds=self.seeds,
             curves=[curve for repetition in repetitions for curve in repetition.curves],
             outcomes={
                 test: {
-                    team: [tested[test][team] for tested in ([of_rules] if team in RULES else of_repetitions)]
+                    team: [tested[test][team] for tested in ([of_untaught] if team in UNTAUGHT else of_each)]
                     for team in TEAMS
                 }
                 for test in of_rules
@@ -150,9 +181,15 @@ class Measurement:
         else:
             self.training_parts.done(n_scenarios(self.curriculum))
 
-        def policies() -> dict[str, KernelPolicy]:
-            tables = random_tables(number, n_brigades=max(built.n_brigades for built in self.tests.values()))
-            return {**{name: team.policy() for name, team in trained.teams.items()}, RANDOM_TABLES: from_tables(tables)}
+        def policies() -> dict[str, Policy]:
+            tables = random_tables(number, n_brigades=self.n_brigades_max)
+            fewer = random_tables(number, n_brigades=self.n_brigades_max, n_states=N_STATES_ALONE)
+            return {
+                **{name: team.policy() for name, team in trained.teams.items()},
+                RANDOM_TABLES: from_tables(tables),
+                RANDOM_ALONE: from_tables(fewer),
+                RANDOM_ALONE_FOR_ALL: from_tables(fewer[:1]),
+            }
 
         return trained, self._test(str(number), LEARNED, policies)
 
@@ -161,12 +198,30 @@ class Measurement:
         made = {**BUILT_IN, NO_WATER: at_random}
         return None, self._test("rules", RULES, lambda: {name: made[name]() for name in RULES})
 
+    def planner(self) -> tuple[Repetition | None, Tested]:
+        """Test the planner; errors as for `run`."""
+        return None, self._test(PLANNER, (PLANNER,), lambda: {PLANNER: Planner()})
+
+    def different(self, number: int, teams: Sequence[TableTeam]) -> tuple[Repetition | None, Tested]:
+        """Test brigades that each follow the table of another training alone, of `teams` in turn; errors as for `run`.
+
+        `number` is that of the repetition whose table the first brigade follows.
+        """
+        tables = np.concatenate([team.tables for team in teams[: self.n_brigades_max]])
+        name = f"{DIFFERENT_ALONE}-{number}"
+        return None, self._test(name, (DIFFERENT_ALONE,), lambda: {DIFFERENT_ALONE: from_tables(tables)})
+
+    @property
+    def n_brigades_max(self) -> int:
+        """Brigades of the largest team that is tested."""
+        return max(built.n_brigades for built in self.tests.values())
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Send what decides the outcome; another process builds tests and cities once."""
         settings = (self.n_repetitions, self.seeds, self.record_trainings)
         return _received, (self.folder, self.curriculum, self.method, *settings)
 
-    def _test(self, name: str, teams: Sequence[str], policies: Callable[[], dict[str, KernelPolicy]]) -> Tested:
+    def _test(self, name: str, teams: Sequence[str], policies: Callable[[], Mapping[str, Policy]]) -> Tested:
         """Run every policy in every test under all seeds, unless the outcomes are kept under this name."""
         tested = self.folder.tested(name, scenarios=self.tests, teams=teams, seeds=self.seeds)
         if tested is not None:
@@ -177,12 +232,27 @@ class Measurement:
             tested[test] = {}
             for team, policy in by_team.items():
                 built = (self.tests_without_water if team == NO_WATER else self.tests)[test]
-                tested[test][team] = evaluate(built, policy, self.seeds)
+                tested[test][team] = self._outcomes(built, policy)
                 self.testing_parts.done()
                 if self.stop.is_set():
                     raise Interrupted("interrupted")
         self.folder.write_tested(name, tested)
         return tested
+
+    def _outcomes(self, built: BuiltScenario, policy: Policy) -> Outcomes:
+        """Run a policy under all seeds."""
+        if isinstance(policy, KernelPolicy):
+            return evaluate(built, policy, self.seeds)
+        rows = []
+        for seed in self.seeds:
+            world = built.world(seed=seed)
+            policy.begin(world.city_arrays, world.n_brigades, seed)
+            while not (world.terminated or world.truncated):
+                world.step(policy)
+                if self.stop.is_set():
+                    raise Interrupted("interrupted")
+            rows.append(row_of(world.outcome))
+        return Outcomes(self.seeds, rows)
 
 
 @lru_cache(maxsize=1)

@@ -11,7 +11,18 @@ import numpy as np
 from fireworld.evaluation.statistics import Estimate, estimate, paired_difference, probability_of_improvement
 from fireworld.kernels.arrays import Array
 from fireworld.reproduction import paper
-from fireworld.reproduction.study import ALONE, FIXED, RANDOM_TABLES, TEAMS, TOGETHER, TOGETHER_WITHOUT_FLAGS, Study
+from fireworld.reproduction.study import (
+    ALONE,
+    DIFFERENT_ALONE,
+    FIXED,
+    RANDOM_ALONE,
+    RANDOM_ALONE_FOR_ALL,
+    RANDOM_TABLES,
+    TEAMS,
+    TOGETHER,
+    TOGETHER_WITHOUT_FLAGS,
+    Study,
+)
 
 WITHIN: Final = "within the interval"
 NEAR: Final = "within 25 %"
@@ -172,6 +183,10 @@ def _comparisons(study: Study, scenarios: Sequence[str], shares: Sequence[TeamSh
         (TOGETHER, TOGETHER_WITHOUT_FLAGS, "do the flags that tell what the others do help?"),
         (TOGETHER_WITHOUT_FLAGS, ALONE, "does training in the team help, without the flags?"),
         (TOGETHER, RANDOM_TABLES, "is what the team learned better than tables drawn at random?"),
+        (RANDOM_ALONE, RANDOM_ALONE_FOR_ALL, "does it help that brigades differ, where nothing is learned?"),
+        (DIFFERENT_ALONE, ALONE, "does it help that brigades differ, where each was trained alone?"),
+        (RANDOM_TABLES, RANDOM_ALONE, "do the flags help where nothing is learned?"),
+        (ALONE, RANDOM_ALONE_FOR_ALL, "is what one brigade learned alone better than one table drawn at random?"),
         (TOGETHER, "random", "is it better than random actions?"),
         (TOGETHER, best_rule, "is it better than the best of the rules that learn nothing (chosen on these tests)?"),
     ]

@@ -108,11 +108,11 @@ def without_flags(curriculum: Curriculum) -> Curriculum:
     return replace(curriculum, name=f"{curriculum.name}-without-flags", stages=stages)
 
 
-def random_tables(number: int, *, n_brigades: int) -> Array:
-    """Draw for a repetition a table a brigade that prefers some action in each state: (n_brigades, 4320, 4)."""
+def random_tables(number: int, *, n_brigades: int, n_states: int = N_STATES) -> Array:
+    """Draw for a repetition a table a brigade that prefers some action in each state: (n_brigades, n_states, 4)."""
     seed = -1 - number  # no training has it
     choice = [
-        [below(seed, TABLE, brigade, state, bound=len(ACTIONS)) for state in range(N_STATES)]
+        [below(seed, TABLE, brigade, state, bound=len(ACTIONS)) for state in range(n_states)]
         for brigade in range(n_brigades)
     ]
     tables: Array = np.eye(len(ACTIONS))[np.array(choice)]

@@ -17,6 +17,10 @@ ALONE: Final = "non-cooperative"
 TOGETHER: Final = "cooperative"
 TOGETHER_WITHOUT_FLAGS: Final = "270-states-in-team"
 RANDOM_TABLES: Final = "random-tables"
+RANDOM_ALONE: Final = "random-270"
+RANDOM_ALONE_FOR_ALL: Final = "random-270-for-all"
+DIFFERENT_ALONE: Final = "non-cooperative-different"
+PLANNER: Final = "planner"
 NO_WATER: Final = "no-water"
 FIXED: Final = ("easiest", "nearest-to-civilian", "nearest-to-center", "nearest-to-me", "each-another", "chief")
 """Policies that are rules, neither learned nor random."""
@@ -25,16 +29,21 @@ TEAMS: Final[Mapping[str, str]] = {
     TOGETHER: "the paper's cooperative team: 4320 states, trained alone, then together",
     ALONE: "the paper's non-cooperative team: 270 states, trained alone",
     TOGETHER_WITHOUT_FLAGS: "control: 270 states, trained alone, then together",
+    DIFFERENT_ALONE: "control: 270 states, trained alone, every brigade the table of another training",
+    RANDOM_ALONE_FOR_ALL: "control: 270 states, one table for all, every entry drawn at random",
+    RANDOM_ALONE: "control: 270 states, every entry drawn at random",
     RANDOM_TABLES: "control: 4320 states, every entry drawn at random",
     "random": "control: a random action in every step",
     **dict.fromkeys(FIXED[:4], "control: always this action"),
     "each-another": "control: every brigade another action",
     "chief": "control: a rule written by hand",
+    PLANNER: "control: tries out actions in copies of the world",
     NO_WATER: "control: the fire left to itself",
 }
 """What is tested, by name."""
-RULES: Final = ("random", *FIXED, NO_WATER)  # teams that do not differ between repetitions
-LEARNED: Final = tuple(team for team in TEAMS if team not in RULES)  # teams that do
+RULES: Final = ("random", *FIXED, NO_WATER)
+UNTAUGHT: Final = (*RULES, PLANNER)  # teams that do not differ between repetitions
+LEARNED: Final = tuple(team for team in TEAMS if team not in (*UNTAUGHT, DIFFERENT_ALONE))  # those of one repetition
 
 Tested = dict[str, dict[str, Outcomes]]  # outcomes by scenario and team
 
@@ -94,7 +103,7 @@ class Study:
     seeds: Sequence[int]  # of the test runs
     curves: Sequence[LearningCurve]  # of all repetitions
     outcomes: Mapping[str, Mapping[str, Sequence[Outcomes]]]
-    """By scenario and team: one Outcomes a repetition, one in all for RULES."""
+    """By scenario and team: one Outcomes a repetition, one in all for UNTAUGHT."""
     agreement: Sequence[float]  # of each repetition, see Repetition.agreement
 
     def values(self, scenario: str, team: str, quantity: str) -> Array:

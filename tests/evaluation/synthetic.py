@@ -6,9 +6,17 @@ import numpy as np
 
 from fireworld.evaluation.runs import Outcomes
 from fireworld.reproduction import paper
-from fireworld.reproduction.study import ALONE, TEAMS, TOGETHER, TOGETHER_WITHOUT_FLAGS, LearningCurve, Study
+from fireworld.reproduction.study import (
+    ALONE,
+    TEAMS,
+    TOGETHER,
+    TOGETHER_WITHOUT_FLAGS,
+    UNTAUGHT,
+    LearningCurve,
+    Study,
+)
 
-LEARNED = (ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS, "random-tables")
+LEARNED = tuple(team for team in TEAMS if team not in UNTAUGHT)
 
 
 def outcomes(seeds, *, score, score_max, burnt_out=100, steps=200, completed=True):

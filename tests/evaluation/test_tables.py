@@ -98,7 +98,7 @@ def test_csv_files_are_the_same_every_time_and_complete():
     rows = {name: [*csv.DictReader(io.StringIO(text))] for name, text in texts.items()}
     assert all(None not in row and None not in row.values() for found in rows.values() for row in found)
     assert [len(rows[f"table-{number}.csv"]) for number in (1, 2, 3)] == [16, 18, 18]
-    assert len(rows["runs.csv"]) == 6 * 3 * (4 * 2 + 8)
+    assert len(rows["runs.csv"]) == 6 * 3 * (7 * 2 + 9)
     assert rows["table-2.csv"][0] | {"low_95": "436.0", "verdict": WITHIN} == rows["table-2.csv"][0]
     episodes = [row for row in rows["episodes.csv"] if row["scenario"] == "train-1" and row["team"] == TOGETHER]
     assert [row["repetitions"] for row in episodes] == ["2"] * 31 + ["1"]
