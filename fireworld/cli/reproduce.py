@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -26,6 +27,17 @@ from fireworld.cli.progress import BAR, COUNT, DESCRIPTION, ELAPSED, bars
 @click.option("--record-trainings", is_flag=True, help="Keep a training log of every training in DIR/trainings.")
 @click.option("--resume", is_flag=True, help="Continue what an interrupted call left in DIR.")
 @click.option("--force", is_flag=True, help="Replace an earlier reproduction in DIR.")
+@click.option(
+    "--readings",
+    metavar="[FILE]",
+    is_flag=False,
+    flag_value="",
+    default=None,
+    help="Try the paper's open choices instead, those of fireworld's readings.yaml or of FILE.",
+)
+@click.option(
+    "--design", type=click.Choice(["screen", "full"]), default="screen", show_default=True, help="64 readings, or 128."
+)
 def command(
     *,
     repetitions: int | None,
@@ -36,6 +48,8 @@ def command(
     record_trainings: bool,
     resume: bool,
     force: bool,
+    readings: str | None,
+    design: str,
 ) -> None:
     """Train the paper's teams, test them beside controls, and write its Tables 1 to 3 beside ours.
 
@@ -48,11 +62,17 @@ def command(
     the same options with --resume continue: what was trained and tested by then is kept in DIR. With --record-trainings
     every episode is on record, too: 13 MB a repetition.
 
+    With --readings, what is asked is whether the claim, that cooperation helps, holds in other readings of the paper:
+    a designed sample of them is tried, and DIR gets readings.html and CSV files. It takes hours; with --quick a minute.
+
     Exit code: 0 done, whatever was found; 2 could not be done; 130 interrupted.
     """
     if force and resume:
         raise click.UsageError("--force and --resume exclude each other.")
     announce_compilation()
+    if readings is not None:
+        _try_readings(readings, out, design, repetitions, seeds, jobs, quick=quick, resume=resume, force=force)
+        return
     from fireworld.reproduction.reproduce import reproduce
 
     with bars(DESCRIPTION, BAR, COUNT, ELAPSED) as progress:
@@ -70,3 +90,39 @@ def command(
         )
     click.echo(reproduction)
     click.echo(f"open {reproduction.report}")
+
+
+def _try_readings(
+    file: str,
+    out: Path,
+    design: str,
+    repetitions: int | None,
+    seeds: int | None,
+    jobs: int | None,
+    *,
+    quick: bool,
+    resume: bool,
+    force: bool,
+) -> None:
+    """Try the readings of a file, "" for fireworld's own."""
+    from fireworld.reproduction.readings.choices import SHIPPED
+    from fireworld.reproduction.readings.report import write_readings
+    from fireworld.reproduction.readings.study import FULL, QUICK, SCREEN, findings_text, try_readings
+
+    size = QUICK if quick else FULL if design == "full" else SCREEN
+    size = replace(size, trainings=repetitions or size.trainings, seeds=seeds or size.seeds)
+    with bars(DESCRIPTION, BAR, COUNT, ELAPSED) as progress:
+        tasks = {what: progress.add_task(what, total=None) for what in ("trying", "confirming")}
+        study = try_readings(
+            out,
+            file=file or SHIPPED,
+            size=size,
+            resume=resume,
+            force=force,
+            executor=jobs,
+            on_progress=lambda what, n_done, n_all: progress.update(tasks[what], completed=n_done, total=n_all),
+        )
+    page = write_readings(study, out)
+    for sentence in findings_text(study):
+        click.echo(sentence)
+    click.echo(f"open {page}")

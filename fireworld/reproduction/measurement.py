@@ -26,6 +26,7 @@ from fireworld.reproduction.study import (
     ALONE,
     DIFFERENT_ALONE,
     LEARNED,
+    MIXED,
     NO_WATER,
     PLANNER,
     RANDOM_ALONE,
@@ -98,7 +99,7 @@ class Measurement:
     @cached_property
     def testing_parts(self) -> Parts:
         """Tests of policies that are done."""
-        n_policies = self.n_repetitions * (len(LEARNED) + 1) + len(UNTAUGHT)
+        n_policies = self.n_repetitions * (len(LEARNED) + len(MIXED)) + len(UNTAUGHT)
         return Parts("testing", len(self.tests) * n_policies, self.on_progress)
 
     @property
@@ -131,22 +132,24 @@ class Measurement:
                 testing.done(sum(map(len, result[1].values())))
 
         repeat: list[Task] = [partial(self.repetition, number + 1) for number in range(self.n_repetitions)]
-        tasks = [self.planner, *repeat, self.rules]  # the rules are short and fill up the end
+        tasks = [*repeat, self.rules]  # the rules are short and fill up the end
         workers = workers_for(executor, stop=self.stop)
         done = workers.run(tasks, on_result)
         if done is None:
             raise Interrupted("interrupted")
         repetitions = [repetition for repetition, _ in done if repetition is not None]
-        of_planner, *of_repetitions, of_rules = (tested for _, tested in done)
+        *of_repetitions, of_rules = (tested for _, tested in done)
         alone = [repetition.teams[ALONE] for repetition in repetitions]
-        mix: list[Task] = [partial(self.different, n + 1, [*alone[n:], *alone[:n]]) for n in range(len(alone))]
-        mixed = workers.run(mix, on_result)
-        if mixed is None:
+        more: list[Task] = [partial(self.planner, test) for test in self.tests]
+        more += [partial(self.controls, n + 1, [*alone[n:], *alone[:n]]) for n in range(len(alone))]
+        done = workers.run(more, on_result)
+        if done is None:
             raise Interrupted("interrupted")
-        of_untaught = {test: {**of_rules[test], **of_planner[test]} for test in of_rules}
+        found = [tested for _, tested in done]
+        of_untaught = {test: {**of_rules[test], **found[n][test]} for n, test in enumerate(self.tests)}
         of_each = [
-            {test: {**tested[test], **different[test]} for test in tested}
-            for tested, (_, different) in zip(of_repetitions, mixed, strict=True)
+            {test: {**tested[test], **controls[test]} for test in tested}
+            for tested, controls in zip(of_repetitions, found[len(self.tests) :], strict=True)
         ]
         study = Study(
             n_repetitions=self.n_repetitions,
@@ -183,13 +186,7 @@ class Measurement:
 
         def policies() -> dict[str, Policy]:
             tables = random_tables(number, n_brigades=self.n_brigades_max)
-            fewer = random_tables(number, n_brigades=self.n_brigades_max, n_states=N_STATES_ALONE)
-            return {
-                **{name: team.policy() for name, team in trained.teams.items()},
-                RANDOM_TABLES: from_tables(tables),
-                RANDOM_ALONE: from_tables(fewer),
-                RANDOM_ALONE_FOR_ALL: from_tables(fewer[:1]),
-            }
+            return {**{name: team.policy() for name, team in trained.teams.items()}, RANDOM_TABLES: from_tables(tables)}
 
         return trained, self._test(str(number), LEARNED, policies)
 
@@ -198,18 +195,21 @@ class Measurement:
         made = {**BUILT_IN, NO_WATER: at_random}
         return None, self._test("rules", RULES, lambda: {name: made[name]() for name in RULES})
 
-    def planner(self) -> tuple[Repetition | None, Tested]:
-        """Test the planner; errors as for `run`."""
-        return None, self._test(PLANNER, (PLANNER,), lambda: {PLANNER: Planner()})
+    def planner(self, test: str) -> tuple[Repetition | None, Tested]:
+        """Run the planner in a test; errors as for `run`."""
+        return None, self._test(f"{PLANNER}-{test}", (PLANNER,), lambda: {PLANNER: Planner()}, tests=[test])
 
-    def different(self, number: int, teams: Sequence[TableTeam]) -> tuple[Repetition | None, Tested]:
-        """Test brigades that each follow the table of another training alone, of `teams` in turn; errors as for `run`.
+    def controls(self, number: int, teams: Sequence[TableTeam]) -> tuple[Repetition | None, Tested]:
+        """Test the controls of a repetition that need no training of their own; errors as for `run`.
 
-        `number` is that of the repetition whose table the first brigade follows.
+        Args:
+            number: of the repetition.
+            teams: the non-cooperative ones of all repetitions, this one's first: a brigade for each table, in turn.
         """
-        tables = np.concatenate([team.tables for team in teams[: self.n_brigades_max]])
-        name = f"{DIFFERENT_ALONE}-{number}"
-        return None, self._test(name, (DIFFERENT_ALONE,), lambda: {DIFFERENT_ALONE: from_tables(tables)})
+        different = np.concatenate([team.tables for team in teams[: self.n_brigades_max]])
+        tables = random_tables(number, n_brigades=self.n_brigades_max, n_states=N_STATES_ALONE)
+        made = {DIFFERENT_ALONE: different, RANDOM_ALONE_FOR_ALL: tables[:1], RANDOM_ALONE: tables}
+        return None, self._test(f"controls-{number}", MIXED, lambda: {name: from_tables(made[name]) for name in MIXED})
 
     @property
     def n_brigades_max(self) -> int:
@@ -221,14 +221,22 @@ class Measurement:
         settings = (self.n_repetitions, self.seeds, self.record_trainings)
         return _received, (self.folder, self.curriculum, self.method, *settings)
 
-    def _test(self, name: str, teams: Sequence[str], policies: Callable[[], Mapping[str, Policy]]) -> Tested:
+    def _test(
+        self,
+        name: str,
+        teams: Sequence[str],
+        policies: Callable[[], Mapping[str, Policy]],
+        *,
+        tests: Sequence[str] | None = None,
+    ) -> Tested:
         """Run every policy in every test under all seeds, unless the outcomes are kept under this name."""
-        tested = self.folder.tested(name, scenarios=self.tests, teams=teams, seeds=self.seeds)
+        names = [*self.tests] if tests is None else tests
+        tested = self.folder.tested(name, scenarios=names, teams=teams, seeds=self.seeds)
         if tested is not None:
             self.testing_parts.done(len(tested) * len(teams))
             return tested
         tested, by_team = {}, policies()
-        for test in self.tests:
+        for test in names:
             tested[test] = {}
             for team, policy in by_team.items():
                 built = (self.tests_without_water if team == NO_WATER else self.tests)[test]

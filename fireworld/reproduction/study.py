@@ -43,7 +43,8 @@ TEAMS: Final[Mapping[str, str]] = {
 """What is tested, by name."""
 RULES: Final = ("random", *FIXED, NO_WATER)
 UNTAUGHT: Final = (*RULES, PLANNER)  # teams that do not differ between repetitions
-LEARNED: Final = tuple(team for team in TEAMS if team not in (*UNTAUGHT, DIFFERENT_ALONE))  # those of one repetition
+MIXED: Final = (DIFFERENT_ALONE, RANDOM_ALONE_FOR_ALL, RANDOM_ALONE)  # tested once all repetitions are trained
+LEARNED: Final = tuple(team for team in TEAMS if team not in (*UNTAUGHT, *MIXED))
 
 Tested = dict[str, dict[str, Outcomes]]  # outcomes by scenario and team
 

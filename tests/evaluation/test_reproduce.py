@@ -214,10 +214,10 @@ def test_from_python_with_an_executor_it_is_the_same(small, undrawn, curriculum)
         for name, executor in (("threads", 1), ("here", here), ("there", there)):
             words = {"repetitions": 2, "seeds": 2, "executor": executor}
             found[name] = reproduce(name, on_progress=lambda *words: told.append(words), **words)
-            assert [max(n for what, n, _ in told if what == each) for each in ("training", "testing")] == [12, 16]
+            assert [max(n for what, n, _ in told if what == each) for each in ("training", "testing")] == [12, 23]
             assert {(what, n) for what, _, n in told} == {
                 ("training", 12),
-                ("testing", 16),
+                ("testing", 23),
                 ("recording", 5),
                 ("drawing", 0),
             }

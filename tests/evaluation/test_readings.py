@@ -1,0 +1,144 @@
+"""Readings of the paper: the file, the design's properties, effects on made-up numbers, a small study end to end."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+
+import numpy as np
+import pytest
+
+from fireworld.errors import OutputError, TrainingError
+from fireworld.reproduction import paper
+from fireworld.reproduction.readings.choices import SHIPPED, load_choices, read_as
+from fireworld.reproduction.readings.design import N_BASIC, design, designed, generators
+from fireworld.reproduction.readings.effects import main_effects, permutation_p, student_95
+from fireworld.reproduction.readings.report import write_readings
+from fireworld.reproduction.readings.study import RUNS, ReadingsSize, findings_text, try_readings
+from fireworld.reproduction.readings.trial import Trial
+from fireworld.training.curriculum import load_curriculum
+from fireworld.training.methods.sarsa import Sarsa
+from tests.evaluation.test_reproduce import CURRICULUM, SMALL_PAPER
+
+
+def test_the_file_has_the_22_choices_and_a_level_that_changes_nothing_is_ours():
+    choices = load_choices()
+    assert [choice.number for choice in choices] == list(range(1, 23))
+    for choice in choices:
+        empty = [name for name, level in choice.levels.items() if not any(getattr(level, part) for part in PARTS)]
+        assert empty == [choice.ours], choice.name
+    ours = read_as(choices, {})
+    assert not any(getattr(ours.level, part) for part in PARTS)
+
+
+PARTS = ("method", "scenario", "training", "study")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("number: 1,", "number: one,", r"choices\[0\].number: expected `int`, got `str`"),
+        ("ours: per-scenario", "ours: never", r"choices.epsilon: ours: expected one of the levels .*, got never"),
+        ("screen: [fresh, same]", "screen: [same, fresh]", r"choices.randomness: screen: expected fresh and another"),
+        ("{fixed_noise: true}", "{fixed_nose: true}", r"choices.randomness: levels.same: --set: fixed_nose: expected"),
+        ("{observation.flags: target}", "{observation.flags: no}", r"choices.flags-of-what: levels.target: .*flags"),
+        ("name: reward,", "name: epsilon,", r"choices.epsilon: name: expected another name"),
+        ("{fires: 1.5}", "{fire: 1.5}", r"choices.first-fires: levels.larger: .*fire"),
+    ],
+)
+def test_faults_are_named(tmp_path, old, new, message):
+    path, text = tmp_path / "a.yaml", SHIPPED.read_text()
+    assert text.count(old) == 1
+    path.write_text(text.replace(old, new))
+    with pytest.raises(TrainingError, match=message) as caught:
+        load_choices(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("n_choices", "n_basic"), [(21, 6), (32, 6), (21, 7), (4, 3)])
+def test_the_design_is_balanced_of_resolution_four_and_its_own_foldover(n_choices, n_basic):
+    signs = design(n_choices, n_basic)
+    assert signs.shape == (2**n_basic, n_choices)
+    assert (signs[0] == -1).all(), "the first reading is ours"
+    assert (signs.sum(axis=0) == 0).all()
+    for a, b in itertools.combinations(range(n_choices), 2):
+        assert signs[:, a] @ signs[:, b] == 0
+    for a, b, c in itertools.combinations(range(n_choices), 3):
+        assert (signs[:, a] * signs[:, b] * signs[:, c]).sum() == 0, "no main effect is an interaction of two"
+    rows = {tuple(row) for row in signs.tolist()}
+    assert rows == {tuple(-value for value in row) for row in rows}
+    assert len(set(generators(n_choices, n_basic))) == n_choices
+
+
+def test_the_shipped_choices_fit_into_the_design():
+    for kind, n_basic in N_BASIC.items():
+        varied, signs, readings = designed(load_choices(), kind=kind)
+        assert signs.shape == (2**n_basic, len(varied)) == (len(readings), 4 if kind == "quick" else 21)
+        assert readings[0].study == read_as(load_choices(), {}).study
+
+
+def test_effects_of_made_up_readings():
+    signs = design(8, 5)
+    means = 0.1 + 0.15 * signs[:, 2] - 0.05 * signs[:, 5] + 0.3 * signs[:, 0] * signs[:, 1]
+    effects = main_effects([*"abcdefgh"], signs, means)
+    assert [round(one.mean, 9) + 0.0 for one in effects] == [0, 0, 0.3, 0, 0, -0.1, 0, 0]
+    width = {round(one.high - one.low, 9) for one in effects}
+    assert len(width) == 1, "one spread for all: what the main effects leave"
+    assert permutation_p(signs, 0.1 + 0.2 * signs[:, 2]) < 0.001
+    noise = np.array([(7 * n * n) % 31 for n in range(32)]) / 31.0
+    assert permutation_p(signs, noise) > 0.01
+
+
+@pytest.mark.parametrize(("freedom", "quantile"), [(3, 3.182), (10, 2.228), (42, 2.018), (1000, 1.962)])
+def test_quantiles_of_students_t(freedom, quantile):
+    assert student_95(freedom) == pytest.approx(quantile, rel=0.02)
+
+
+SIZE = ReadingsSize("quick", 1, 2, Sarsa(n_episodes_max=3, n_episodes_unchanged=2))
+
+
+@pytest.fixture
+def small(tmp_path, monkeypatch):
+    for name, rows in SMALL_PAPER.items():
+        monkeypatch.setattr(paper, name, rows)
+    path = tmp_path / "small.yaml"
+    path.write_text(CURRICULUM)
+    return path
+
+
+@pytest.mark.slow
+def test_a_study_is_resumed_and_comes_out_the_same(small, tmp_path):
+    whole = try_readings(tmp_path / "a", size=SIZE, curriculum=small)
+    page = write_readings(whole, tmp_path / "a")
+    rows = [*csv.DictReader((tmp_path / "a" / RUNS).read_text().splitlines())]
+    assert len(rows) == (8 + 3) * 2
+    assert len(whole.confirmed) == 3
+    assert "in 8 readings" not in page.read_text()
+    for sentence in findings_text(whole):
+        assert sentence.endswith(".")
+    with pytest.raises(OutputError, match="--resume continues it"):
+        try_readings(tmp_path / "a", size=SIZE, curriculum=small)
+    try_readings(tmp_path / "b", size=SIZE, curriculum=small)
+    runs = tmp_path / "b" / RUNS
+    runs.write_bytes(runs.read_bytes()[: runs.stat().st_size // 2])  # as after a kill
+    again = try_readings(tmp_path / "b", size=SIZE, curriculum=small, resume=True)
+    assert runs.read_bytes() == (tmp_path / "a" / RUNS).read_bytes()
+    assert findings_text(again) == findings_text(whole)
+    with pytest.raises(TrainingError, match="trainings"):
+        try_readings(tmp_path / "b", size=ReadingsSize("quick", 2, 2, SIZE.method), curriculum=small, resume=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "level",
+    [(choice.name, name) for choice in load_choices() for name in choice.levels if name != choice.ours],
+    ids="-".join,
+)
+def test_every_level_can_be_tried(level, small):
+    from threading import Event
+
+    reading = read_as(load_choices(), dict([level]))
+    shares = Trial(0, reading, 1, load_curriculum(small), SIZE.method, [1000], Event())()
+    assert len(shares) == 1
+    assert all(0.0 <= share <= 1.0 for share in shares[0])
