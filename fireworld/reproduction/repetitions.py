@@ -85,7 +85,8 @@ def train_repetition(
         begun = control.progress.tables
         flagged = np.repeat(begun, N_FLAG_VALUES, axis=1)
         team_alone = replace(control.team(), tables=begun[:1].copy(), visits=control.progress.visits[:1].copy())
-        progress = Progress(n_alone, tables=flagged, visits=np.zeros(flagged.shape, dtype=np.int64))
+        n_before = control.progress.n_before
+        progress = Progress(n_alone, tables=flagged, visits=np.zeros(flagged.shape, dtype=np.int64), n_before=n_before)
         together = trainer_in(curriculum, progress)
         with recording(logs, TOGETHER, together, after=of_control) as of_together:
             follow(together, TOGETHER, of_together)

@@ -38,7 +38,7 @@ PARTS = ("method", "scenario", "training", "study")
     ("old", "new", "message"),
     [
         ("number: 1,", "number: one,", r"choices\[0\].number: expected `int`, got `str`"),
-        ("ours: per-scenario", "ours: never", r"choices.epsilon: ours: expected one of the levels .*, got never"),
+        ("ours: per-scenario", "ours: never", r"choices.epsilon: ours: expected one of the levels .*, got 'never'"),
         ("screen: [fresh, same]", "screen: [same, fresh]", r"choices.randomness: screen: expected fresh and another"),
         ("{fixed_noise: true}", "{fixed_nose: true}", r"choices.randomness: levels.same: --set: fixed_nose: expected"),
         ("{observation.flags: target}", "{observation.flags: no}", r"choices.flags-of-what: levels.target: .*flags"),
