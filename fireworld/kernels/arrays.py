@@ -193,7 +193,7 @@ class ObservationConstants(NamedTuple):
     volume_growth: float  # of the thresholds of the volume, one after another
     own_flags: bool  # the flags tell of the brigade itself, too
     flags: int  # what they tell: 0 the action, 1 the target, 2 the target that is sprayed
-    edge_by_city: bool  # a side is free where the city goes on beyond it
+    edge_by_city: bool  # a side is free where the city continues beyond it
     west: float  # mm, of the centroids of all that can burn
     south: float
     east: float

@@ -42,7 +42,7 @@ def volume_class(volume: float, unit: float, growth: float) -> int:
 
 @inner
 def sides_in_city(site: int, sites: SiteState, constants: ObservationConstants) -> int:
-    """Return beyond how many sides of a site's box the city goes on."""
+    """Return beyond how many sides of a site's box the city continues."""
     return (
         (sites.north[site] < constants.north)
         + (sites.east[site] < constants.east)
@@ -163,8 +163,8 @@ def flag_targets(
     for action in range(N_ACTIONS):
         target, flag = find_target(brigade, action, brigades, buildings, fire, geometry, sites), 0
         for other in range(len(known)):
-            told = (other != brigade or constants.own_flags) and known[other] == target
-            if told and (constants.flags == BY_TARGET or brigades.sprayed[other] > 0):
+            counts = (other != brigade or constants.own_flags) and known[other] == target
+            if counts and (constants.flags == BY_TARGET or brigades.sprayed[other] > 0):
                 flag = 1
         features[4 + action] = flag
     return state_index(features)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import itertools
+from pathlib import Path
+from threading import Event
 
 import numpy as np
 import pytest
@@ -29,6 +31,20 @@ def test_the_file_has_the_22_choices_and_a_level_that_changes_nothing_is_ours():
         assert empty == [choice.ours], choice.name
     ours = read_as(choices, {})
     assert not any(getattr(ours.level, part) for part in PARTS)
+
+
+def test_the_docs_have_every_choice_and_switch():
+    page = (Path(__file__).parents[2] / "docs" / "readings.md").read_text()
+    for choice in load_choices():
+        (line,) = [line for line in page.splitlines() if line.startswith(f"| {choice.number} | {choice.name} |")]
+        assert choice.sentence in line
+        for name, level in choice.levels.items():
+            assert name in line
+            for part in PARTS:
+                assert all(
+                    f"`{key}: {str(value).lower()}`" in line.replace("True", "true")
+                    for key, value in getattr(level, part).items()
+                )
 
 
 PARTS = ("method", "scenario", "training", "study")
@@ -136,8 +152,6 @@ def test_a_study_is_resumed_and_comes_out_the_same(small, tmp_path):
     ids="-".join,
 )
 def test_every_level_can_be_tried(level, small):
-    from threading import Event
-
     reading = read_as(load_choices(), dict([level]))
     shares = Trial(0, reading, 1, load_curriculum(small), SIZE.method, [1000], Event())()
     assert len(shares) == 1

@@ -26,7 +26,7 @@ class StudySettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """What a level changes in how teams are trained and tested."""
 
     learn_in_tests: bool = False
-    """Cooperative and non-cooperative teams go on learning in every test, without exploring."""
+    """Cooperative and non-cooperative teams continue to learn in every test, without exploring."""
     fires: Annotated[float, Meta(gt=0, le=10)] = 1.0
     """How many times as many buildings burn at first, in trainings and tests."""
     alone_through_both: bool = False
