@@ -41,6 +41,9 @@ OF_KIND: Final[Mapping[type[Any], tuple[str, ...]]] = {
     Played: ("played", "actions"),
 }
 
+PLACE_DOCS: Final = {"scenario": "name of its scenario"}
+"""Of columns that are not what the field of the log is."""
+
 
 def tables_of(log: TrainingLog) -> tuple[str, ...]:
     """Return the names of the tables that a training has."""
@@ -247,7 +250,7 @@ def _docs(names: Collection[str]) -> list[ColumnDoc]:
     """Return what the columns mean that are fields of the log."""
     first = {of_kind[0]: kind for kind, of_kind in OF_KIND.items() if of_kind[0] in names}
     return [
-        (table, item.name, item.metadata["unit"], item.metadata["doc"])
+        (table, item.name, item.metadata["unit"], PLACE_DOCS.get(item.name, item.metadata["doc"]))
         for table, kind in first.items()
         for item in fields(kind)
         if "per" not in item.metadata

@@ -30,7 +30,10 @@ def test_rows_are_those_of_the_log(here, fireworld, make_log, method):
         n_lines = sum(line["of"] == name for line in lines)
         assert len(rows) == n_lines == json.loads(done.out)["n_rows"][name] > 0
     documented = (here / "tables" / "columns.csv").read_text()
-    wanted = "episodes,epsilon,,probability of exploring" if method == "paper" else "generations,score_mean,,"
+    assert method != "paper" or "episodes,scenario,,name of its scenario" in documented
+    wanted = (
+        "episodes,epsilon,probability,probability of exploring" if method == "paper" else "generations,score_mean,,"
+    )
     assert wanted in documented
 
 

@@ -63,7 +63,7 @@ def draw_paired_differences(panels: Sequence[DifferencePanel], *, title: str) ->
         axes.remove()
     figure.suptitle(label_text(title), fontsize=12, x=0.01, ha="left")
     figure.supxlabel(
-        "a point is a seed: B - A. Blue, upward: B is better; orange, downward: A is; grey: equal. "
+        "a triangle is a seed: B - A. Blue, pointing up: B is better; orange, pointing down: A is; grey dots: equal. "
         "Black: mean and 95 % interval.",
         fontsize=9,
     )
