@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -68,6 +69,10 @@ return [...document.querySelectorAll("button, select, input, a, canvas, summary,
   !element.hidden && element.getAttribute("aria-hidden") !== "true"
   && !(named(element) && (element.tagName !== "CANVAS" || element.getAttribute("role") === "img"))
 ).map((element) => element.outerHTML.slice(0, 90));
+"""
+AXE = """
+axe.run().then((found) => JSON.stringify({n_passed: found.passes.length, violations: found.violations.map(
+  (one) => [one.id, one.help, one.nodes.map((node) => node.html.slice(0, 120))])}))
 """
 
 
@@ -454,6 +459,21 @@ def test_it_opens_where_it_is_told_to(shown, small):
     assert shown.step() == 17
     shown.show(page, at="#5")
     assert shown.step() == 5, "the address goes before"
+
+
+@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize("size", [(1400, 900), (420, 800)])
+def test_axe_has_nothing_to_say(shown, one, two, size, dark):
+    """The rules of axe-core, for people who read the page with the ears or the keyboard."""
+    axe = pytest.importorskip("axe_core_python")
+    source = (Path(axe.__file__).parent / "axe.min.js").read_text(encoding="utf-8")
+    for page in (one, two):
+        shown.show(page, size=size, dark=dark)
+        shown.page.devtools("Runtime.evaluate", expression=source)
+        found = shown.page.devtools("Runtime.evaluate", expression=AXE, awaitPromise=True, returnByValue=True)
+        result = json.loads(found["result"]["value"])
+        assert result["violations"] == []
+        assert result["n_passed"] > 15
 
 
 def test_a_large_city_is_drawn_in_few_paths(shown):
