@@ -36,8 +36,8 @@ _VERDICTS: Final[Mapping[Judgement, FindingVerdict]] = {
     "cannot tell": "cannot",
 }
 _WORDS: Final[Mapping[FindingVerdict, str]] = {verdict: judgement for judgement, verdict in _VERDICTS.items()}
-_MARKS: Final = {"better": "good", "worse": "bad", "cannot tell": "open", "the same policy": "open"}
-_CAPTION: Final = "mean (interquartile mean); B - A [95 % interval]; P: a run of B is the better one"
+_MARKS: Final = {"better": "good", "worse": "bad", "equal": "open", "cannot tell": "open", "the same policy": "open"}
+_CAPTION: Final = "means; B - A [95 % interval]; P: a run of B is the better one"
 
 
 @dataclass(frozen=True)
