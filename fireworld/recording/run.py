@@ -6,17 +6,18 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, cast, overload
 
 import numpy as np
 
 from fireworld.arguments import path_of
-from fireworld.errors import FieldError, LogError, OutputError, expected, one_line
+from fireworld.errors import FieldError, LogError, expected, one_line
 from fireworld.outcome import QUANTITIES, Outcome, outcome_of
 from fireworld.records import Array, CityRecord, RunHeader, StepRecord, StoredRun
 
 if TYPE_CHECKING:
     import pandas
+    import polars
 
     from fireworld.picture import Picture
     from fireworld.recording.pages.notebook import PlayedPage
@@ -160,17 +161,15 @@ class Run:
             LogError: there is no such table.
             OutputError: pandas is not installed.
         """
-        try:
-            import pandas as pd
-        except ImportError:
-            raise OutputError("to_pandas: pandas is not installed; try pip install pandas") from None
-        from fireworld_recorder.tables import find_table, table_arrays
+        from fireworld_recorder.tables import to_pandas
 
-        frame = pd.DataFrame(table_arrays(self._recording, table))
-        for column in find_table(table).columns:
-            if column.names:
-                frame[column.name] = pd.Categorical(frame[column.name], categories=column.names)
-        return frame
+        return cast("pandas.DataFrame", to_pandas(self._recording, table))
+
+    def to_polars(self, table: str = "steps") -> polars.DataFrame:
+        """Return a table of the run as a data frame of polars; as `to_pandas`."""
+        from fireworld_recorder.tables import to_polars
+
+        return cast("polars.DataFrame", to_polars(self._recording, table))
 
     @overload
     def show(self, what: int) -> Picture: ...
