@@ -15,7 +15,7 @@ from fireworld.evaluation.comparison_runs import ComparisonRuns, RunnablePolicy,
 from fireworld.evaluation.inputs import scenarios_of, seeds_of
 from fireworld.evaluation.paired import compare_outcomes
 from fireworld.evaluation.results import open_results
-from fireworld.executors import AnyExecutor, in_processes, workers_for
+from fireworld.executors import AnyExecutor, in_this_process, workers_for
 from fireworld.interrupt import gentle_interrupt
 from fireworld.policy.names import note_on_team
 from fireworld.scenario import Scenario
@@ -83,7 +83,7 @@ def compare(
     for policy in found:
         if known.path is not None:
             policy.named.require_identity("results")
-        if in_processes(executor):
+        if not in_this_process(executor):
             policy.named.require_found_again("executor")
     cities = CityCache()
     built = {name: cities.build(one) for name, one in scenarios_of(scenarios, settings_of(set)).items()}
