@@ -53,8 +53,8 @@ def compare(
         first_seed: the first, where only their number is given.
         set: values of scenario keys, as in {"brigades.n": 7}; of all scenarios.
         executor: who makes the runs. None: all cores, in threads for policies that run in compiled code, in processes
-            for others that processes can find again; a number: as many at a time, likewise; "threads" or "processes":
-            all of them in these; or an executor of concurrent.futures.
+            for others that processes can find again; a number: as many at a time, likewise; a word of `--on` or an `On`
+            of `fireworld.executors`: all of them there; or an executor of concurrent.futures.
         results: a file (.parquet) to take known runs from, and to add the others to.
         metric: what the judgement is about: "score", "burnt-out", "time" or "civilians".
         margin: a loss that does not matter, in the metric's unit.

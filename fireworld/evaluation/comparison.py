@@ -37,7 +37,9 @@ _VERDICTS: Final[Mapping[Judgement, FindingVerdict]] = {
 }
 _WORDS: Final[Mapping[FindingVerdict, str]] = {verdict: judgement for judgement, verdict in _VERDICTS.items()}
 _MARKS: Final = {"better": "good", "worse": "bad", "cannot tell": "open", "the same policy": "open"}
-_CAPTION: Final = "mean (interquartile mean); B - A [95 % interval]; P: a run of B is the better one"
+_CAPTION: Final = (
+    "mean (interquartile mean); B - A [95 % interval]; P: a run of B is the better one; pairs: what pairing is worth"
+)
 
 
 @dataclass(frozen=True)
@@ -262,7 +264,7 @@ class Comparison:
 
     def __repr__(self) -> str:
         def text(one: Comparison) -> str:
-            table = text_table(_HEADS, _text_rows(one), "<>>>><")
+            table = text_table(_HEADS, _text_rows(one), "<>>>>><")
             return "\n".join([_title(one), table, _CAPTION, *one.notes])
 
         return "\n\n".join(map(text, self.each))
@@ -276,7 +278,7 @@ class Comparison:
         )
 
 
-_HEADS: Final = ("", "A", "B", "B - A", "P", "B is")
+_HEADS: Final = ("", "A", "B", "B - A", "P", "pairs", "B is")
 
 
 def _finding(one: Comparison, picture: str) -> Finding:

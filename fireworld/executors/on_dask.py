@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import os
+import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import contextmanager, suppress
@@ -23,8 +25,8 @@ AT_LEAST: Final = 4
 class DaskPool(Executor):
     """A client of Dask's as an executor whose work can be left."""
 
-    def __init__(self, client: Any) -> None:
-        self._client = client
+    def __init__(self, client: Any, cluster: Any = None) -> None:
+        self._client, self._cluster = client, cluster
         self._sent: dict[Future[Any], Any] = {}
 
     def submit(self, function: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
@@ -36,26 +38,30 @@ class DaskPool(Executor):
         return future
 
     def abandon(self) -> None:
-        """Take back what is not done."""
+        """Take back what is not done; of a cluster made for this work, end the workers, whatever they do."""
         with suppress(Exception):  # no cluster any more
             self._client.cancel([*self._sent.values()], force=True)
         self._sent.clear()
+        for nanny in [*self._cluster.workers.values()] if self._cluster is not None else ():
+            nanny.auto_restart = False
+            with suppress(OSError, TypeError):  # ended by itself
+                os.kill(nanny.pid, signal.SIGKILL)
 
     def _done(self, future: Future[Any], sent: Any) -> None:
         try:
             if sent.status == "finished":
                 future.set_result(sent.result())
             elif sent.status == "error":
-                future.set_exception(_told(sent.exception()))
+                future.set_exception(_error_of(sent.exception()))
             else:
                 future.set_exception(BrokenExecutor("the cluster is gone"))
-        except BaseException as error:  # noqa: BLE001 - the result did not arrive; nobody else would be told
+        except BaseException as error:  # noqa: BLE001 - the result did not arrive; nobody else would know
             future.set_exception(BrokenExecutor(str(error)))
         self._sent.pop(future, None)
 
 
-def _told(error: BaseException) -> BaseException:
-    """Return what is told of a task that failed."""
+def _error_of(error: BaseException) -> BaseException:
+    """Return the error that stands for that of a task."""
     if type(error).__name__ == "KilledWorker":
         n_killed = error.args[2] + 1
         return ExecutorError(f"dask: a part of the work killed {n_killed} workers: they crashed or ran out of memory")
@@ -104,7 +110,7 @@ def _local(library: Any, n: int) -> Iterator[Executor]:
         silence_logs=logging.CRITICAL,
     )
     with cluster, library.Client(cluster, set_as_default=False) as client:
-        yield DaskPool(client)
+        yield DaskPool(client, cluster)
 
 
 @contextmanager

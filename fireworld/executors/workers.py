@@ -25,7 +25,7 @@ class ExecutorError(FireworldError):
 
 @dataclass(frozen=True)
 class Unfinished:
-    """A result of a task that is not done: `rest` is the task that goes on, and its result the next one."""
+    """A result of a task that is not done: `rest` is the task that continues it."""
 
     part: Any
     rest: Callable[[], Any]
