@@ -1,4 +1,4 @@
-# fireworld: `make demo` shows it, `make check` checks it within a minute, `make test` checks all of it.
+# fireworld: `make demo` shows it (and installs no more than that), `make check` checks it within a minute, `make test` checks all of it.
 # Needs Python 3.11 or newer, and pip.
 PYTHON ?= python3
 WORKERS ?= 2
@@ -11,27 +11,46 @@ PICTURE := recordings/picture-
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help install demo check test static check-format check-lint check-types check-imports check-tests format docs oldest pictures fuzz faults bench check-teams clean
+.PHONY: help install demo check test static check-format check-lint check-types check-imports check-tests format docs site oldest pictures fuzz faults bench check-teams clean
 
 help:  ## List these targets.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 install: .venv/.installed  ## Make .venv with everything in it, and nothing else.
 
-# Written last, so that half an installation does not count; renewed when the requirements change. A Python without
-# ensurepip (Debian keeps it in a package of its own) lends its own pip to the new environment.
-.venv/.installed: pyproject.toml constraints.txt
-	$(PYTHON) -m venv .venv || { $(PYTHON) -m venv --without-pip .venv && $(PYTHON) -m pip --python $(BIN)/python install --quiet pip; }
-	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --editable '.[view,figures,gym,minari,dev]'
-	touch $@
+# What a demonstration shows: fireworld and the viewer. The stamps are written last, so that half an installation does not
+# count, and are renewed when the requirements change. A Python without ensurepip (Debian keeps it in a package of its own)
+# lends its own pip to the new environment.
+.venv/.demo: pyproject.toml constraints.txt
+	@echo "Installing fireworld and its viewer, Rerun, into .venv, once: 310 MB are downloaded, 1.1 GB of disk are taken."
+	@echo "That takes half a minute on a fast line, five minutes on one of 10 Mbit/s; nothing is shown meanwhile."
+	@$(PYTHON) -m venv .venv || { $(PYTHON) -m venv --without-pip .venv && $(PYTHON) -m pip --python $(BIN)/python install --quiet pip; }
+	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --editable '.[view]'
+	@touch $@
+
+.venv/.installed: .venv/.demo
+	@echo "Installing what develops and tests fireworld, once: another 150 MB are downloaded, .6 GB of disk are taken."
+	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --editable '.[view,figures,gym,minari,dev]'
+	@touch $@
 
 # No file is a target here: a recording is made anew each time, and half a one never counts as made.
-demo: install  ## Run the default scenario, record it, verify the recording and save it for Rerun.
-	mkdir -p recordings
+demo: .venv/.demo  ## Run the default scenario, record it, verify the recording, save it for Rerun and as a page that plays.
+	@echo "A fire in a city of 624 buildings, and a team of four brigades that learned to put it out. It takes five seconds,"
+	@echo "fifteen more the first time, when the simulator is compiled."
+	@mkdir -p recordings
 	$(BIN)/fireworld run default --record $(DEMO).mcap --force
 	$(BIN)/fireworld verify $(DEMO).mcap
 	$(BIN)/fireworld view $(DEMO).mcap --save $(DEMO).rrd --force
-	@echo "look at it: $(BIN)/fireworld view $(DEMO).mcap"
+	$(BIN)/fireworld play $(DEMO).mcap -o $(DEMO).html --force
+	@echo
+	@echo "$(DEMO).mcap   the recording: every step, every decision and its reason"
+	@echo "$(DEMO).html   the same as a page that plays, in any browser"
+	@echo "$(DEMO).rrd    the same for Rerun, in three dimensions"
+	@echo
+	@echo "Next:"
+	@echo "  look at it             $(BIN)/fireworld view $(DEMO).mcap, or open the page"
+	@echo "  see another team fail  $(BIN)/fireworld run test-1 --policy easiest"
+	@echo "  write a team           docs/tutorial-policy.md"
 
 # While you work: a minute on two cores, once the kernels and the types are cached.
 check: static  ## Check format, lint, types and imports, and run the tests that are not slow.
@@ -70,13 +89,22 @@ format: install  ## Format the code and fix what the linter can fix.
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-docs: install  ## Renew what is made from the code in docs/, and the transcripts in the README.
+docs: install  ## Renew what is made from the code in docs/, and what the commands in the pages print.
 	$(BIN)/python -m tests.docs.log_format
 	$(BIN)/python -m tests.docs.foxglove_schema
 	$(BIN)/python -m tests.docs.scenario_reference
 	$(BIN)/python -m tests.docs.contested_table
 	$(BIN)/python -m tests.docs.cli_reference
-	$(BIN)/python -m tests.docs.transcripts
+	$(BIN)/python -m tests.docs.blocks --renew
+
+site: .venv/.site  ## Make docs/ a web site that needs no network, reports/site.
+	PYTHONPATH=. NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@echo "open reports/site/index.html"
+
+.venv/.site: .venv/.demo
+	@echo "Installing what makes the site, once: another 30 MB are downloaded, 120 MB of disk are taken."
+	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --editable '.[view,docs]'
+	@touch $@
 
 pictures: install  ## Draw the pictures of the docs again, from runs made again.
 	mkdir -p docs/pictures recordings
@@ -111,5 +139,5 @@ check-teams: install  ## Train the teams that come with fireworld again; they mu
 
 clean:  ## Remove what the other targets made, .venv too.
 	rm -rf .venv .venv-oldest .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist build reports
-	rm -f $(DEMO).mcap $(DEMO).mcap.partial $(DEMO).rrd $(PICTURE)*.mcap
+	rm -f $(DEMO).mcap $(DEMO).mcap.partial $(DEMO).rrd $(DEMO).html $(PICTURE)*.mcap
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -127,7 +127,9 @@ def contestants(size: Size, fires: Fires, folder: Path, cities: CityCache) -> li
             1,
             lambda _, group: best_joint(fires[group]),
         ),
-        Contestant("planner", "rollouts at run time; the upper bound", 1, lambda _, __: Planner(), SEEDS_OF_PLANNER),
+        Contestant(
+            "planner", "rollouts at run time; over `best` it saves more", 1, lambda _, __: Planner(), SEEDS_OF_PLANNER
+        ),
         *(replace(rival, n_seeds=SEEDS_OF_RIVALS) for rival in rivals),
         Contestant("own-alone", f"search, own targets{SIGHT_WORDS['alone']}", n, workshop.ranking("own", "alone")),
         Contestant(

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ from benchmarks.machine import describe
 from fireworld.policy.asking import begin
 from fireworld.policy.names import find_policy
 from fireworld.scenario import load_scenario
-from fireworld.simulation.built import BuiltScenario, CityCache, build_scenario
+from fireworld.simulation.built import BuiltScenario, CityCache
 
 TESTS: Final = ("test-1", "test-2", "test-3")
 TRAINING: Final = tuple(f"train-{number}" for number in range(1, 9))
@@ -60,16 +61,14 @@ class Result:
     seconds: float  # processor time of an episode
 
 
-def contested(cities: CityCache) -> list[BuiltScenario]:
-    """Build the contested fires."""
-    base = load_scenario("test-1")
-    return [
-        build_scenario(
-            base.with_settings({"city.generated.seed": str(seed), "fires.0.at": at, "fires.0.n_buildings": str(n)}),
-            cities=cities,
-        )
+def contested(cities: CityCache, *, larger: bool = False) -> list[BuiltScenario]:
+    """Build the contested fires; `larger`: with a quarter more burning buildings."""
+    base, more = load_scenario("test-1"), 1.25 if larger else 1.0
+    settings = [
+        {"city.generated.seed": str(seed), "fires.0.at": at, "fires.0.n_buildings": str(math.ceil(more * n))}
         for seed, at, n in CONTESTED
     ]
+    return [cities.build(base.with_settings(one)) for one in settings]
 
 
 def play(built: BuiltScenario, options: str, seeds: Iterable[int]) -> Result:
@@ -88,7 +87,7 @@ def play(built: BuiltScenario, options: str, seeds: Iterable[int]) -> Result:
 
 @click.command()
 @click.option(
-    "--on", "which", type=click.Choice(["tests", "training", "contested"]), default="tests", show_default=True
+    "--on", "which", type=click.Choice(["tests", "training", "contested", "larger"]), default="tests", show_default=True
 )
 @click.option("--seeds", "n_seeds", default=20, show_default=True, help="Runs on each fire.")
 @click.option("--first-seed", default=1, show_default=True)
@@ -96,15 +95,15 @@ def play(built: BuiltScenario, options: str, seeds: Iterable[int]) -> Result:
 def main(which: str, n_seeds: int, first_seed: int, chosen: tuple[str, ...]) -> None:
     """Print score / maximum on every fire, their mean, and processor seconds an episode."""
     cities = CityCache()
-    if which == "contested":
-        stages = contested(cities)
+    if which in {"contested", "larger"}:
+        stages = contested(cities, larger=which == "larger")
     else:
         names = TESTS if which == "tests" else TRAINING
         stages = [cities.build(load_scenario(name)) for name in names]
     play(stages[0], "horizon=1", [0])  # compiles
     machine = describe()
     print(f"{machine['processor']}, {n_seeds} seeds from {first_seed}\n")
-    labels = [str(k) for k in range(1, len(stages) + 1)] if which == "contested" else list(names)
+    labels = [str(k) for k in range(1, len(stages) + 1)] if which in {"contested", "larger"} else list(names)
     print("| options | mean | " + " | ".join(labels) + " | s an episode |")
     print("|---" * (len(stages) + 3) + "|")
     for options in chosen or OPTIONS:

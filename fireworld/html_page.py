@@ -19,9 +19,12 @@ th { background: #f0ede6; font-weight: 600; } td.text, th.text { text-align: lef
 .good { background: #d8efd9; color: #17561d; } .fair { background: #fbeec3; color: #6a4d00; }
 .bad { background: #f8d9d5; color: #86201a; } .open { background: #e6e6ea; color: #444; }
 .caveat { background: #fbeec3; padding: .6rem 1rem; border-radius: 4px; }
+.table { overflow-x: auto; } td.text { overflow-wrap: anywhere; min-width: 9rem; }
 .maps { display: grid; grid-template-columns: repeat(3, 1fr); gap: .6rem; } img { max-width: 100%; }
 .credit { font-size: 12.5px; color: #555; margin-top: 2.6rem; }
-figure { margin: 0; } figcaption { font-size: 13px; color: #555; }
+figure { margin: 0; overflow-x: auto; }
+@media (max-width: 700px) { body { padding: 0 .8rem; } figure img { max-width: none; width: 54rem; } }
+figcaption { font-size: 13px; color: #555; }
 """
 """Marks are good, fair, bad or open."""
 
@@ -34,7 +37,10 @@ def html_page(title: str, body: Iterable[str], *, style: str = "") -> str:
         body: HTML, part by part.
         style: rules besides those that all pages share.
     """
-    head = f'<meta charset="utf-8"><title>{escape(title)}</title><style>{_STYLE}{style}</style>'
+    head = (
+        '<meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+        f"<title>{escape(title)}</title><style>{_STYLE}{style}</style>"
+    )
     return f'<!doctype html>\n<html lang="en"><head>{head}</head><body>\n' + "\n".join(body) + "\n</body></html>\n"
 
 
@@ -42,7 +48,7 @@ def html_table(heads: Sequence[str], rows: Iterable[Sequence[str]], *, n_text: i
     """Write a table; cells are HTML, to the right unless made by `text_cell`. The first `n_text` headings are words."""
     head = "".join(f"<th{' class=text' if k < n_text else ''}>{name}</th>" for k, name in enumerate(heads))
     body = "\n".join("<tr>" + "".join(_cell(cell) for cell in row) + "</tr>" for row in rows)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table>"
+    return f'<div class="table"><table><thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table></div>'
 
 
 def text_cell(html: str) -> str:

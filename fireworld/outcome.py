@@ -124,6 +124,8 @@ class Quantity:
 
 
 def _time(outcome: Outcome) -> str:
+    if outcome.completed and 2 * outcome.n_burnt_out > outcome.n_buildings:
+        return f"{outcome.steps} steps; the city burnt down"
     if outcome.completed:
         return f"{outcome.steps} steps"
     if outcome.n_burning == 0:  # a kernel continues when nothing burns any more

@@ -21,14 +21,23 @@ from fireworld.cli.progress import bar
     type=click.Path(path_type=Path),
     help="Write a Parquet file for each table into this folder.",
 )
+@click.option(
+    "--csv", metavar="DIR", type=click.Path(path_type=Path), help="Write a CSV file for each table into this folder."
+)
+@click.option(
+    "--jsonl",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Write a line of JSON for each row of all tables into this file.",
+)
 @click.option("--rlds", metavar="DIR", type=click.Path(path_type=Path), help="Write a dataset as Parquet files.")
 @click.option("--minari", metavar="ID", help="Write a dataset of Minari, as in fireworld/quick/random-v0.")
 @click.option(
     "--tables",
     metavar="NAMES",
-    help="Of --parquet, only these: city, buildings, brigades, decisions, civilians, sites, events, steps; of a "
-    "training episodes, steps, tables; of a search generations, candidates, fights; of what a learner played played, "
-    "actions. Separated by commas.",
+    help="Of --parquet, --csv and --jsonl, only these: city, buildings, brigades, decisions, civilians, sites, events, "
+    "steps; of a training episodes, steps, tables; of a search generations, candidates, fights; of what a learner "
+    "played played, actions. Separated by commas.",
 )
 @click.option(
     "--observation",
@@ -52,6 +61,8 @@ def command(
     *,
     logs: tuple[Path, ...],
     parquet: Path | None,
+    csv: Path | None,
+    jsonl: Path | None,
     rlds: Path | None,
     minari: str | None,
     tables: str | None,
@@ -64,32 +75,37 @@ def command(
     \b
     fireworld export run.mcap --parquet run
     fireworld export run.mcap --parquet run --tables buildings,steps --force
+    fireworld export run.mcap --csv run-csv
+    fireworld export run.mcap --jsonl run.jsonl --tables steps,events
     fireworld export runs/episodes-1.mcap run.mcap --rlds dataset
     fireworld export runs/episodes-1.mcap --minari fireworld/quick/mine-v0
 
     Of tables there is a row for each step and building, brigade and so on. Columns are named after the fields of the
     recording, with unit and meaning in the metadata of the column; the header of the run is the metadata of each file.
-    A recording that was cut off or damaged is exported as far as it is good.
+    With --csv columns.csv says what each column is and in which unit, with --jsonl the first line. Both need no
+    library, and hold one step in memory at a time. A recording that was cut off or damaged is exported as far as it is
+    good.
 
     A dataset has what brigades saw, could do, did and got, from logs of runs and of what learners played in
     environments. Every episode is played again for it, and docs/datasets.md explains how it is loaded back.
 
     Exit code: 0 exported, 2 could not export, 130 interrupted (nothing is left of it).
     """
-    if sum(one is not None for one in (parquet, rlds, minari)) != 1:
-        raise click.UsageError("Give one of --parquet, --rlds and --minari.")
+    if sum(one is not None for one in (parquet, csv, jsonl, rlds, minari)) != 1:
+        raise click.UsageError("Give one of --parquet, --csv, --jsonl, --rlds and --minari.")
     given = {name: value for name, value in dataset.items() if value is not None}
-    if parquet is not None:
-        if given or len(logs) > 1:
-            raise click.UsageError("--parquet takes one LOG, and no --observation, --reward or --own-targets.")
-        _export_tables(logs[0], parquet, tables, force=force, as_json=as_json)
-        return
+    for form, place in {"parquet": parquet, "csv": csv, "jsonl": jsonl}.items():
+        if place is not None:
+            if given or len(logs) > 1:
+                raise click.UsageError(f"--{form} takes one LOG, and no --observation, --reward or --own-targets.")
+            _export_tables(logs[0], place, form, tables, force=force, as_json=as_json)
+            return
     if tables is not None:
-        raise click.UsageError("--tables goes with --parquet.")
+        raise click.UsageError("--tables goes with --parquet, --csv and --jsonl.")
     _export_dataset(logs, rlds, minari, given, force=force, as_json=as_json)
 
 
-def _export_tables(log: Path, folder: Path, tables: str | None, *, force: bool, as_json: bool) -> None:
+def _export_tables(log: Path, folder: Path, form: str, tables: str | None, *, force: bool, as_json: bool) -> None:
     from fireworld.recording.export import export
     from fireworld.recording.inputs import is_training, open_run
     from fireworld.records import StoredRun
@@ -98,7 +114,7 @@ def _export_tables(log: Path, folder: Path, tables: str | None, *, force: bool, 
     chosen = None if tables is None else [name.strip() for name in tables.split(",")]
     recording = open_training(log, partial=True) if is_training(log) else open_run(log, partial=True)
     with bar("export", len(recording), quiet=as_json) as advance:
-        n_rows = export(recording, folder, tables=chosen, force=force, on_step=lambda _: advance())
+        n_rows = export(recording, folder, form=form, tables=chosen, force=force, on_step=lambda _: advance())
     if recording.damage is not None:
         unit = "step" if isinstance(recording, StoredRun) else recording.header.unit
         click.echo(f"{log}: {recording.damage}; exported {len(recording)} committed {unit}s", err=True)
@@ -108,7 +124,8 @@ def _export_tables(log: Path, folder: Path, tables: str | None, *, force: bool, 
         click.echo(json.dumps(known, indent=2))
         return
     for name, n in n_rows.items():
-        click.echo(f"{folder / name}.parquet: {n:,} rows")
+        place = f"{folder}: {name}" if form == "jsonl" else f"{folder / name}.{form}"
+        click.echo(f"{place}: {n:,} rows")
 
 
 def _export_dataset(

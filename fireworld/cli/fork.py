@@ -99,8 +99,9 @@ def command(
     else:
         found.show()
         original, _, _ = run.header.forked_from.partition(":")
-        same = "; the same run" if found.digest == original else f", where the score was {run.score_of_original:.3f}"
-        click.echo(f"forked from {log} after step {at}{same}")
+        ended = f", which ended with the score {run.score_of_original:.3f}"
+        same = "; the same run" if found.digest == original else ended
+        click.echo(f"forked after step {at} from {log}{same}")
     context.exit(INTERRUPTED if found.interrupted else 0)
 
 

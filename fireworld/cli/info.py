@@ -166,7 +166,8 @@ def _show(log: Log, summary: dict[str, Any]) -> None:
         outcome = final_outcome(log)
         lines["outcome"] = ", ".join(f"{quantity.label} {quantity.text(outcome)}" for quantity in QUANTITIES)
     lines["not recorded"] = header.get("not_recorded", "")
-    lines["snapshots"] = ", ".join(map(str, summary["snapshots"])) or "none"
+    at = summary["snapshots"]
+    lines["snapshots"] = f"{len(at)}, at step {', '.join(map(str, at))}" if at else "none"
     lines["attachments"] = ", ".join(f"{name} ({n} bytes)" for name, n in summary["attachments"].items()) or "none"
     for label, text in lines.items():
         if text:

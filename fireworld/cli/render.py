@@ -31,6 +31,7 @@ _STEPS_MAX: Final = 24
 @click.option("--to", "last", type=click.IntRange(min=0), metavar="N", help="Last step of a film.")
 @click.option("--every", type=click.IntRange(min=1), metavar="N", help="Only each N-th step of a film.  [default: 1]")
 @click.option("--fps", type=click.FloatRange(0.1, 50.0), metavar="X", help="Steps a second of a film.  [default: 10]")
+@click.option("--whole", is_flag=True, help="Show the whole city, not only the part in which it burns.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def command(
     *,
@@ -42,6 +43,7 @@ def command(
     last: int | None,
     every: int | None,
     fps: float | None,
+    whole: bool,
     force: bool,
 ) -> None:
     """Draw LOG, a recording, or two of one city side by side: a picture, a strip of pictures or a film.
@@ -66,7 +68,7 @@ def command(
     check_output(output, endings=ENDINGS, force=force)
     trainings = open_trainings(logs, doing="drawing")
     if trainings:
-        if any(option is not None for option in (step, steps, first, last, every, fps)):
+        if whole or any(option is not None for option in (step, steps, first, last, every, fps)):
             raise click.UsageError("A training is drawn whole: no steps, ranges or frames.")
         from fireworld.training.log.pages.page import render_training
 
@@ -76,7 +78,7 @@ def command(
     if output.suffix.lower() in FILMS:
         if step is not None or steps is not None:
             raise click.UsageError(f"--step and --steps go with pictures, not with films ({output.suffix}).")
-        _render_film(logs, output, first=first, last=last, every=every or 1, fps=fps, force=force)
+        _render_film(logs, output, first=first, last=last, every=every or 1, fps=fps, whole=whole, force=force)
         return
     if not (first is last is every is fps is None):
         raise click.UsageError(f"--from, --to, --every and --fps go with films, not with pictures ({output.suffix}).")
@@ -85,7 +87,7 @@ def command(
     chosen = _step_numbers("--steps", steps) if steps is not None else _step_numbers("--step", step or _LAST)
     if steps is None and len(chosen) > 1:
         raise click.UsageError(f"--step: expected one step, got {step!r}; several go with --steps.")
-    _render_picture(logs, output, chosen, force=force)
+    _render_picture(logs, output, chosen, whole=whole, force=force)
 
 
 def _step_numbers(option: str, text: str) -> list[int]:
@@ -98,10 +100,10 @@ def _step_numbers(option: str, text: str) -> list[int]:
     return [-1 if word == _LAST else int(word) for word in words]
 
 
-def _render_picture(paths: Sequence[Path], output: Path, steps: Sequence[int], *, force: bool) -> None:
+def _render_picture(paths: Sequence[Path], output: Path, steps: Sequence[int], *, whole: bool, force: bool) -> None:
     from fireworld.recording.pages.pictures import render_picture
 
-    render_picture(open_one_or_two(paths, doing="drawing"), output, steps=steps, force=force)
+    render_picture(open_one_or_two(paths, doing="drawing"), output, steps=steps, whole=whole, force=force)
     click.echo(f"{output}: {len(steps)} step{'s' if len(steps) > 1 else ''}, {_size(output)}")
 
 
@@ -113,6 +115,7 @@ def _render_film(
     last: int | None,
     every: int,
     fps: float | None,
+    whole: bool,
     force: bool,
 ) -> None:
     from fireworld_viewer.pictures.film import FPS
@@ -129,6 +132,7 @@ def _render_film(
             last_step=last,
             every=every,
             fps=fps or FPS,
+            whole=whole,
             force=force,
             on_frame=lambda done, total: progress.update(task, completed=done, total=total),
         )

@@ -133,8 +133,8 @@ class Ending:
         table.add_column(justify="right", overflow="fold")
         for quantity in QUANTITIES:
             table.add_row(quantity.label, quantity.text(self.outcome))
-        table.add_row("digest", self.digest)
         Console(markup=False, emoji=False).print(table)
+        click.echo(f"digest {self.digest}")
         if self.interrupted:
             click.echo(f"interrupted after step {self.outcome.steps}", err=True)
         if self.output is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING
@@ -18,6 +19,7 @@ from fireworld.cli.progress import BAR, DESCRIPTION, ELAPSED, bars, is_watched
 from fireworld.training.methods import method_names
 
 if TYPE_CHECKING:
+    from fireworld.training.hooks import Hook
     from fireworld.training.method import Report
     from fireworld.training.training import Callback, Training
 
@@ -68,6 +70,22 @@ if TYPE_CHECKING:
     type=click.IntRange(min=1),
     help="Record every N-th episode as a whole run too; --record then names an existing folder.",
 )
+@click.option(
+    "--jsonl",
+    metavar="F.jsonl",
+    type=click.Path(path_type=Path),
+    help="Write a line of JSON for every report while it learns.",
+)
+@click.option(
+    "--tensorboard",
+    metavar="DIR",
+    type=click.Path(path_type=Path),
+    help="Keep curves for TensorBoard in this folder; of several teams in DIR/seed-1 and so on.",
+)
+@click.option(
+    "--mlflow", metavar="DIR|URI", help="Keep curves and the team in MLflow, in a folder or at the address of a server."
+)
+@click.option("--strict", is_flag=True, help="Exit code 1 if any of these could not be kept to the end.")
 @click.option("--resume", is_flag=True, help="Continue from the checkpoint of an interrupted training.")
 @click.option("--force", is_flag=True, help="Replace existing files, checkpoints too.")
 @view_options
@@ -87,6 +105,10 @@ def command(
     log: Path | None,
     record: Path | None,
     full_every: int | None,
+    jsonl: Path | None,
+    tensorboard: Path | None,
+    mlflow: str | None,
+    strict: bool,
     resume: bool,
     force: bool,
     view: bool,
@@ -105,6 +127,7 @@ def command(
     fireworld train test-1 -o team.npz                   in a single scenario
     fireworld train -o best.npz --method search          a ranking of targets
     fireworld train -o team.npz --record training.mcap   every step on record
+    fireworld train -o team.npz --tensorboard runs/a     curves in TensorBoard; or --mlflow, --jsonl
     fireworld train -o team.npz --view                   curves while it learns, a fire after every stage
     fireworld run test-2 --policy team.npz               let it fight a fire
 
@@ -112,7 +135,10 @@ def command(
     bit for bit. With --record the log under way is the checkpoint, after a kill too; `info`, `verify`, `diff`, `view`,
     `report` and `export` read it, and `replay` writes any of its episodes as the log of a run.
 
-    Exit code: 0 trained, 2 could not train, 130 interrupted.
+    Curves of --jsonl, --tensorboard and --mlflow never cost a training: if a disk is full or a server gone, a line says
+    so once, and the training continues without them.
+
+    Exit code: 0 trained, 1 trained, but with --strict some curves are not complete, 2 could not train, 130 interrupted.
     """
     screen = find_screen(view=view, url=view_url)
     announce_compilation()
@@ -134,11 +160,34 @@ def command(
         resume=resume,
         force=force,
     )
+    for number, training in enumerate(trainings, 1):
+        training.attach(_hooks(training, number, len(trainings), jsonl, tensorboard, mlflow))
     with _progress(trainings) as progress, watched_trainings(screen, trainings) as watched:
         train_all(trainings, jobs=jobs, executor=executor_of(on, jobs), callbacks=(progress, watched))
     for training in trainings:
         _print_result(training)
-    context.exit(0 if all(training.team is not None for training in trainings) else INTERRUPTED)
+    if any(training.team is None for training in trainings):
+        context.exit(INTERRUPTED)
+    context.exit(1 if strict and any(hook.failure for training in trainings for hook in training.hooks) else 0)
+
+
+def _hooks(
+    training: Training, number: int, n: int, jsonl: Path | None, tensorboard: Path | None, mlflow: str | None
+) -> list[Hook]:
+    """Return what keeps the curves of the number-th of n trainings."""
+    from fireworld.training.hooks import JsonlCallback, MLflowCallback, TensorBoardCallback
+    from fireworld.training.train import numbered
+
+    hooks: list[Hook] = []
+    if (path := numbered("jsonl", jsonl, number, n)) is not None:
+        hooks.append(JsonlCallback(path))
+    if tensorboard is not None:
+        hooks.append(TensorBoardCallback(tensorboard if n == 1 else tensorboard / f"seed-{training.seed}"))
+    if mlflow is not None:
+        hooks.append(MLflowCallback(mlflow))
+    for hook in hooks:
+        hook.warn = partial(click.echo, err=True)
+    return hooks
 
 
 def _print_result(training: Training) -> None:

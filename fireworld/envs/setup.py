@@ -15,9 +15,10 @@ from fireworld.errors import expected
 from fireworld.scenario import Scenario, find_scenario
 from fireworld.scenario.document import Choices
 from fireworld.simulation.built import BuiltScenario, CityCache
+from fireworld.training.curriculum import Curriculum, find_curriculum, names_curriculum
 
-AnyScenario = str | Path | Scenario | Mapping[str, Any]
-"""A shipped name, a YAML file, a scenario, or the keys and values of one."""
+AnyScenario = str | Path | Scenario | Mapping[str, Any] | Curriculum
+"""A shipped name, a YAML file, a scenario, or the keys and values of one; or a curriculum for all of its scenarios."""
 Scenarios = AnyScenario | Sequence[AnyScenario]
 """One, or several that are played in turn: worker w plays number (w + episode) modulo their number."""
 
@@ -113,7 +114,7 @@ def setup_of(
         raise ArgumentError(expected("set", "choices", choices, values["choices"], f"try {other}"))
     forced = {} if choices is None else {"choices": choices}
     return Setup(
-        tuple(find_scenario(one).with_values({**values, **forced}) for one in several),
+        tuple(one.with_values({**values, **forced}) for given in several for one in _scenarios_of(given)),
         observation=observation_of(observation),
         reward=reward_of(reward),
         own_targets=whole_number("own_targets", own_targets, least=0, most=10_000),
@@ -121,3 +122,10 @@ def setup_of(
         steps=last_step_of(steps),
         record=None if record is None else os.fspath(record),
     )
+
+
+def _scenarios_of(given: AnyScenario) -> list[Scenario]:
+    """Return the scenario that is meant, or those of the curriculum."""
+    if isinstance(given, Curriculum) or (isinstance(given, str | Path) and names_curriculum(given)):
+        return find_curriculum(given).scenarios
+    return [find_scenario(given)]

@@ -36,10 +36,8 @@ _VERDICTS: Final[Mapping[Judgement, FindingVerdict]] = {
     "cannot tell": "cannot",
 }
 _WORDS: Final[Mapping[FindingVerdict, str]] = {verdict: judgement for judgement, verdict in _VERDICTS.items()}
-_MARKS: Final = {"better": "good", "worse": "bad", "cannot tell": "open", "the same policy": "open"}
-_CAPTION: Final = (
-    "mean (interquartile mean); B - A [95 % interval]; P: a run of B is the better one; pairs: what pairing is worth"
-)
+_MARKS: Final = {"better": "good", "worse": "bad", "equal": "open", "cannot tell": "open", "the same policy": "open"}
+_CAPTION: Final = "means; B - A [95 % interval]; P: a run of B is the better one; CRN: what pairing is worth"
 
 
 @dataclass(frozen=True)
@@ -278,7 +276,7 @@ class Comparison:
         )
 
 
-_HEADS: Final = ("", "A", "B", "B - A", "P", "pairs", "B is")
+_HEADS: Final = ("", "A", "B", "B - A", "P", "CRN", "B is")
 
 
 def _finding(one: Comparison, picture: str) -> Finding:

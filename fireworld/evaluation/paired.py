@@ -21,7 +21,7 @@ from fireworld.evaluation.statistics import Estimate, estimate, interquartile_me
 from fireworld.kernels.arrays import Array
 from fireworld.outcome import METRICS, Metric
 
-Verdict = Literal["better", "worse", "cannot tell", "the same policy"]
+Verdict = Literal["better", "worse", "equal", "cannot tell", "the same policy"]
 Judgement = Literal["not worse", "worse", "cannot tell"]
 
 N_SEEDS_MIN: Final = 6
@@ -40,10 +40,6 @@ class Side:
     interquartile_mean: float
     n_truncated: int
     """Runs in which the fire was not out at the last step, which stands for their time to complete."""
-
-    def text(self, digits: int) -> str:
-        """Return the mean and the interquartile mean for people."""
-        return f"{self.mean:.{digits}f} ({self.interquartile_mean:.{digits}f})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,9 +60,11 @@ class Pairing:
 
     @property
     def verdict(self) -> Verdict:
-        """What B is: better or worse where the interval leaves out zero and enough seeds differ."""
+        """What B is: better or worse where the interval leaves out zero and enough seeds differ, equal if none does."""
         if self.same_policy:
             return "the same policy"
+        if not self.n_differing and len(self.differences) >= N_SEEDS_MIN:
+            return "equal"
         low, high = self.interval_of_gain
         if self.n_differing < N_SEEDS_MIN:
             return "cannot tell"
@@ -108,12 +106,13 @@ class Pairing:
         """Cells of a table for people: metric, A, B, B - A, P, what pairing is worth, verdict."""
         digits = self.metric.digits
         difference = self.difference.text(digits=digits, sign=True)
-        sides = self.a.text(digits), self.b.text(digits)
+        sides = (f"{side.mean:.{digits}f}" for side in (self.a, self.b))
         return [self.metric.label, *sides, difference, f"{self.improvement.mean:.2f}", self._worth, self.verdict]
 
     @property
     def _worth(self) -> str:
-        return "-" if self.pairing_worth is None else f"{self.pairing_worth:.3g}"
+        worth = self.pairing_worth
+        return "-" if worth is None else f"{worth:.{1 if worth < 10 else 0}f}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values (docs/comparing-policies.md)."""
@@ -152,7 +151,7 @@ class Pairing:
         """Return in words how many more seeds would tell."""
         more = self.seeds_needed(margin=margin)
         if more is None:
-            return f"no number of seeds up to {N_SEEDS_MAX:,} would tell" if self.n_differing else "no run differs"
+            return f"no number of seeds up to {N_SEEDS_MAX:,} would tell"
         if len(self.differences) < N_SEEDS_MIN:
             return f"at least {more:,} more seeds are needed"
         return f"about {more:,} more seeds would tell"

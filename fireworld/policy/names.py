@@ -58,6 +58,8 @@ TEAM_ATTACHMENT: Final = "policy.npz"
 RECORDED: Final = "recorded"
 """Names the policy of brigades that decide as is recorded, whatever happens."""
 _FILE: Final = re.compile(rf"(.+?(?:{re.escape(CODE_SUFFIX)}|{re.escape(SUFFIX)}))(?::(.*))?", re.DOTALL)
+_OVER: Final = re.compile(rf"(?:{'|'.join(PLANNERS)}):(?:[^\"']*,)?over=(?=[^\"'])", re.DOTALL)
+"""The beginning of a planner's name, up to the policy that it is over."""
 
 
 class KnownPolicy(NamedTuple):
@@ -178,8 +180,16 @@ def policies() -> list[KnownPolicy]:
 
 def with_file(name: str, changed: Callable[[str], str]) -> str:
     """Return the name of a policy with another path of its file, if it names one."""
-    file = _FILE.fullmatch(name)
-    return name if file is None else changed(file[1]) + name[len(file[1]) :]
+    over = _OVER.match(name)
+    before = over[0] if over else ""
+    rest, more = (name[len(before) :], "") if not over else _until_comma(name[len(before) :])
+    file = _FILE.fullmatch(rest)
+    return name if file is None else before + changed(file[1]) + rest[len(file[1]) :] + more
+
+
+def _until_comma(text: str) -> tuple[str, str]:
+    end = text.find(",")
+    return (text, "") if end < 0 else (text[:end], text[end:])
 
 
 def note_on_team(named: NamedPolicy, n_brigades: int, *, choices: str = "") -> str:
@@ -219,7 +229,9 @@ def _by_name(text: str, more: Parameters) -> NamedPolicy:
         policy = make(**values)
         return NamedPolicy(name, policy.digest, policy, given=name)
     if ":" not in text and "." not in text:
-        raise _unknown(text)
+        if not Path(f"{text}{CODE_SUFFIX}").is_file():
+            raise _unknown(text)
+        source = f"{text}{CODE_SUFFIX}"
     module = import_source(source)
     thing = find_in(module, target or "", where=f"--policy: {source}")
     policy = make_policy(thing, values, where=where)
@@ -230,8 +242,9 @@ def _by_name(text: str, more: Parameters) -> NamedPolicy:
 
 def _split(text: str) -> tuple[str, str | None, str]:
     """Split SOURCE:TARGET:PARAMETERS; what holds a "=" is parameters, so a target can be left out."""
-    file = _FILE.fullmatch(text)
-    source = file[1] if file else text.partition(":")[0]
+    first = text.partition(":")[0]
+    file = None if first in BUILT_IN | PLANNERS else _FILE.fullmatch(text)
+    source = file[1] if file else first
     if source == text:
         return source, None, ""
     rest = text[len(source) + 1 :]
@@ -264,7 +277,5 @@ def _unknown(name: str) -> PolicyError:
     """Return the error for a name that no policy has."""
     names, meant = [*BUILT_IN, *PLANNERS, *team_names()], name.lower()
     near = [known for known in names if meant and meant in known] or get_close_matches(meant, names, n=1)
-    if name and Path(f"{name}{CODE_SUFFIX}").is_file():
-        near = [f"{name}{CODE_SUFFIX}"]
     hint = "try " + " or ".join(near) if near else "FILE.py:CLASS or MODULE:CLASS names one of your own"
     return PolicyError(expected("--policy", "", "one of " + ", ".join(names), name, hint))

@@ -7,7 +7,7 @@ import os
 from collections.abc import Collection, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, overload
+from typing import TYPE_CHECKING, Any, Final, Literal, overload
 
 from fireworld.errors import LogError, expected
 from fireworld.files import check_output, write_file
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from fireworld.cause import Cause
     from fireworld.findings import Finding
+    from fireworld.recording.pages.notebook import PlayedPage
     from fireworld.training.log.difference import TrainingDifference
     from fireworld.training.log.reader import TrainingLog
 
@@ -181,6 +182,24 @@ class Difference:
     def _file(self) -> str:
         """Run A as a file, "" if it is none."""
         return self.names[0] if getattr(self.runs[0], "path", None) is not None else ""
+
+    @overload
+    def show(self, what: Literal["play"] = "play") -> PlayedPage: ...
+    @overload
+    def show(self, what: Literal["rerun"]) -> Any: ...
+    def show(self, what: str = "play") -> Any:
+        """Return something that notebooks show: a page that plays both runs from their first difference on, or Rerun.
+
+        Args:
+            what: "play", or "rerun" for its widget.
+
+        Raises:
+            ArgumentError: it is neither.
+            ViewError: a run has no steps; for "rerun": Rerun, or its widget, is not installed.
+        """
+        from fireworld.recording.pages.notebook import show_difference
+
+        return show_difference(self, what)
 
     def page(self) -> str:
         """Return the comparison as an HTML page with maps and curves, which needs no other file.

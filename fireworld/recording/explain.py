@@ -19,7 +19,7 @@ from fireworld.recording.decisions import RecordedDecisions, check_same_draws
 from fireworld.recording.explanation.counterfactual import CounterfactualRun, MakePolicy, prepare_counterfactuals
 from fireworld.recording.explanation.search import ScoreAll, SearchResult, SpanEffect, search_effects
 from fireworld.recording.explanation.spans import DecisionSpan, find_spans
-from fireworld.recording.explanation.text import HEADS, closing_lines, opening_lines, rows
+from fireworld.recording.explanation.text import HEADS, SMALL_DIFFERENCE, closing_lines, opening_lines, rows
 from fireworld.recording.inputs import AnyRun, check_replayable, open_run, run_name
 from fireworld.recording.replay import Replay, build_recorded, check_replay
 from fireworld.recording.resume import recorded_policy
@@ -58,6 +58,11 @@ class Explanation:
     def difference(self) -> float:
         """Of the scores."""
         return self.better_score - self.worse_score
+
+    @property
+    def is_small(self) -> bool:
+        """Whether the difference is too small to be shared out."""
+        return self.difference < SMALL_DIFFERENCE * (len(self.better.city.civilian_hp) + 1)
 
     @property
     def effects(self) -> Sequence[SpanEffect]:

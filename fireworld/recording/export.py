@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,17 +24,19 @@ def export(
     log: AnyRun | TrainingLog,
     folder: Path | str,
     *,
+    form: str = "parquet",
     tables: Collection[str] | None = None,
     force: bool = False,
     on_step: Callable[[StepRecord | None], object] = lambda _: None,
 ) -> dict[str, int]:
-    """Write a recording as a folder of Parquet files, a file for each table, for pandas, polars, DuckDB and the like.
+    """Write a recording as tables, for pandas, polars, DuckDB and the like: as Parquet, CSV or JSON lines.
 
     A training has other tables than a run; see `fireworld.training.log.export.TABLES`.
 
     Args:
         log: the path of a recording, or a run; one that was cut off or damaged is exported as far as it is good.
-        folder: the folder to make.
+        folder: the folder to make, with a file for each table; of JSON lines the file.
+        form: "parquet", "csv" or "jsonl".
         tables: names of the tables to write; None: all.
         force: replace an earlier export.
         on_step: called after each step, or part of a training.
@@ -43,8 +46,11 @@ def export(
 
     Raises:
         LogError: the recording cannot be read.
-        OutputError: there is no such table, pyarrow is not installed, or the folder exists or cannot be written.
+        OutputError: there is no such form, pyarrow is not installed (for Parquet), or the folder exists or cannot be
+            written.
     """
+    if form != "parquet":
+        return _export_text(log, Path(folder), form, tables=tables, force=force, on_step=on_step)
     if find_spec("pyarrow") is None:
         raise OutputError("export: pyarrow is not installed; try pip install 'fireworld[archive]'")
     if is_training(log):
@@ -60,6 +66,27 @@ def export(
 
     chosen = TABLES if tables is None else tables
     return parquet.export(run, Path(folder), tables=chosen, force=force, on_step=on_step)
+
+
+def _export_text(
+    log: AnyRun | TrainingLog,
+    place: Path,
+    form: str,
+    *,
+    tables: Collection[str] | None,
+    force: bool,
+    on_step: Callable[[StepRecord | None], object],
+) -> dict[str, int]:
+    if is_training(log):
+        from fireworld.training.log.export import export_training_text
+        from fireworld.training.log.reader import opened
+
+        training = opened(log, partial=True)
+        on_part = partial(on_step, None)
+        return export_training_text(training, place, form, tables=tables, force=force, on_part=on_part)
+    from fireworld_recorder.text_tables import export_text
+
+    return export_text(open_run(log, partial=True), place, form, tables=tables, force=force, on_step=on_step)
 
 
 def recover(log: Path | str, output: Path | str, *, force: bool = False) -> Recovery:

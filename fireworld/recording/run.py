@@ -6,19 +6,21 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal, cast, overload
 
 import numpy as np
 
 from fireworld.arguments import path_of
-from fireworld.errors import FieldError, LogError, OutputError, expected, one_line
+from fireworld.errors import FieldError, LogError, expected, one_line
 from fireworld.outcome import QUANTITIES, Outcome, outcome_of
 from fireworld.records import Array, CityRecord, RunHeader, StepRecord, StoredRun
 
 if TYPE_CHECKING:
     import pandas
+    import polars
 
     from fireworld.picture import Picture
+    from fireworld.recording.pages.notebook import PlayedPage
 
 
 def open_log(path: str | os.PathLike[str], *, partial: bool = False) -> Run:
@@ -159,39 +161,57 @@ class Run:
             LogError: there is no such table.
             OutputError: pandas is not installed.
         """
-        try:
-            import pandas as pd
-        except ImportError:
-            raise OutputError("to_pandas: pandas is not installed; try pip install pandas") from None
-        from fireworld_recorder.tables import find_table, table_arrays
+        from fireworld_recorder.tables import to_pandas
 
-        frame = pd.DataFrame(table_arrays(self._recording, table))
-        for column in find_table(table).columns:
-            if column.names:
-                frame[column.name] = pd.Categorical(frame[column.name], categories=column.names)
-        return frame
+        return cast("pandas.DataFrame", to_pandas(self._recording, table))
 
-    def show(self, step: int = -1) -> Picture:
-        """Return a picture of the city after a step, which notebooks show.
+    def to_polars(self, table: str = "steps") -> polars.DataFrame:
+        """Return a table of the run as a data frame of polars; as `to_pandas`."""
+        from fireworld_recorder.tables import to_polars
+
+        return cast("polars.DataFrame", to_polars(self._recording, table))
+
+    @overload
+    def show(self, what: int) -> Picture: ...
+    @overload
+    def show(self, what: Literal["play"] = "play") -> PlayedPage: ...
+    @overload
+    def show(self, what: Literal["rerun"]) -> Any: ...
+    def show(self, what: int | str = "play") -> Any:
+        """Return something that notebooks show: the page that plays the run, a map, or Rerun's widget.
 
         Args:
-            step: its number; -1 is the last.
+            what: "play"; the number of a step for a map of the city after it, -1 is the last; or "rerun".
 
         Raises:
+            ArgumentError: it is none of these.
             LogError: there is no such step.
-            ViewError: matplotlib is not installed.
+            ViewError: the run has no steps; for a map: matplotlib is not installed; for "rerun": Rerun, or its widget.
         """
-        from fireworld.recording.pages.pictures import map_of
+        if isinstance(what, int):
+            from fireworld.recording.pages.pictures import map_of
 
-        return map_of(self, self[step])
+            return map_of(self, self[what])
+        from fireworld.recording.pages.notebook import show_run
 
-    def film(self, path: str | os.PathLike[str], *, fps: float = 10.0, every: int = 1, force: bool = False) -> Path:
+        return show_run(self._recording, what)
+
+    def film(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        fps: float = 10.0,
+        every: int = 1,
+        whole: bool = False,
+        force: bool = False,
+    ) -> Path:
         """Write a film of the run.
 
         Args:
             path: a .gif or .mp4 file.
             fps: steps a second.
             every: only each n-th step.
+            whole: show the whole city, not only the part in which it burns.
             force: replace an existing file.
 
         Raises:
@@ -201,7 +221,7 @@ class Run:
         from fireworld.recording.pages.pictures import render_film
 
         output = path_of("path", path)
-        render_film(self._recording, output, fps=fps, every=every, force=force)
+        render_film(self._recording, output, fps=fps, every=every, whole=whole, force=force)
         return output
 
     def view(self, *, save: str | os.PathLike[str] | None = None, force: bool = False) -> None:

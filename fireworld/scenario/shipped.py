@@ -22,6 +22,9 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     if str(name_or_path) in names:
         return read_scenario(shipped_folder() / f"{name_or_path}.yaml", source=str(name_or_path))
     path = Path(name_or_path)
+    if path.suffix == ".mcap":
+        hint = f"`fireworld view {path}` shows a recording, `fireworld verify {path}` runs it again"
+        raise ScenarioError(expected(str(path), "", "a scenario", "a recording", hint))
     if path.suffix in {".yaml", ".yml"} or path.parent != Path() or path.is_file():
         return read_scenario(path)
     hint = nearest(str(name_or_path), names, otherwise="try `fireworld scenarios`")

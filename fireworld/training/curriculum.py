@@ -110,6 +110,17 @@ def curriculum_names() -> list[str]:
     return sorted(path.stem for path in (shipped_folder() / "curricula").glob("*.yaml"))
 
 
+def names_curriculum(given: str | Path) -> bool:
+    """Return whether a name or a path is that of a curriculum; a file that cannot be read is none."""
+    if str(given) in curriculum_names() or str(given) in scenario_names():
+        return str(given) in curriculum_names()
+    try:
+        document = _read_document(Path(given), source=str(given))
+    except FireworldError:
+        return False
+    return isinstance(document, dict) and "stages" in document
+
+
 def find_curriculum(given: str | Path | Curriculum | Scenario) -> Curriculum:
     """Return the curriculum that is meant, or a curriculum of the one scenario that is meant.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
@@ -266,6 +267,20 @@ class Trainer(ABC, Generic[AMethod, AReport]):
     @abstractmethod
     def points(self, report: AReport) -> Mapping[str, Mapping[str, float]]:
         """Return what is drawn of the last report: by plot, then by curve; "" is a plot's only curve."""
+
+    def numbers(self, report: AReport) -> dict[str, float]:
+        """Return the numbers of the last report by name, for tools that keep curves.
+
+        They are the columns of the log that are numbers, then what is drawn and is no column, as in "td_error/50".
+        """
+        columns = {key: float(value) for key, value in report.as_dict().items() if isinstance(value, int | float)}
+        drawn = {
+            re.sub(r"[^\w./-]+", "_", f"{plot}/{curve}" if curve else plot).strip("_"): value
+            for plot, curves in self.points(report).items()
+            for curve, value in curves.items()
+            if plot not in columns
+        }
+        return {**columns, **drawn}
 
     def page(self) -> str:
         """Return a text about the team as it is now, in Markdown, to be read beside its own plots."""

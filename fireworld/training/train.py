@@ -13,6 +13,7 @@ from fireworld.policy.teams.team import Team
 from fireworld.scenario import Scenario
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import Curriculum, find_curriculum
+from fireworld.training.hooks.hook import Hook
 from fireworld.training.log.episode_run import FullEpisodes
 from fireworld.training.method import COUNT_MAX, Method
 from fireworld.training.methods import find_method
@@ -62,7 +63,8 @@ def train(
             `Training` (`seed`, `n_reports`, `trainer.share_done`, `trainer.team()`); `report` is of the method, such
             as `EpisodeReport` or `Generation`: its `as_dict()` is a line of the log, its `text` is for people. A
             callback that raises `StopTraining` stops the training: `train` returns the team as it is, and leaves a
-            checkpoint instead of the output.
+            checkpoint instead of the output. A `Hook` of `fireworld.training.hooks` keeps curves in another tool; if it
+            fails while the training is under way, a warning says so, and the training continues.
         jobs: fights at a time, where the method has many at once; None: as many as there are cores.
 
     Returns:
@@ -91,7 +93,8 @@ def train(
         resume=resume,
         force=force,
     )
-    train_all([training], jobs=jobs, callbacks=callbacks)
+    training.attach([one for one in callbacks if isinstance(one, Hook)])
+    train_all([training], jobs=jobs, callbacks=[one for one in callbacks if not isinstance(one, Hook)])
     if training.team is None and not training.stopped:
         raise Interrupted(training.interruption)
     return training.team if training.team is not None else training.trainer.team()
@@ -138,10 +141,10 @@ def prepare_trainings(
     trainings = [
         Training(
             trainer=way.trainer(chosen, seed=seed + number - 1, cities=cities),
-            path=_numbered("output", output, number, repetitions),
-            record=_numbered("record", record if folder is None else folder / TRAINING_FILE, number, repetitions),
+            path=numbered("output", output, number, repetitions),
+            record=numbered("record", record if folder is None else folder / TRAINING_FILE, number, repetitions),
             full=_full_episodes(folder, full_every, number, repetitions, force=force),
-            log_path=_numbered("log", log, number, repetitions),
+            log_path=numbered("log", log, number, repetitions),
             force=force,
         )
         for number in range(1, repetitions + 1)
@@ -183,7 +186,7 @@ def _full_episodes(
     return FullEpisodes(own, every, force)
 
 
-def _numbered(name: str, path: str | Path | None, number: int, repetitions: int) -> Path | None:
+def numbered(name: str, path: str | Path | None, number: int, repetitions: int) -> Path | None:
     """Return the file of one of several trainings: TEAM-3.npz; TEAM.npz if it is the only one."""
     if path is None:
         return None

@@ -20,6 +20,7 @@ from fireworld.files import check_output, check_outputs, write_file
 from fireworld.interrupt import gentle_interrupt
 from fireworld.policy.teams.npz import SUFFIX
 from fireworld.policy.teams.team import Team, read_team, write_team
+from fireworld.training.hooks.hook import DONE, FAILED, STOPPED, Hook, StopTraining
 from fireworld.training.method import Report, Trainer
 
 if TYPE_CHECKING:
@@ -29,10 +30,6 @@ if TYPE_CHECKING:
 
 CHECKPOINT_SUFFIX: Final = ".checkpoint"
 HINT: Final = "name what it was begun with, or begin again with --force"
-
-
-class StopTraining(Exception):  # noqa: N818 - not an error
-    """Raise it in a callback to stop a training: as Ctrl-C does, after what is under way, with a checkpoint."""
 
 
 @dataclass
@@ -50,6 +47,7 @@ class Training:
         n_reports: how often it has reported, interrupted trainings before this one included.
         has_checkpoint: whether there is a checkpoint of this training.
         stopped: whether a callback raised StopTraining.
+        hooks: callbacks of this training that have a beginning and an end; see `attach`.
     """
 
     trainer: Trainer[Any, Any]
@@ -62,6 +60,7 @@ class Training:
     n_reports: int = 0
     has_checkpoint: bool = False
     stopped: bool = False
+    hooks: Sequence[Hook] = ()
     log: str = field(default="", repr=False)
     error: Exception | None = field(default=None, repr=False)
     _resumes: bool = field(default=False, repr=False)
@@ -80,6 +79,56 @@ class Training:
         return self.path and self.path.with_name(self.path.name + CHECKPOINT_SUFFIX)
 
     @property
+    def outputs(self) -> list[Path]:
+        """The files that it writes, but the checkpoint."""
+        return [path for path in (self.path, self.log_path, self.record) if path is not None]
+
+    @property
+    def continues(self) -> bool:
+        """Whether it continues an interrupted training."""
+        return self.n_reports > 0 or self._resumes
+
+    @property
+    def ending(self) -> str:
+        """How it has ended, if it is not under way: done, stopped or failed."""
+        return DONE if self.team is not None else STOPPED if self.error is None else FAILED
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """What decides what comes of it, as flat plain values: curriculum, method, hyperparameters, seed, version."""
+        known = self.trainer.identity
+        curriculum, method = known["curriculum"], known["method"]
+        return {
+            "curriculum": curriculum["name"],
+            "curriculum_digest": curriculum["digest"],
+            "method": method["name"],
+            **self.trainer.method.as_dict(),
+            "seed": known["seed"],
+            "fireworld": known["fireworld"],
+        }
+
+    @property
+    def table(self) -> str:
+        """All reports so far as CSV, a line for each, below the names of the columns."""
+        return _csv_line(self.trainer.report_type.columns()) + self.log
+
+    def numbers(self, report: Report) -> dict[str, float]:
+        """Return the numbers of the last report by name; see `Trainer.numbers`."""
+        return self.trainer.numbers(report)
+
+    def attach(self, hooks: Sequence[Hook]) -> None:
+        """Let hooks follow this training, which has begun or been resumed, but not run.
+
+        Raises:
+            FireworldError: one of them could not begin.
+        """
+        paths = [hook.path for hook in hooks if hook.path is not None]
+        check_outputs(paths, force=True, inputs=self.outputs)
+        for hook in hooks:
+            hook.check(self)
+        self.hooks = hooks
+
+    @property
     def interruption(self) -> str:
         """How far an interrupted training has come, and how to continue."""
         done = f"interrupted after {self.n_reports} {self.trainer.unit}s"
@@ -91,8 +140,7 @@ class Training:
         Raises:
             OutputError: a file is in the way, or a folder is missing.
         """
-        outputs = [path for path in (self.path, self.log_path, self.record) if path is not None]
-        check_outputs(outputs, force=self.force)
+        check_outputs(self.outputs, force=self.force)
         if self.path is not None:
             check_output(self.path, force=self.force, endings=(SUFFIX,))
         if self.checkpoint is not None and self.checkpoint.exists() and not self.force:
@@ -158,20 +206,26 @@ class Training:
 
         Args:
             workers: when their `stop` is set, the training stops after what is under way, with a checkpoint.
-            callbacks: called with this training and the report, after every report.
+            callbacks: called with this training and the report, after every report, as the training's hooks are.
 
         Raises:
             OutputError: something cannot be written; the last checkpoint stays.
         """
+        if self.team is not None or workers.stop.is_set():
+            return
         try:
-            self._run(workers, callbacks)
+            for hook in self.hooks:
+                hook.start(self)
+                self.trainer.watched = True
+            self._run(workers, [*self.hooks, *callbacks])
         except Exception as error:
             self.error = error
             raise
+        finally:
+            for hook in self.hooks:
+                hook.finish(self)
 
     def _run(self, workers: Workers, callbacks: Sequence[Callback]) -> None:
-        if self.team is not None or workers.stop.is_set():
-            return
         if self.full is not None:
             self.full.begin(self.trainer)
         with self._recorder() as recorder:
@@ -265,7 +319,7 @@ class Training:
 
     def _write_log(self) -> None:
         if self.log_path is not None:
-            write_file(self.log_path, (_csv_line(self.trainer.report_type.columns()) + self.log).encode())
+            write_file(self.log_path, self.table)
 
     def _with_checkpoint(self, error: OutputError) -> OutputError:
         return OutputError(

@@ -50,6 +50,7 @@ def check_format(found: str, kind: LogKind = RUN) -> None:
     hint = "it was written by a newer fireworld: try to upgrade" if newer else ""
     if name != ours_name and name in NOUNS:
         hint = f"it is the log of a {NOUNS[name]}, not of a {kind.noun}"
+        hint += "; `fireworld replay` makes the log of a run of any episode" if kind == RUN else ""
     raise ForeignError(expected("format", "", kind.format, found, hint))
 
 

@@ -15,9 +15,8 @@ import pyarrow.parquet as pq
 from fireworld.errors import LogError
 from fireworld.files import new_folder
 from fireworld.records import Array, StepRecord, StoredRun
-from fireworld_recorder.header import to_metadata
 from fireworld_recorder.reader import Log
-from fireworld_recorder.tables import TABLES, ExportColumn, ExportTable, find_table, joined, n_rows_of
+from fireworld_recorder.tables import TABLES, ExportColumn, ExportTable, facts_of, find_table, joined, n_rows_of
 
 SUFFIX: Final = ".parquet"
 ROWS_PER_GROUP: Final = 1 << 17
@@ -50,7 +49,7 @@ def export(
         LogError: there is no such table, the log changed since it was opened, or a step in it makes no sense.
         OutputError: the folder exists, or cannot be written.
     """
-    metadata = _metadata(log)
+    metadata = facts_of(log)
     chosen = [find_table(name) for name in (TABLES if tables is None else tables)]
     own = {f"{name}{SUFFIX}" for name in TABLES}
     with new_folder(folder, own=own, force=force) as scratch, ExitStack() as stack:
@@ -74,13 +73,6 @@ def export(
         for writer in writers.values():
             writer.flush()
     return {name: writer.n_rows for name, writer in writers.items()}
-
-
-def _metadata(log: StoredRun) -> dict[str, str]:
-    """Return the metadata of every file: the header, how far the run is good, the digest."""
-    header = {key: text for key, text in to_metadata(log.header).items() if ":" not in key and key != "checksum"}
-    facts = {"digest": log.digest, "state": log.state, "damage": log.damage or "", "n_steps": str(len(log))}
-    return {f"fireworld.{key}": text for key, text in sorted({**header, **facts}.items())}
 
 
 class _TableWriter:

@@ -5,14 +5,15 @@ Which fields make which table follows from what they are declared to have entrie
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from operator import attrgetter
 from typing import Any, Final
 
 import numpy as np
 
-from fireworld.errors import LogError, expected, nearest
+from fireworld.errors import LogError, OutputError, expected, nearest
 from fireworld.records import (
     ACTIONS,
     DTYPES,
@@ -29,7 +30,9 @@ from fireworld.records import (
     Rewards,
     Score,
     Steps,
+    StoredRun,
 )
+from fireworld_recorder.header import to_metadata
 from fireworld_recorder.schema import Commit, Field, message_of
 
 _NUMPY_TYPES: Final[Mapping[str, str]] = {**DTYPES, "bool": "|b1"}
@@ -137,7 +140,55 @@ def table_arrays(run: Steps, name: str) -> dict[str, Array]:
         LogError: there is no such table, or a step makes no sense.
     """
     table = find_table(name)
-    read = [table.read(record, run.header.lacks) for record in ([run.city] if name == "city" else run)]
+    return arrays_of(table, [run.city] if name == "city" else run, run.header.lacks)
+
+
+def to_pandas(run: Steps, name: str) -> Any:
+    """Return a table over all steps as a data frame of pandas; columns of names are categorical.
+
+    Args:
+        run: the run; it is iterated over once.
+        name: of the table.
+
+    Raises:
+        LogError: there is no such table, or a step makes no sense.
+        OutputError: pandas is not installed.
+    """
+    table, pandas = find_table(name), import_frames("pandas")
+    frame = pandas.DataFrame(table_arrays(run, name))
+    for column in table.columns:
+        if column.names:
+            frame[column.name] = pandas.Categorical(frame[column.name], categories=column.names)
+    return frame
+
+
+def to_polars(run: Steps, name: str) -> Any:
+    """Return a table over all steps as a data frame of polars; columns of names are of type Enum; as `to_pandas`."""
+    table, polars = find_table(name), import_frames("polars")
+    arrays, series = table_arrays(run, name), []
+    for column in table.columns:
+        if column.names:
+            kind = polars.Enum(column.names)
+            series.append(polars.Series(column.name, arrays[column.name].tolist(), dtype=kind))
+            continue
+        values = np.ma.asarray(arrays[column.name])
+        found = polars.Series(column.name, values.data)
+        missing = np.ma.getmaskarray(values)
+        series.append(found.set(polars.Series(missing), None) if missing.any() else found)
+    return polars.DataFrame(series)
+
+
+def import_frames(name: str) -> Any:
+    """Return the library pandas or polars; OutputError if it is not installed."""
+    try:
+        return import_module(name)
+    except ImportError:
+        raise OutputError(f"to_{name}: {name} is not installed; try pip install 'fireworld[frames]'") from None
+
+
+def arrays_of(table: ExportTable, records: Iterable[Any], lacks: Callable[[str], bool]) -> dict[str, Array]:
+    """Return the rows that some steps (or the city) add to a table, as `table_arrays` does; errors as for it."""
+    read = [table.read(record, lacks) for record in records]
     lengths = [n_rows_of(values) for values in read]
     arrays: dict[str, Array] = {}
     for k, column in enumerate(table.columns):
@@ -147,6 +198,13 @@ def table_arrays(run: Steps, name: str) -> dict[str, Array]:
         else:
             arrays[column.name] = values if values.mask.any() else values.data
     return arrays
+
+
+def facts_of(log: StoredRun) -> dict[str, str]:
+    """Return what is known of a run as a whole: its header, how far it is good, its digest."""
+    header = {key: text for key, text in to_metadata(log.header).items() if ":" not in key and key != "checksum"}
+    facts = {"digest": log.digest, "state": log.state, "damage": log.damage or "", "n_steps": str(len(log))}
+    return {f"fireworld.{key}": text for key, text in sorted({**header, **facts}.items())}
 
 
 def find_table(name: str) -> ExportTable:

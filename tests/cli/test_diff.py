@@ -330,9 +330,11 @@ def test_the_page_holds_everything_itself(diff, tmp_path, monkeypatch):
     text = (tmp_path / "out.html").read_text(encoding="utf-8")
     page = Page(text)
     assert page.open == []
-    assert page.tags.count("img") == 7  # three maps of two steps, and the curves
+    assert page.tags.count("img") == 5  # both maps and what differs, at two steps, and the curves
+    assert page.tags.count("iframe") == 1
     assert all(source.startswith("data:image/png;base64,iVBOR") for source in page.loaded)
-    assert not re.search(r"url\(|@import|<script|https?:", text)
+    outside = re.sub(r'srcdoc="[^"]*"', "", text)
+    assert not re.search(r"url\(|@import|<script|https?:", outside)
     words = " ".join(page.words)
     assert "step 21, choose: brigade 1 chose nearest-to-me, was nearest-to-civilian" in words
     for heading in ("The first difference", "How it spread", "Curves", "The last step of both", "Topics"):

@@ -40,11 +40,21 @@ def test_the_closing_table(here, fireworld):
     assert "recorded" not in done.out
 
 
-def test_the_table_shows_the_whole_digest_on_a_narrow_terminal(here, fireworld, monkeypatch):
+def test_the_digest_stands_on_one_line(here, fireworld, monkeypatch):
     digest = outcome_of(fireworld(*SHORT, "--json"))["digest"]
     monkeypatch.setenv("COLUMNS", "60")
-    shown = "".join(character for character in fireworld(*SHORT).out if character.isalnum())
-    assert digest in shown
+    assert f"digest {digest}" in fireworld(*SHORT).out.splitlines()
+
+
+def test_a_recording_is_no_scenario(here, fireworld):
+    assert fireworld(*SHORT, "--record", "a.mcap").code == 0
+    done = fireworld("run", "a.mcap")
+    assert (done.code, done.out) == (2, "")
+    assert done.err.startswith("fireworld: a.mcap: expected a scenario, got a recording; `fireworld view a.mcap` ")
+
+
+def test_a_city_that_burnt_down_is_said_to_have(here, fireworld):
+    assert "; the city burnt down" in fireworld("run", "test-1", "--policy", "easiest").out
 
 
 def test_the_outcome_as_json(here, fireworld):

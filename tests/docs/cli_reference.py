@@ -24,9 +24,12 @@ met), 2 could not be done, 130 interrupted.
 The tab key completes commands and options, once the shell knows how. One of these lines in the shell's own file does
 it: `~/.bashrc`, `~/.zshrc`, `~/.config/fish/completions/fireworld.fish`.
 
-    eval "$(_FIREWORLD_COMPLETE=bash_source fireworld)"
-    eval "$(_FIREWORLD_COMPLETE=zsh_source fireworld)"
-    _FIREWORLD_COMPLETE=fish_source fireworld | source
+<!-- not run: each is for another shell; tests/docs/test_project.py calls them -->
+```sh
+eval "$(_FIREWORLD_COMPLETE=bash_source fireworld)"
+eval "$(_FIREWORLD_COMPLETE=zsh_source fireworld)"
+_FIREWORLD_COMPLETE=fish_source fireworld | source
+```
 """
 
 

@@ -12,6 +12,7 @@ README = ROOT / "README.md"
 FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SILENT = " > /dev/null"
 """At the end of a command: its output is not shown."""
+REDIRECTED = re.compile(r" > \S+$")
 LINK = re.compile(r"\[[^\]\[]*\]\(([^()\s]+)\)")
 
 
@@ -37,7 +38,7 @@ def code(page: Path) -> list[str]:
 
 def commands(page: Path) -> list[list[str]]:
     """Return the words after `fireworld` of every command in a page's code, remarks left out, `&&` taken apart."""
-    lines = [line.removeprefix("$ ").removesuffix(SILENT) for line in code(page)]
+    lines = [REDIRECTED.sub("", line.removeprefix("$ ")) for line in code(page)]
     parts = [part.strip() for line in lines for part in line.split("&&")]
     return [shlex.split(part, comments=True)[1:] for part in parts if part.startswith("fireworld ")]
 

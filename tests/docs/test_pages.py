@@ -51,7 +51,7 @@ def test_commands_are_real(words):
         return
     scenario, policy = given.get("scenario"), given.get("policy")
     assert scenario in {None, "NAME", *scenario_names()} or scenario.endswith(".yaml")
-    assert policy in {None, *BUILT_IN, *PLANNERS, *team_names()} or ":" in policy or policy.endswith(".npz")
+    assert policy in {None, *BUILT_IN, *PLANNERS, *team_names()} or ":" in policy or policy.endswith((".npz", ".py"))
 
 
 def test_the_model_has_every_section_that_code_cites():
@@ -74,8 +74,8 @@ def test_the_architecture_names_folders_that_exist():
 
 def test_the_architecture_shows_the_layers_that_are_enforced():
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-    block = page.partition("\nImports go down only, and never between neighbours of one line:\n\n")[2].partition(
-        "\n\n"
+    block = page.partition("Imports go down only, and never between neighbours of one line:\n\n```text\n")[2].partition(
+        "```"
     )[0]
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     (layers,) = (

@@ -104,3 +104,15 @@ def completion(instruction, **variables):
     program = Path(sys.executable).with_name("fireworld")
     found = os.environ | variables | {"_FIREWORLD_COMPLETE": instruction}
     return subprocess.run([program], capture_output=True, text=True, check=True, env=found).stdout
+
+
+def test_a_demonstration_installs_what_it_shows_and_ends_with_files_to_look_at():
+    rules = dict(re.findall(r"^([\w./-]+:[^\n]*)\n((?:\t[^\n]*\n)+)", MAKEFILE, re.MULTILINE))
+    demo = next(recipe for head, recipe in rules.items() if head.startswith("demo: .venv/.demo "))
+    installs = next(recipe for head, recipe in rules.items() if head.startswith(".venv/.demo: "))
+    assert re.findall(r"--editable (\S+)", installs) == ["'.[view]'"]
+    assert " MB are downloaded" in installs
+    shown = demo.partition("Next:")
+    assert all(f"$(DEMO).{ending} " in shown[0].rpartition("--force")[2] for ending in ("mcap", "html", "rrd"))
+    assert shown[2].count("@echo") == 3
+    assert any(head.startswith(".venv/.installed: .venv/.demo") for head in rules)

@@ -10,6 +10,7 @@ from fireworld import envs
 from fireworld.arguments import ArgumentError
 from fireworld.errors import ScenarioError
 from fireworld.kernels.arrays import TOTAL
+from fireworld.training.curriculum import find_curriculum
 from fireworld.training.seeds import Seeds
 from tests.envs.towns import HOT, LATER, SMALL, built, by_table, reference, table_policy
 
@@ -217,6 +218,19 @@ def test_mistakes_of_making(name):
     make, message = MISTAKES[name]
     with pytest.raises(ArgumentError, match=message):
         make()
+
+
+def test_curricula_are_all_of_their_scenarios(tmp_path):
+    learned = find_curriculum("paper")
+    (tmp_path / "mine.yaml").write_text("stages: [{name: one, cooperation: true, scenarios: [quick, train-1]}]\n")
+    for given, names in (
+        (["quick", "paper"], ["quick", *(scenario.name for scenario in learned.scenarios)]),
+        (tmp_path / "mine.yaml", ["quick", "train-1"]),
+    ):
+        worlds = envs.worlds(given, 2, set={"steps": 7})
+        assert [scenario.name for scenario in worlds.scenarios] == names
+        assert {scenario.steps for scenario in worlds.scenarios} == {7}
+    assert len(envs.worlds(learned.only([learned.stages[-1].name])).scenarios) == len(learned.stages[-1].scenarios)
 
 
 def test_scenarios_that_are_not_there():

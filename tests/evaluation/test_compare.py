@@ -54,7 +54,7 @@ def test_a_policy_asked_step_by_step_meets_its_compiled_twin_in_processes_too(fi
     alone = compared(fireworld, *words, "--jobs", 1)
     assert not alone["same_policy"]
     for each in alone["comparisons"]:
-        assert (each["n_differing"], each["reason"]) == (0, "no run differs")
+        assert (each["n_differing"], each["verdict"], each["reason"]) == (0, "equal", "")
     assert compared(fireworld, *words, "--jobs", 2) == alone
 
 
@@ -289,3 +289,8 @@ def test_help_imports_nothing_heavy():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ)
     assert done.stdout.endswith("set()\n"), done.stdout
+
+
+def test_the_table_fits_in_eighty_columns(fireworld):
+    done = fireworld("compare", "chief", "best", "--scenarios", "quick", "--seeds", 6)
+    assert all(len(line) <= 80 for line in done.out.splitlines()[:7])

@@ -62,7 +62,7 @@ def test_fewer_of_the_burnt_out_is_better_and_so_is_less_time():
     assert judge(by_name["burnt-out"]) == "not worse"
     assert judge(by_name["time"]) == "worse"
     assert judge(by_name["time"], margin=1.0) == "not worse"
-    assert by_name["score"].verdict == "cannot tell"
+    assert by_name["score"].verdict == "equal"
 
 
 def test_over_all_every_scenario_counts_the_same():
@@ -134,7 +134,9 @@ def test_equal_policies_are_seldom_told_apart():
 
 def test_no_number_of_seeds_tells_what_does_not_differ():
     ties = score_of(GROWING, GROWING)
-    assert (ties.verdict, ties.more_seeds, ties.reason) == ("cannot tell", None, "no run differs")
+    assert (ties.verdict, ties.more_seeds, ties.reason) == ("equal", None, "")
+    few = score_of(GROWING[: N_SEEDS_MIN - 1], GROWING[: N_SEEDS_MIN - 1])
+    assert (few.verdict, few.reason) == ("cannot tell", "at least 1 more seeds are needed")
     assert ties.improvement.mean == 0.5
     assert judge(ties) == "not worse", "that much is told"
     balanced = score_of([0.0] * 8, [1.0, -1.0] * 4)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import gc
 import json
 import os
 import shutil
@@ -296,3 +297,30 @@ def test_inner_functions_have_no_machine_code():
     done = subprocess.run([sys.executable, "-c", command], env=environment, capture_output=True, text=True, check=False)
     assert done.stdout == "InnerCache\n"
     assert done.stderr.splitlines()[-1].startswith("TypeError: hash_key is for kernels only")
+
+
+@pytest.mark.parametrize("enabled", [True, False])
+def test_compilation_leaves_the_collection_of_garbage_as_it_was(enabled, monkeypatch):
+    seen = []
+
+    @jit.kernel
+    def thrice(x: float) -> float:
+        return 3 * x
+
+    monkeypatch.setattr(thrice._compiler, "compile", _remembering(thrice._compiler.compile, seen))
+    was_enabled = gc.isenabled()
+    try:
+        (gc.enable if enabled else gc.disable)()
+        assert thrice(2.0) == 6.0
+        assert gc.isenabled() == enabled
+    finally:
+        (gc.enable if was_enabled else gc.disable)()
+    assert seen == [False]
+
+
+def _remembering(compile_it, seen):
+    def compiled(*given):
+        seen.append(gc.isenabled())
+        return compile_it(*given)
+
+    return compiled

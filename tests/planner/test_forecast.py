@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fireworld.planning.planner import BURNING_COST, FIRST_SEED, Forecast, PlannerOptions
+from fireworld.planning.planner import BURNING_COST, FIRST_SEED, FOLLOW, Forecast, PlannerOptions
 from fireworld.policy.kernel import KernelPolicy, always
+from fireworld.policy.names import find_policy
 from fireworld.policy.protocol import Decision
 from fireworld.simulation.state import copy_world, named_arrays
 from tests.simulation.town import play, town_world
@@ -86,3 +87,18 @@ def test_a_value_depends_neither_on_what_was_tried_before_nor_on_the_seed_of_the
     used.value((0, 0, 0))
     used.value((1, 1, 1))
     assert used.value(ASSIGNMENT) == fresh.value(ASSIGNMENT) == used.value(ASSIGNMENT)
+
+
+def test_brigades_follow_a_policy_in_rollouts():
+    world = town_world(seed=3)
+    moment, room, options = moment_of(world, 2), copy_world(world.state), PlannerOptions(12, 1, 1)
+    plain, over_me = Forecast(moment, room, options), Forecast(moment, room, options, always(3))
+    assert over_me.value((2, FOLLOW, 1)) == plain.value((2, 3, 1))
+    best = find_policy("best").policy
+    twin = town_world(seed=3, n_steps_max=13)
+    play(twin, always(3), to=1)
+    twin.seed = FIRST_SEED + 2
+    twin.run(best.for_brigades(3))
+    outcome = twin.state.outcome
+    value = Forecast(moment, room, options, best).value((FOLLOW,) * 3)
+    assert value == outcome.score[0] / outcome.score[1] - BURNING_COST * outcome.counts[0]

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import pytest
 from fireworld_recorder.diff import compare
 
+import fireworld
 from fireworld.errors import PolicyError
 from fireworld.planning.planner import Planner, PlannerOptions
 from fireworld.policy.asking import begin, name_of
 from fireworld.policy.kernel import always
-from fireworld.policy.names import find_policy
+from fireworld.policy.names import find_policy, with_file
 from fireworld.recording.replay import Replay
 from fireworld.records import MemoryRecording
 from fireworld.scenario import load_scenario
@@ -116,12 +118,18 @@ def test_names():
     assert len(digests) == 4
     assert find_policy("planner:horizon=31").digest == find_policy("planner", parameters={"horizon": 31}).digest
     assert find_policy("planner:horizon=30").digest == find_policy("planner").digest == Planner().digest
+    assert Planner().digest == "e24cd65692ed9895d57e9199d94e9ad1c06e3d8be068955e1133774f449f7188", (
+        "a promise to old logs"
+    )
+    over = {find_policy(name).digest for name in ("planner:over=best", "planner:over=chief", "planner:milliseconds=5")}
+    assert len(over - digests) == 3
+    assert Planner(over=find_policy("best")).digest == find_policy("planner:over=best").digest
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("horizn=3", "--policy: planner: expected parameters horizon, interval, rollouts, got 'horizn'; try horizon"),
+        ("horizn=3", "planner: expected parameters horizon, .*, over, milliseconds, got 'horizn'; try horizon"),
         ("horizon=", "--policy: planner:horizon: expected a whole number from 1 to 1000, got ''"),
         ("horizon=0", "from 1 to 1000, got 0"),
         ("interval=-1", "planner:interval: expected a whole number from 1 to 1000, got -1"),
@@ -131,6 +139,9 @@ def test_names():
         ("rollouts=\u0663", "expected a whole number"),
         ("horizon=99999999999999999999", "from 1 to 1000"),
         ("horizon=3,horizon=4", "--policy: planner: expected every parameter once, got horizon twice"),
+        ("milliseconds=-1", "planner:milliseconds: expected a whole number from 0 to 60000, got -1"),
+        ("over=planner", "planner:over: expected a rule, a team or a network, which kernels follow, got 'planner'"),
+        ("over=besst", "expected one of .*, got 'besst'; try best"),
         ("horizon=3,", "--policy: planner: expected parameters as in k=3,near=true, got 'horizon=3,'"),
     ],
 )
@@ -148,3 +159,31 @@ def test_a_module_of_that_name_is_still_ones_own(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
     assert name_of(find_policy("planner:Mine").policy) == "planner:Mine"
     del sys.modules["planner"]
+
+
+def test_it_is_over_a_file_too(tmp_path, monkeypatch):
+    content = (Path(fireworld.__file__).parent / "shipped/teams/best.npz").read_bytes()
+    (tmp_path / "teams").mkdir()
+    (tmp_path / "teams" / "mine.npz").write_bytes(content)
+    monkeypatch.chdir(tmp_path)
+    named = find_policy("planner:horizon=5,over=teams/mine.npz,interval=2")
+    assert named.digest == find_policy("planner:over=best,horizon=5,interval=2").digest
+    moved = with_file(named.name, lambda path: f"up/{path}")
+    assert moved == "planner:horizon=5,over=up/teams/mine.npz,interval=2"
+    assert with_file("planner:over=best", lambda path: f"up/{path}") == "planner:over=best"
+
+
+def test_what_it_is_over_decides_where_no_action_is_better(built):
+    """With a horizon of a step nothing tells the options apart, and the first is to follow."""
+    best, over = decisions_of(built.world(seed=3), find_policy("best").policy, n_steps=1), []
+    over = decisions_of(built.world(seed=3), Planner(horizon=1, over="best"), n_steps=1)
+    assert [(each.action, each.target) for each in over[0]] == [(each.action, each.target) for each in best[0]]
+    assert all(len(each.q_values) == 4 for each in over[0] if each.action >= 0)
+
+
+def test_over_a_team_it_is_better_than_the_team(built):
+    scores = {}
+    for name in ("nearest-to-center", "planner:over=nearest-to-center,horizon=10"):
+        last = list(prepare_run(built, find_policy(name), seed=4, n_steps_max=60))[-1]
+        scores[name] = last.score.score
+    assert scores["planner:over=nearest-to-center,horizon=10"] > scores["nearest-to-center"]

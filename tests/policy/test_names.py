@@ -173,7 +173,7 @@ def test_a_file_that_changed_is_imported_again(here):
 
 def test_the_only_class_needs_no_name(here):
     (here / "mine.py").write_text(NEAR + "class _Hidden(Near): ...\nAlias = Near\nfrom collections import Counter\n")
-    for name in ("mine.py", "mine.py:", "mine:", "./mine.py", "mine:k=1", "mine.py:k=1"):
+    for name in ("mine", "mine.py", "mine.py:", "mine:", "./mine.py", "mine:k=1", "mine.py:k=1"):
         named = find_policy(name)
         assert (named.name, name_of(named.policy)) == (name, "mine:Near")
     assert find_policy("mine.py").identity == find_policy("mine:Near").identity
@@ -181,8 +181,10 @@ def test_the_only_class_needs_no_name(here):
     wanted = r"^--policy: two.py: expected one policy class .*, got Near, Far; name one of them, as in :Near$"
     with pytest.raises(PolicyError, match=wanted):
         find_policy("two.py")
-    with pytest.raises(PolicyError, match=r"one of easiest.*, got 'two'; try two.py$"):
+    with pytest.raises(PolicyError, match=wanted):
         find_policy("two")
+    with pytest.raises(PolicyError, match=r"one of easiest.*, got 'three'; FILE.py:CLASS or MODULE:CLASS names "):
+        find_policy("three")
 
 
 def test_parameters(here):

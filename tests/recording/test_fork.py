@@ -227,10 +227,10 @@ def test_a_stopped_run_is_gone_on_with(here, answer, recordings):
 def test_the_table(here, fireworld):
     same = fireworld("fork", "easiest.mcap", "--at", 20)
     assert (same.code, same.err) == (0, "")
-    assert "forked from easiest.mcap after step 20; the same run\n" in same.out
+    assert "forked after step 20 from easiest.mcap; the same run\n" in same.out
     score = open_log("easiest.mcap").step(STEPS).score.score
     other = fireworld("fork", "easiest.mcap", "--at", 20, "--policy", "chief")
-    assert f"forked from easiest.mcap after step 20, where the score was {score:.3f}\n" in other.out
+    assert f"forked after step 20 from easiest.mcap, which ended with the score {score:.3f}\n" in other.out
 
 
 WRONG = {

@@ -8,8 +8,9 @@ from concurrent.futures import ProcessPoolExecutor
 import pytest
 from fireworld_recorder.reader import open_log
 
+import fireworld as fw
 from fireworld.arguments import ArgumentError
-from fireworld.errors import FireworldError, LogError, OutputError, PolicyError
+from fireworld.errors import FireworldError, LogError, OutputError, PolicyError, ViewError
 from fireworld.policy.protocol import Action, Decision
 from fireworld.recording.difference import diff
 from fireworld.recording.explain import explain
@@ -47,6 +48,32 @@ def test_a_difference_shows_itself(here):
     assert difference.first.sentence in html
     assert "How it spread" in html
     assert "<img" not in html
+
+
+def test_runs_and_differences_play_in_a_notebook(here):
+    run, difference = fw.open_log("easiest.mcap"), diff("easiest.mcap", "random.mcap")
+    for shown, n_runs in ((run.show(), 1), (difference.show(), 2)):
+        html = shown._repr_html_()
+        assert html.startswith("<iframe")
+        assert "&lt;!doctype html&gt;" in html
+        assert shown.html == shown.save(here / "page.html").read_text(encoding="utf-8")
+        assert repr(shown).startswith("<PlayedPage ")
+        assert repr(shown).count("seed") == n_runs
+    assert run.show(-1).png == run.show(60).png
+    with pytest.raises(ArgumentError, match="what: expected a step, 'play' or 'rerun', got 'film'"):
+        run.show("film")
+    with pytest.raises(ArgumentError, match="what: expected a step"):
+        difference.show("")
+
+
+def test_a_missing_widget_takes_a_line(here):
+    notebook = pytest.importorskip("rerun.notebook")
+    if notebook.HAS_NOTEBOOK:
+        pytest.skip("the widget is here")
+    with pytest.raises(
+        ViewError, match=r"show: Rerun's widget is not installed; try pip install 'rerun-sdk\[notebook\]"
+    ):
+        fw.open_log("easiest.mcap").show("rerun")
 
 
 def test_runs_of_one_digest(here):

@@ -134,9 +134,9 @@ def test_policy_show_and_diff(here, fireworld):
     assert content["n_changed"] > 0
     assert len(content["changed"]) <= 20
     assert fireworld(*TRAIN, "c.npz", "--stages", "alone").code == 0
-    refused = fireworld("policy", "diff", "a.npz", "c.npz")
-    assert refused.code == 2
-    assert refused.err == "fireworld: B: tables: expected 3 of 4320 states, as in A, got 1 of 270 states\n"
+    alone = fireworld("policy", "diff", "a.npz", "c.npz", "--limit", 2)
+    assert (alone.code, alone.err) == (1, "")
+    assert " of 4320 states, " in alone.out
     assert fireworld("policy", "show", "a.npz", "5000").code == 2
 
 

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fireworld.errors import PolicyError, TrainingError
+from fireworld.errors import PolicyError
 from fireworld.kernels.observation import state_index
 from fireworld.policy.teams.table_team import TableTeam
 from fireworld.policy.teams.team import compare_teams
@@ -146,10 +146,16 @@ def test_how_long_choices_are_kept_is_a_difference():
     assert not compare_teams(make_team(), make_team(commit=2)).same_actions
 
 
-@pytest.mark.parametrize("other", [{"n_states": 270}, {"n_tables": 2}])
-def test_what_cannot_be_compared(other):
-    with pytest.raises(TrainingError, match="B: tables: expected 1 of 4320 states, as in A, got "):
-        compare_teams(make_team(), make_team(**other))
+def test_a_team_that_sees_less_is_compared_in_all_states_of_the_other():
+    state, alone = state_of((3, 0, 0, 2, 0, 0, 0, 1)), state_of((3, 0, 0, 2, 0, 0, 0, 0)) // 16
+    a = make_team({(1, state): (0, 0, 0, 1)}, n_tables=2)
+    b = make_team({(0, alone): (0, 0, 1, 0)}, n_states=270)
+    for found, order in ((compare_teams(a, b), 1), (compare_teams(b, a), -1)):
+        assert {len(changed) for changed in found.changed} == {2}
+        assert [one.table for one, _ in found.changed] == [0] * 16 + [1] * 16
+        assert {one.state // 16 for one, _ in found.changed} == {alone}
+        differing = [(one.action, other.action) for one, other in found.changed if (one.table, one.state) == (1, state)]
+        assert differing == [(3, 2)[::order]]
 
 
 def test_choices_are_frozen():

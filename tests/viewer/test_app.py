@@ -8,16 +8,20 @@ import socket
 import subprocess
 import sys
 import urllib.request
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 import rerun
 from fireworld_viewer.rerun_view import app
-from fireworld_viewer.rerun_view.blueprint import frame_fire, frame_from_above, title
+from fireworld_viewer.rerun_view.blueprint import Camera, frame_all, frame_from_above, title
+from fireworld_viewer.rerun_view.brigades import positions_m
 from fireworld_viewer.rerun_view.pages import OutcomePage
 
 from fireworld.errors import OutputError, ViewError
+from fireworld.records import MemoryRecording
 from tests.viewer import rrd
 from tests.viewer.conftest import make_recording
 
@@ -208,12 +212,31 @@ def test_the_viewer_reports_no_usage():
     assert environment["HOME"] == "/home/me"
 
 
-def test_the_camera_looks_at_the_fire_from_the_south(small):
-    camera = frame_fire([small], aspect=1.8)
-    assert camera.target_m[2] == 0
-    assert 0 < camera.target_m[0] < 100
-    assert camera.eye_m[1] < camera.target_m[1]
-    assert camera.eye_m[2] > 50
+def on_screen(camera: Camera, places: np.ndarray, *, aspect: float) -> np.ndarray:
+    """Where places, (k, 3), are seen, (k, 2): -1 to 1 from edge to edge of the view."""
+    forward = np.subtract(camera.target_m, camera.eye_m)
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, camera.up)
+    right /= np.linalg.norm(right)
+    x, y, depth = ((places - camera.eye_m) @ axis for axis in (right, np.cross(right, forward), forward))
+    return np.column_stack([x / aspect, y]) / depth[:, np.newaxis] / math.tan(math.radians(27.5))
+
+
+@pytest.mark.parametrize("aspect", [0.8, 1.5, 2.5])
+def test_the_camera_sees_all_that_burns_and_the_whole_team(small, slower, aspect: float):
+    away = replace(list(small)[3].brigades, x_m=np.array([-600.0, 20.0, 30.0]), y_m=np.array([900.0, 0.0, 10.0]))
+    records = [*list(small)[:3], replace(list(small)[3], brigades=away)]
+    for runs in ([small], [small, slower], [MemoryRecording(small.header, small.city, records)]):
+        camera = frame_all(runs, aspect=aspect)
+        assert camera.target_m[2] == 0
+        assert camera.eye_m[1] < camera.target_m[1], "it looks from the south"
+        burnt = [one.column("/buildings", "fieryness").any(axis=0) for one in runs]
+        city = small.city
+        places = np.column_stack([city.center_x_m, city.center_y_m, 0 * city.center_x_m])[np.any(burnt, axis=0)]
+        team = np.concatenate([positions_m(one).reshape(-1, 3) for one in runs])
+        seen = on_screen(camera, np.concatenate([places, team]), aspect=aspect)
+        assert np.abs(seen).max() < 1.0
+    assert np.abs(seen).max() > 0.8, "and little more than that"
 
 
 def test_the_map_from_above_shows_the_whole_box_with_north_up():

@@ -80,7 +80,7 @@ def test_the_outcome_and_the_first_difference_are_those_that_diff_tells(logs, tm
     first = compare(logs.small, logs.slower).first
     assert first is not None
     (line,) = found["/diff/log/first_difference"]["TextLog:text"]
-    assert (line[0], line[1].as_py()) == (first.step, [f"first difference: {first.sentence}"])
+    assert (line[0], line[1].as_py()) == (first.step, [f"{first.step}  first difference: {first.sentence}"])
     page = found["/outcome"]["TextDocument:text"][0][1].as_py()[0]
     assert "| A: a.mcap | B: b.mcap |" in page
     assert "| steps | 41 | 31 |" in page

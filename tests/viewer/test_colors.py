@@ -56,10 +56,20 @@ def contrast(one: colors.Rgb, other: colors.Rgb) -> float:
     return (light + 0.05) / (dark + 0.05)
 
 
+def test_two_runs_have_colors_that_mean_nothing_else():
+    """Blue is water, yellow to red is fire; better and worse are not colors of a run."""
+    others = {
+        *colors.FIERYNESS_RGB, *colors.ACTIVITY_RGB, *colors.HEALTH_RGB, colors.WATER_RGB, colors.REFUGE_RGB,
+        *colors.DIFFERENCE_RGB, colors.DIFFERS_RGB,
+    }  # fmt: skip
+    assert not others & {*colors.RUN_RGB}
+    assert not {colors.BETTER_RGB, colors.WORSE_RGB} & {*colors.FIERYNESS_RGB, *colors.ACTIVITY_RGB, colors.WATER_RGB}
+
+
 def test_curves_and_logs_are_to_be_read_on_black_and_on_white():
     events = [rgb for *_, rgb in narration._EVENT_LINES.values()]
     single_run = [*colors.BRIGADE_RGB, *plots._COUNT_RGB, *plots._REWARD_RGB]
-    scores = [rgb for pair in plots._SCORE_RGB.values() for rgb in pair]
+    scores = [*plots._SCORE_RGB, *colors.RUN_RGB]
     for rgb in (*events, *single_run, *map(colors.paler, single_run), *scores):
         assert contrast(rgb, (255, 255, 255)) > 2.2, rgb
         assert contrast(rgb, (13, 16, 17)) > 2.2, rgb  # Rerun's dark background

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from fireworld_viewer import colors
 from fireworld_viewer.rerun_view import app
+from fireworld_viewer.rerun_view.layers import _UNNAMED
 from fireworld_viewer.rerun_view.pages import OutcomePage
 from fireworld_viewer.rerun_view.run_layers import AGREEMENT
 from fireworld_viewer.story.steps import DAMAGE_ORDER, common_steps, compare_damage
@@ -67,10 +68,11 @@ def test_the_difference_is_colored_at_every_step(small, slower, tmp_path: Path):
 def test_both_runs_are_told_apart_in_one_plot(small, slower, tmp_path: Path):
     app.save([small, slower], tmp_path / "pair.rrd")
     found = rrd.read(tmp_path / "pair.rrd")
-    names = [found[f"{side}/plots/buildings"]["SeriesLines:names"][0][1].as_py() for side in ("/a", "/b")]
-    assert [name[0] for name in names] == ["A burning", "B burning"]
-    looks = [found[f"{side}/plots/score"]["SeriesLines:colors"][0][1].as_py() for side in ("/a", "/b")]
-    assert not set(looks[0]) & set(looks[1])
+    for plot in ("burning", "score"):
+        names = [found[f"{side}/plots/{plot}"]["SeriesLines:names"][0][1].as_py() for side in ("/a", "/b")]
+        assert names == [["A"], ["B"]]
+        looks = [found[f"{side}/plots/{plot}"]["SeriesLines:colors"][0][1].as_py() for side in ("/a", "/b")]
+        assert looks == [colors.single(rgb).tolist() for rgb in colors.RUN_RGB]
 
 
 def test_the_first_difference_is_marked_and_the_outcome_is_a_page(small, slower, tmp_path: Path):
@@ -83,10 +85,12 @@ def test_the_first_difference_is_marked_and_the_outcome_is_a_page(small, slower,
     app.save([small, slower], tmp_path / "pair.rrd", outcome=outcome)
     found = rrd.read(tmp_path / "pair.rrd")
     (line,) = found["/diff/log/first_difference"]["TextLog:text"]
-    assert (line[0], line[1].as_py()) == (2, ["first difference: step 2, fire: building 5 burns"])
+    assert (line[0], line[1].as_py()) == (2, ["2  first difference: step 2, fire: building 5 burns"])
     (mark,) = found["/diff/plots/first_difference"]["Scalars:scalars"]
     assert mark[0] == 2
-    lane = [(step, state.as_py()[0]) for step, state in found["/diff/agreement"]["StateChange:state"]]
+    lane = [
+        (step, state.as_py()[0].removesuffix(_UNNAMED)) for step, state in found["/diff/agreement"]["StateChange:state"]
+    ]
     codes_a, codes_b = (one.column("/buildings", "fieryness") for one in (small, slower))
     differ = int(np.flatnonzero(np.any(codes_a[:31] != codes_b, axis=1))[0])
     wanted = [(0, AGREEMENT[0]), (2, AGREEMENT[1])][: 2 if differ > 2 else 1]
@@ -119,7 +123,7 @@ def test_the_same_run_twice_differs_nowhere(small, tmp_path: Path):
 
 def test_different_cities_are_refused(small, tmp_path: Path):
     other = make_recording(5, 5, 3)
-    said = r"expected two recordings of one city, got 'grid' with 36 .* and 'grid' with 25"
+    said = r"expected two of one city, got 'grid' with 36 .* and 'grid' with 25"
     with pytest.raises(ViewError, match=said):
         app.save([small, other], tmp_path / "x.rrd")
     taller = MemoryRecording(small.header, replace(small.city, floors=small.city.floors + 1), list(small))
@@ -129,5 +133,5 @@ def test_different_cities_are_refused(small, tmp_path: Path):
 
 
 def test_a_run_without_steps_is_refused():
-    with pytest.raises(ViewError, match="expected two recordings with steps, got 3 and 0 steps"):
+    with pytest.raises(ViewError, match="expected two with steps, got 3 and 0 steps"):
         common_steps(np.arange(3), np.arange(0))

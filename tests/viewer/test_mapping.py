@@ -78,7 +78,7 @@ def test_handles_sit_on_the_roofs_and_know_their_buildings(small, saved):
 
 @pytest.mark.parametrize(
     ("path", "fields"),
-    [("score", SCORES), ("buildings", COUNTS), ("reward", REWARDS)],
+    [("reward", REWARDS), *((path, (field,)) for path, field in {**SCORES, **COUNTS}.items())],
 )
 def test_plots_hold_the_recorded_scalars(small, saved, path: str, fields: tuple[str, ...]):
     shown = rrd.at_every_step(saved[f"/plots/{path}"]["Scalars:scalars"], small.steps.tolist())
@@ -105,9 +105,8 @@ def test_brigades_stand_where_they_are_in_the_color_of_what_they_do(small, saved
     shown = np.array(rrd.at_every_step(brigades["Points3D:colors"], steps))
     assert np.array_equal(shown, colors.packed_table(colors.ACTIVITY_RGB)[activity])
     labels = rrd.at_every_step(saved["/team/names"]["Points3D:labels"], steps)
-    assert labels[3].tolist() == [
-        f"brigade {i} · {tank} l" for i, tank in enumerate(list(small)[3].brigades.tank_litres)
-    ]
+    for row, shown_labels in zip(xyz, labels, strict=True):
+        assert sorted(int(one) for label in shown_labels for one in label.split(", ")) == list(range(len(row)))
 
 
 def test_gauges_are_as_high_as_the_tanks_are_full(small, saved):
@@ -156,17 +155,44 @@ def test_sites_and_their_free_sides(small, saved):
             assert [point[1] for point in strips[1]] == pytest.approx([observed.site_south_m[site]] * 2)
 
 
+def states_at_every_step(lane, steps: list[int]) -> list[list[str]]:
+    """States without what makes one of them a state that shows no name."""
+    every = rrd.at_every_step(lane, steps)
+    return [[one.removesuffix(layers._UNNAMED) for one in states.tolist()] for states in every]
+
+
+def test_bands_too_short_for_their_names_have_none(small, saved):
+    lane = [(step, states.as_py()[0]) for step, states in saved["/brigade_0"]["StateChange:state"]]
+    ends = [*(step for step, _ in lane[1:]), 41]
+    named = {end - step: not state.endswith(layers._UNNAMED) for (step, state), end in zip(lane, ends, strict=True)}
+    assert named[1] is False
+    assert named[max(named)] is True
+    (values, labels) = (
+        saved["/brigade_0"][f"StateConfiguration:{name}"][0][1].as_py() for name in ("values", "labels")
+    )
+    shown = dict(zip(values, labels, strict=True))
+    assert shown["spraying"] == "spraying"
+    assert shown["spraying" + layers._UNNAMED].strip() == ""
+
+
+def test_brigades_that_stand_together_share_a_label():
+    x, y = np.array([[0.0, 15.0, 30.0, 100.0]]), np.zeros((1, 4))
+    assert brigades.leaders(x, y, within_m=20.0).tolist() == [[0, 0, 2, 3]]
+    assert brigades.leaders(x, y, within_m=1.0).tolist() == [[0, 1, 2, 3]]
+    assert brigades.leaders(x, y, within_m=200.0).tolist() == [[0, 0, 0, 0]]
+
+
 def test_lanes_change_where_activities_change(small, saved):
     for brigade in range(3):
-        lane = saved[f"/activity/brigade_{brigade}"]["StateChange:state"]
-        shown = [states.tolist() for states in rrd.at_every_step(lane, small.steps.tolist())]
+        lane = saved[f"/brigade_{brigade}"]["StateChange:state"]
+        shown = states_at_every_step(lane, small.steps.tolist())
         assert shown == [[ACTIVITIES[record.brigades.activity[brigade]]] for record in small]
 
 
 def test_lanes_tell_the_actions_too(small, saved):
     for brigade in range(3):
-        lane = saved[f"/action/brigade_{brigade}"]["StateChange:state"]
-        shown = [states.tolist() for states in rrd.at_every_step(lane, small.steps.tolist())]
+        lane = saved[f"/chosen/brigade_{brigade}"]["StateChange:state"]
+        shown = states_at_every_step(lane, small.steps.tolist())
         assert shown[0] == ["no choice"]
         assert shown[1:] == [[ACTION_NAMES[record.decisions.action[brigade]]] for record in list(small)[1:]]
 
@@ -253,6 +279,13 @@ def test_steps_sent_one_by_one_show_the_same_as_all_at_once(small, saved, tmp_pa
         assert set(components) == set(saved[path]), path
         for name, rows in components.items():
             whole = saved[path][name]
+            if "brigade_" in path and name.startswith("StateChange"):  # how long a band lasts is known at its end
+                assert states_at_every_step(rows, small.steps.tolist()) == states_at_every_step(
+                    whole, small.steps.tolist()
+                )
+                continue
+            if path == "/team/names":  # it is not known from how far they will be seen
+                continue
             n_before = next(place for place, (_, value) in enumerate(whole) if value.as_py() != [] or path == "/")
             assert rows == whole[n_before:], (path, name)  # what is not there yet is nothing in both
 
@@ -291,17 +324,17 @@ def test_the_log_tells_events_and_new_choices(small, saved):
     events = [(step, text.as_py()[0]) for step, text in saved["/log/events"]["TextLog:text"]]
     wanted = sum(len(record.events.kind) for record in small)
     assert len(events) == wanted
-    assert (6, "brigade 0: tank empty") in events
+    assert (6, "6  brigade 0: tank empty") in events
     first = next(record for record in small if 0 in record.events.kind)
-    assert events[0] == (first.step, f"building {small.city.building_id[first.events.entity[0]]} ignited")
+    assert events[0] == (first.step, f"{first.step}  building {small.city.building_id[first.events.entity[0]]} ignited")
     choices = [(step, text.as_py()[0]) for step, text in saved["/log/decisions"]["TextLog:text"]]
     target = small.city.building_id[list(small)[1].decisions.target]
     ways = "nearest-to-civilian", "nearest-to-center", "nearest-to-me"
     state = f"{ways[2]}, state 0: free edges 0, center low, civilian low, volume very-low, others nothing"
     assert choices[:3] == [
-        (1, f"brigade 0: easiest → building {target[0]}, Q 0 against 3 of {state}"),
-        (1, f"brigade 1: {ways[0]} → building {target[1]} (exploring), Q 5 against 7 of {state}"),
-        (1, f"brigade 2: {ways[1]} → building {target[2]}, Q 10 against 11 of {state}"),
+        (1, f"1  brigade 0: easiest → building {target[0]}, Q 0 against 3 of {state}"),
+        (1, f"1  brigade 1: {ways[0]} → building {target[1]} (exploring), Q 5 against 7 of {state}"),
+        (1, f"1  brigade 2: {ways[1]} → building {target[2]}, Q 10 against 11 of {state}"),
     ]
     assert len(choices) < 3 * len(small.steps)
 

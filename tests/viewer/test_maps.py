@@ -12,14 +12,16 @@ import pytest
 from fireworld_viewer import colors
 from fireworld_viewer.pictures import maps
 from fireworld_viewer.pictures.city_map import BrigadeMarks, MapState, contrasting, state_of
-from fireworld_viewer.pictures.figure_files import plain_style, save_figure
-from fireworld_viewer.pictures.map_grid import LABELS, count_marks
+from fireworld_viewer.pictures.extent import fire_extent, whole_extent
+from fireworld_viewer.pictures.figure_files import INK, plain_style, save_figure
+from fireworld_viewer.pictures.map_grid import LABELS, MapGrid, count_marks, labels_on
 from fireworld_viewer.story.steps import LAST, evenly_spaced, read_steps, read_steps_between
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgba
 
 from fireworld.errors import OutputError, ViewError
 from fireworld.records import FIERYNESS, MemoryRecording
+from tests.viewer.conftest import make_recording
 
 
 def legend_of(figure):
@@ -136,7 +138,7 @@ def test_titles_say_what_when_and_how_well(small):
 
 def test_two_runs_side_by_side_and_one_that_has_ended(small, slower):
     figure = maps.draw_steps([small, slower], [LAST])
-    assert len([axes for axes in figure.axes if axes.get_title() == ""]) == 2
+    assert len(figure.axes) == 2 + 2, "two maps, and curves below each"
     texts = texts_of(figure)
     assert texts[0] == "A: grid, easiest, seed 3"
     assert texts[2] == "B: grid, nearest-to-me, seed 3"
@@ -152,6 +154,58 @@ def test_a_strip_has_a_map_for_each_step_and_run(small, slower):
     titles = [text for text in texts_of(figure) if ": step" in text]
     assert titles == ["A: step 0", "A: step 10", "A: step 40", "B: step 0", "B: step 10", "B: step 40 (ended at 30)"]
     assert not any("(" in entry for entry in legend_of(figure)), "no counts where there are many maps"
+
+
+def test_the_part_that_is_drawn_has_all_that_burns_and_who_is_near(small):
+    assert fire_extent([small]) is None, "most of the city burns"
+    large = make_recording(30, 30, 12)
+    part = fire_extent([large])
+    assert part is not None
+    codes, city = large.column("/buildings", "fieryness"), large.city
+    x, y = (np.asarray(one)[codes.any(axis=0)] for one in (city.center_x_m, city.center_y_m))
+    assert part.west < x.min() < x.max() < part.east
+    assert part.south < y.min() < y.max() < part.north
+    whole = whole_extent(city)
+    assert part.wide * part.high < 0.6 * whole.wide * whole.high
+    assert 0.79 < part.wide / part.high < 1.26
+    crew = large.column("/brigades", "x_m"), large.column("/brigades", "y_m")
+    near = (np.abs(crew[0] - city.middle_x_m) < 40) & (np.abs(crew[1] - city.middle_y_m) < 40)
+    assert near.any()
+    assert (crew[0][near] < part.east).all()
+    away = [replace(one, brigades=replace(one.brigades, x_m=one.brigades.x_m + 5000)) for one in large]
+    assert fire_extent([MemoryRecording(large.header, city, away)]).east < whole.east
+    cold = [replace(next(iter(large)), buildings=replace(next(iter(large)).buildings, fieryness=0 * codes[0]))]
+    assert fire_extent([MemoryRecording(large.header, city, cold)]) is None
+
+
+def test_a_part_has_the_whole_city_beside_it_and_curves_with_a_cursor(small):
+    large = make_recording(30, 30, 12)
+    figure = maps.draw_steps([large], [7])
+    city_map, inset, curves = figure.axes
+    part = fire_extent([large])
+    assert (*city_map.get_xlim(), *city_map.get_ylim()) == pytest.approx(part)
+    assert inset.get_xlim() == pytest.approx(whole_extent(large.city)[:2])
+    (frame,) = inset.patches
+    assert (frame.get_x(), frame.get_y(), frame.get_width()) == pytest.approx((part.west, part.south, part.wide))
+    *counts, cursor = curves.lines
+    assert [list(line.get_ydata()) for line in counts] == [
+        large.column("/score", name).tolist() for name in ("n_burning", "n_burnt_out", "n_water_damaged")
+    ]
+    assert list(cursor.get_xdata()) == [7, 7]
+    assert len(maps.draw_steps([large], [7], whole=True).axes) == 2
+
+
+def test_a_legend_counts_only_what_there_is(small):
+    shown = read_steps_between([small], every=20)
+    cells = [maps.cells_of([small], step) for step in shown]
+    labels = labels_on(cell for both in cells for cell in both)
+    grid = MapGrid(cells[0], labels=labels)
+    for one in cells:
+        grid.show(one)
+        rows = grid.legend_rows
+        assert not any("(0)" in row.get_text() for row in rows)
+        there = count_marks(small.city, one[0].state)
+        assert [row.get_color() != INK for row in rows] == [label not in there for label in labels]
 
 
 def test_names_are_no_formulas_and_fit(small):
@@ -172,7 +226,7 @@ def test_which_steps_are_shown(small, slower):
     assert [record.step for record in both.records] == [35, 30]
     with pytest.raises(ViewError, match="expected a step from 0 to 40, got 41"):
         read_steps([small], [41])
-    with pytest.raises(ViewError, match="expected a recording with steps"):
+    with pytest.raises(ViewError, match="recording: expected one with steps"):
         read_steps([MemoryRecording(small.header, small.city, [])], [0])
 
 
@@ -186,15 +240,18 @@ def simulated(rgb, matrix):
     return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
 
 
-@pytest.mark.parametrize(
-    "matrix",
-    [
-        np.eye(3),
-        np.array([[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]]),
-        np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]),
-    ],
-    ids=["all cones", "no red", "no green"],
-)
+EYES = {
+    "all cones": np.eye(3),
+    "no red": np.array(
+        [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]]
+    ),
+    "no green": np.array(
+        [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]
+    ),
+}
+
+
+@pytest.mark.parametrize("matrix", EYES.values(), ids=EYES)
 def test_those_who_do_not_see_red_or_green_can_tell_the_buildings_apart(matrix):
     seen = [simulated(rgb, matrix) for rgb in (*colors.FIERYNESS_RGB, colors.REFUGE_RGB)]
     names = (*FIERYNESS, "refuge")
@@ -202,6 +259,14 @@ def test_those_who_do_not_see_red_or_green_can_tell_the_buildings_apart(matrix):
         (names[a], names[b]): np.linalg.norm(seen[a] - seen[b]) for a in range(len(seen)) for b in range(a)
     }  # fmt: skip
     assert min(apart.values()) > 12.0, min(apart, key=apart.get)
+
+
+@pytest.mark.parametrize("matrix", EYES.values(), ids=EYES)
+def test_those_who_do_not_see_red_or_green_can_tell_runs_and_differences_apart(matrix):
+    a, b = (simulated(rgb, matrix) for rgb in colors.RUN_RGB)
+    assert np.linalg.norm(a - b) > 60.0
+    better, same, worse = (simulated(rgb, matrix) for rgb in colors.DIFFERENCE_RGB)
+    assert min(np.linalg.norm(one - other) for one, other in ((better, worse), (better, same), (worse, same))) > 18.0
 
 
 def test_letters_can_be_read_on_every_ball():

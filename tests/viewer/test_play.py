@@ -189,7 +189,7 @@ def test_a_cut_off_recording_says_so(fireworld, here, small):
         (("a.mcap", "-o", "a.mcap", "--force"), "expected a file of its own for every input and output"),
         (("absent.mcap", "-o", "a.html"), "absent.mcap: cannot be read"),
         (("a.mcap", "a.mcap", "a.mcap", "-o", "a.html"), "Expected one or two recordings, got 3"),
-        (("a.mcap", "other.mcap", "-o", "a.html"), "expected two recordings of one city"),
+        (("a.mcap", "other.mcap", "-o", "a.html"), "recordings: expected two of one city"),
         (("a.mcap", "-o", "a.html", "--from", "90"), "expected steps from 0 to 40, got steps 90 to 40"),
         (("a.mcap", "-o", "mine.html"), "got an existing file; use --force to replace it"),
     ],
@@ -208,5 +208,5 @@ def test_mistakes_take_one_line(fireworld, here, small, words, message):
 
 
 def test_a_recording_without_steps_is_refused(small):
-    with pytest.raises(ViewError, match="expected a recording with steps"):
+    with pytest.raises(ViewError, match="recording: expected one with steps"):
         page_of(MemoryRecording(small.header, small.city, []))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -17,6 +18,7 @@ from fireworld_viewer.story.series import choices_of
 
 from fireworld.records import ACTIVITIES, FIERYNESS, MemoryRecording
 from tests.viewer.browser import Browser, browser, executable
+from tests.viewer.conftest import make_recording
 from tests.viewer.pixels import decoded, n_near
 
 PATIENCE_SECONDS = 60.0
@@ -67,6 +69,10 @@ return [...document.querySelectorAll("button, select, input, a, canvas, summary,
   !element.hidden && element.getAttribute("aria-hidden") !== "true"
   && !(named(element) && (element.tagName !== "CANVAS" || element.getAttribute("role") === "img"))
 ).map((element) => element.outerHTML.slice(0, 90));
+"""
+AXE = """
+axe.run().then((found) => JSON.stringify({n_passed: found.passes.length, violations: found.violations.map(
+  (one) => [one.id, one.help, one.nodes.map((node) => node.html.slice(0, 120))])}))
 """
 
 
@@ -445,3 +451,46 @@ def test_it_is_fast(shown, big):
     )
     assert drawn_ms < 500 * 6, "machines that do other work too have time"
     assert np.median(frames_ms) < 8 * 3
+
+
+def test_it_opens_where_it_is_told_to(shown, small):
+    page = play_page([small], names=["small.mcap"], start=17)
+    shown.show(page)
+    assert shown.step() == 17
+    shown.show(page, at="#5")
+    assert shown.step() == 5, "the address goes before"
+
+
+@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize("size", [(1400, 900), (420, 800)])
+def test_axe_has_nothing_to_say(shown, one, two, size, dark):
+    """The rules of axe-core, for people who read the page with the ears or the keyboard."""
+    axe = pytest.importorskip("axe_core_python")
+    source = (Path(axe.__file__).parent / "axe.min.js").read_text(encoding="utf-8")
+    for page in (one, two):
+        shown.show(page, size=size, dark=dark)
+        shown.page.devtools("Runtime.evaluate", expression=source)
+        found = shown.page.devtools("Runtime.evaluate", expression=AXE, awaitPromise=True, returnByValue=True)
+        result = json.loads(found["result"]["value"])
+        assert result["violations"] == []
+        assert result["n_passed"] > 15
+
+
+def test_a_large_city_is_drawn_in_few_paths(shown):
+    """Of a city of 40,000 buildings none has an edge, and each state is filled in paths of hundreds."""
+    large = make_recording(250, 160, 3)
+    shown.show(play_page([large], names=["large.mcap"]))
+    shown.run("const {view} = window.fireworldPage; view.zoom(0.02); return null")
+    seen = shown.run("return window.fireworldPage.maps[0].inSight().length")
+    assert seen > 6000
+    counted = shown.run(
+        "const kind = CanvasRenderingContext2D.prototype, n = {};"
+        "for (const name of ['fill', 'stroke', 'fillRect', 'strokeRect']) {"
+        "  const own = kind[name]; n[name] = 0;"
+        "  kind[name] = function (...given) { n[name] += 1; return own.apply(this, given); };"
+        "} window.fireworldPage.draw(); return n;"
+    )
+    assert 0 < sum(counted.values()) < seen / 20, counted
+    box = shown.run("return document.querySelector('.map canvas').getBoundingClientRect().toJSON()")
+    rows, columns = (slice(int(box[a]), int(box[b])) for a, b in (("top", "bottom"), ("left", "right")))
+    assert n_near(decoded(shown.page.screenshot())[rows, columns], colors.FIERYNESS_RGB[0]) > 2_000

@@ -37,7 +37,9 @@ def assert_shown(log: Log, found: dict[str, rrd.Rows], prefix: str = "") -> None
     for name in ("temperature", "fuel_share", "water_litres", "fieryness"):
         shown = rrd.at_every_step(found[f"{prefix}/city/handles"][f"Building:{name}"], steps)
         assert np.array_equal(np.array(shown), log.column("/buildings", name))
-    for path, fields in (("score", SCORES), ("buildings", COUNTS), ("reward", REWARDS), ("tanks", None)):
+    for path, fields in (
+        {path: [one] for path, one in {**SCORES, **COUNTS}.items()} | {"reward": REWARDS, "tanks": None}
+    ).items():
         shown = rrd.at_every_step(found[f"{prefix}/plots/{path}"]["Scalars:scalars"], steps)
         columns = (
             [log.column(*f"/{field}".split(".")) for field in fields]

@@ -15,6 +15,7 @@ from fireworld_viewer.pictures.figure_files import plain_style
 from fireworld_viewer.story.steps import read_steps_between
 from PIL import Image
 
+from fireworld.records import MemoryRecording
 from tests import command_line
 from tests.viewer.conftest import make_recording
 from tests.viewer.recorded import write_log
@@ -70,6 +71,16 @@ def test_a_strip_and_a_pair(render, tmp_path):
     assert files(tmp_path) == ["pair.svg", "strip.png"]
 
 
+def test_where_it_burns_or_the_whole_city(render, logs, tmp_path):
+    """Of a city that burns in a corner the corner is drawn, and all of it on demand."""
+    write_log(logs / "corner.mcap", make_recording(20, 20, 12))
+    for name, words in (("part", ()), ("whole", ("--whole",))):
+        assert render("corner.mcap", "-o", f"{name}.png", "--step", "12", *words).code == 0
+        assert render("corner.mcap", "-o", f"{name}.gif", "--to", "2", *words).code == 0
+    assert (tmp_path / "part.png").read_bytes() != (tmp_path / "whole.png").read_bytes()
+    assert (tmp_path / "part.gif").read_bytes() != (tmp_path / "whole.gif").read_bytes()
+
+
 def test_a_gif_plays_every_step_and_holds_the_last(render, tmp_path):
     done = render("a.mcap", "-o", "film.GIF", "--from", "2", "--to", "20", "--every", "4", "--fps", "5")
     assert done.out.startswith("film.GIF: 6 frames, steps 2 to 20, ")
@@ -92,7 +103,7 @@ def test_the_frames_of_a_gif_are_the_pictures(small, tmp_path):
         picture.seek(2)
         seen = np.asarray(picture.convert("RGB")).astype(int)
     assert np.abs(seen - wanted.astype(int)).max() < 80
-    assert np.abs(seen - wanted.astype(int)).mean() < 0.5
+    assert np.abs(seen - wanted.astype(int)).mean() < 0.7
     for rgb in (*colors.FIERYNESS_RGB, *colors.ACTIVITY_RGB):
         there = (wanted == np.array(rgb)).all(axis=-1)
         assert (seen[there] == np.array(rgb)).all(), "what has a color of the table keeps it exactly"
@@ -126,12 +137,14 @@ def test_an_mp4(render, tmp_path):
     assert len(frames) == 5 + 7, "the last step stays for two seconds"
 
 
-def test_a_cut_off_recording_is_drawn_as_far_as_it_is_good(render, tmp_path):
+def test_a_cut_off_recording_is_drawn_as_far_as_it_is_good(render, tmp_path, small, monkeypatch):
     done = render("cut.mcap", "-o", "still.png")
     assert done.code == 0
     assert done.err.startswith("cut.mcap: ")
     assert done.err.endswith("; drawing 18 committed steps\n")
-    assert render("a.mcap", "-o", "whole.png", "--step", "17").code == 0
+    write_log(tmp_path / "good.mcap", MemoryRecording(small.header, small.city, list(small)[:18]))
+    good = command_line.call(monkeypatch, "render", tmp_path / "good.mcap", "-o", "whole.png", "--step", "17")
+    assert good.code == 0
     assert (tmp_path / "still.png").read_bytes() == (tmp_path / "whole.png").read_bytes()
 
 
@@ -141,13 +154,13 @@ def test_a_cut_off_recording_is_drawn_as_far_as_it_is_good(render, tmp_path):
         (("a.mcap", "-o", "a.bmp"), "a.bmp: expected a file ending in .png, .svg, .pdf, .gif, .mp4, got '.bmp'"),
         (("a.mcap", "-o", "a"), "a: expected a file ending in .png, .svg, .pdf, .gif, .mp4, got no ending"),
         (("a.mcap", "-o", "none/a.png"), "none/a.png: expected an existing folder none, got 'none'; make it first"),
-        (("a.mcap", "-o", "a.png", "--step", "41"), "pictures: step: expected a step from 0 to 40, got 41"),
-        (("cut.mcap", "-o", "a.png", "--steps", "3,18"), "pictures: step: expected a step from 0 to 17, got 18"),
+        (("a.mcap", "-o", "a.png", "--step", "41"), "step: expected a step from 0 to 40, got 41"),
+        (("cut.mcap", "-o", "a.png", "--steps", "3,18"), "step: expected a step from 0 to 17, got 18"),
         (
             ("a.mcap", "-o", "a.gif", "--from", "50"),
-            "pictures: --from and --to: expected steps from 0 to 40, got steps 50 to 40",
+            "--from and --to: expected steps from 0 to 40, got steps 50 to 40",
         ),
-        (("a.mcap", "other.mcap", "-o", "a.png"), "expected two recordings of one city, got 'grid' with 36 buildings"),
+        (("a.mcap", "other.mcap", "-o", "a.png"), "recordings: expected two of one city, got 'grid' with 36 buildings"),
         (("absent.mcap", "-o", "a.png"), "absent.mcap: cannot be read"),
         (("a.mcap", "-o", "a.png", "--step", "-1"), "--step: expected steps like 0,60,last, got '-1'"),
         (("a.mcap", "-o", "a.png", "--step", "1,2"), "--step: expected one step, got '1,2'; several go with --steps"),

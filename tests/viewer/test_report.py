@@ -14,6 +14,7 @@ import pytest
 from click.testing import CliRunner
 from fireworld_recorder.reader import open_log
 from fireworld_viewer.pictures.curves import draw_curves, draw_timeline
+from fireworld_viewer.pictures.figure_files import PAIR_COLORS
 from fireworld_viewer.story.series import OwnTarget, count_choices
 
 from fireworld.cli import root
@@ -98,22 +99,46 @@ def test_the_timeline_has_a_band_for_each_stretch(small):
     assert [(round(lane), start, end) for lane, start, end in chosen] == [(0, 0.5, 2.5), (1, 0.5, 1.5), (1, 1.5, 3.5)]
 
 
-def test_curves_of_two_runs_have_the_same_scales(small, slower):
-    panels = np.array(draw_curves([small, slower]).axes).reshape(-1, 2)
-    for left, right in panels:
-        assert left.get_ylim() == right.get_ylim()
-        for axes in (left, right):
-            low, high = axes.get_ylim()
-            for line in axes.get_lines():
-                assert low <= min(line.get_ydata())
-                assert max(line.get_ydata()) <= high
+def test_curves_of_two_runs_lie_over_each_other(small, slower):
+    figure = draw_curves([small, slower])
+    for axes in figure.axes:
+        low, high = axes.get_ylim()
+        lines = [line for line in axes.get_lines() if line.get_linestyle() != ":"]
+        assert [line.get_color() for line in lines] == [*PAIR_COLORS]
+        assert lines[0].get_linestyle() == "-" != lines[1].get_linestyle()
+        for line, run in zip(lines, (small, slower), strict=True):
+            assert len(line.get_xdata()) == len(run.steps)
+            assert low <= min(line.get_ydata())
+            assert max(line.get_ydata()) <= high
+
+
+def test_the_score_of_a_good_run_is_no_flat_line(small):
+    records = [replace(one, score=replace(one.score, score=6.9 - 0.001 * one.step)) for one in small]
+    axes = draw_curves([MemoryRecording(small.header, small.city, records)]).axes[0]
+    low, high = axes.get_ylim()
+    assert low < 6.9 - 0.04
+    assert high > 7.0
+    assert high - low < 0.2
+    flat = [replace(one, score=replace(one.score, score=7.0)) for one in small]
+    low, high = draw_curves([MemoryRecording(small.header, small.city, flat)]).axes[0].get_ylim()
+    assert low < 7.0 < high
+
+
+def test_counts_have_ticks_at_whole_numbers(small, slower):
+    few = [replace(one, score=replace(one.score, n_burnt_out=one.step % 2)) for one in small]
+    run = MemoryRecording(small.header, small.city, few)
+    for recordings in ([run], [run, run]):
+        for axes in draw_curves(recordings).axes:
+            if axes.get_title(loc="left").startswith("buildings"):
+                assert all(float(tick).is_integer() for tick in axes.get_yticks())
 
 
 def test_a_page_of_one_run(page_of_a, small):
     page = page_of_a.read_text(encoding="utf-8")
     assert page.count('src="data:image/png;base64,') == 3
     assert re.findall(r'(?:src|href)="(?!data:)', page) == []
-    assert "http" not in re.sub(r"base64,[^\"]*", "", page)
+    assert "http" not in re.sub(r"base64,[^\"]*|srcdoc=\"[^\"]*\"", "", page)
+    assert page.count("<iframe") == 1
     text, last = text_of(page_of_a), list(small)[-1].score
     assert f"{last.score:.3f} of {last.score_max:.0f}" in text
     assert f"{last.n_burnt_out} of 36 buildings" in text
@@ -172,7 +197,7 @@ def test_the_commands_of_a_page_repeat_the_run(fireworld, tmp_path):
         (("a.mcap", "-o", "none/a.html"), "none/a.html: expected an existing folder none, got 'none'; make it first"),
         (("absent.mcap", "-o", "a.html"), "absent.mcap: cannot be read"),
         (("a.mcap", "b.mcap", "a.mcap", "-o", "a.html"), "Expected one or two recordings, got 3"),
-        (("a.mcap", "other.mcap", "-o", "a.html"), "expected two recordings of one city"),
+        (("a.mcap", "other.mcap", "-o", "a.html"), "recordings: expected two of one city"),
         (
             ("start.mcap", "-o", "mine.html"),
             "mine.html: expected a name that is free, got an existing file; use --force to replace it",

@@ -86,7 +86,7 @@ BRIGADE_RGB: Final[tuple[Rgb, ...]] = (
 )
 """Colors of the brigades in plots and logs, readable on black and on white; repeated when there are more."""
 
-TOTAL_RGB: Final[Rgb] = (140, 110, 200)
+TOTAL_RGB: Final[Rgb] = (196, 110, 140)
 GREY_RGB: Final[Rgb] = (128, 124, 120)  # what is burnt out, and what comes second, in plots and logs
 
 HEALTHY_RGB: Final[Rgb] = (96, 240, 120)
@@ -95,12 +95,15 @@ DYING_RGB: Final[Rgb] = (225, 60, 235)
 DEAD_RGB: Final[Rgb] = (10, 10, 10)
 HEALTH_RGB: Final[tuple[Rgb, ...]] = (HEALTHY_RGB, HURT_RGB, DYING_RGB, DEAD_RGB)
 
-BETTER_RGB: Final[Rgb] = (64, 132, 230)
-WORSE_RGB: Final[Rgb] = (214, 60, 52)
+RUN_RGB: Final[tuple[Rgb, Rgb]] = ((130, 84, 200), (150, 112, 40))
+"""Of two runs or teams, A and B: purple and ochre, in every picture; blue is water, yellow to red is fire."""
+
+BETTER_RGB: Final[Rgb] = (0, 158, 115)
+WORSE_RGB: Final[Rgb] = (213, 94, 0)
 DIFFERENCE_RGB: Final[tuple[Rgb, ...]] = (BETTER_RGB, FIERYNESS_RGB[0], WORSE_RGB)
 """By difference + 1: -1 less damage in the second run, 0 the same, +1 more."""
 
-DIFFERS_RGB: Final[Rgb] = (160, 32, 154)
+DIFFERS_RGB: Final[Rgb] = (190, 20, 130)
 """Edges of what differs between two runs."""
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Final, Self
 
 import numpy as np
@@ -127,18 +127,21 @@ class TableTeam(Team):
         return agreement(self.tables, self.visits)
 
     def difference(self, other: Self) -> TableDifference:
-        """Compare the tables of another team with these; TrainingError if they have another shape."""
-        n_tables, n_states, _ = self.tables.shape
-        if self.tables.shape != other.tables.shape:
-            got = f"{other.tables.shape[0]} of {other.tables.shape[1]} states"
-            raise TrainingError(expected("B", "tables", f"{n_tables} of {n_states} states, as in A", got))
-        differs = (self.tables != other.tables).any(axis=2)
-        changed = self.tables.argmax(axis=2) != other.tables.argmax(axis=2)
+        """Compare the tables of another team with these.
+
+        What the others do is left out of tables of 270 states: they are compared in every one of the 4320. Of teams
+        that differ in their number of tables, the smaller one's are followed by further brigades, too.
+        """
+        shapes = self.tables.shape, other.tables.shape
+        n_tables, n_states = (max(sizes) for sizes in zip(*(shape[:2] for shape in shapes), strict=True))
+        a, b = (_spread(team.tables, n_tables, n_states) for team in (self, other))
+        differs = (a != b).any(axis=2)
+        changed = a.argmax(axis=2) != b.argmax(axis=2)
         places = [(int(table), first_state(int(row), n_states)) for table, row in np.argwhere(changed)]
         return TableDifference(
             n_states=n_states,
             changed=tuple(
-                (self.choice(table=table, state=state), other.choice(table=table, state=state))
+                (self._choice_of(brigade=table, state=state), other._choice_of(brigade=table, state=state))
                 for table, state in places
             ),
             n_values_only=int((differs & ~changed).sum()),
@@ -175,6 +178,9 @@ class TableTeam(Team):
             "states": [choice.as_dict() for state in found for choice in self._choices(state)],
         }
 
+    def _choice_of(self, *, brigade: int, state: int) -> Choice:
+        return replace(self.choice(table=brigade % len(self.tables), state=state), table=brigade, state=state)
+
     def _choices(self, state: int) -> list[Choice]:
         return [self.choice(table=table, state=state) for table in range(len(self.tables))]
 
@@ -182,3 +188,9 @@ class TableTeam(Team):
         """Return the states that a user names, of those that a table of 270 states does not tell apart the first."""
         step = N_STATES // self.tables.shape[1]
         return list(dict.fromkeys(state // step * step for state in find_states(text)))
+
+
+def _spread(tables: Array, n_tables: int, n_states: int) -> Array:
+    """Return tables as those of more brigades and states: (n_tables, n_states, 4), rows and tables repeated."""
+    rows = np.repeat(tables, n_states // tables.shape[1], axis=1)
+    return rows[np.arange(n_tables) % len(rows)]

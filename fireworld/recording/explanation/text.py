@@ -15,6 +15,8 @@ APART: Final = 0.05
 """Shares whose sum is farther than this from what all do together do not add up."""
 LISTED_SHARE: Final = 0.005
 """Shares below are not listed: they would be shown as 0 %."""
+SMALL_DIFFERENCE: Final = 0.01
+"""Differences below this part of the highest score are not shared out: shares of next to nothing say nothing."""
 HEADS: Final = ("brigade", "steps", "decision", "explains", "all but it", "narrowed to")
 
 
@@ -27,6 +29,8 @@ def opening_lines(explanation: Explanation) -> Iterator[str]:
     scores = f"{better} scores {explanation.better_score:.6g}, {worse} {explanation.worse_score:.6g}"
     yield f"{scores}: {explanation.difference:.6g} to explain"
     yield f"{worse} replayed with decisions of {better} in it; after them {_what_continues(explanation)}"
+    if explanation.is_small:
+        yield f"that is less than {_percent(SMALL_DIFFERENCE)} of the highest score: changes of it, no shares"
     if explanation.n_spans == 0:
         yield "no brigade took another action in steps that both runs have"
 
@@ -59,13 +63,13 @@ def closing_lines(explanation: Explanation, *, limit: int) -> Iterator[str]:
         return
     score, share = explanation.together
     total = sum(one.share for one in effects)
-    yield f"all that were tried at once: score {score:.6g}, {_percent(share)} of the difference"
+    yield f"all that were tried at once: score {score:.6g}, {_part(share, explanation)} of the difference"
     if abs(share - 1.0) > APART:
         yield f"between the spans {_what_continues(explanation)}, in a world that neither of the runs was in"
     if len(effects) > 1 and abs(total - share) > APART:
         yield (
-            f"one by one they add up to {_percent(total)}: they depend on each other, since each changes the world"
-            " that the others act in"
+            f"one by one they add up to {_part(total, explanation)}: they depend on each other, since each"
+            " changes the world that the others act in"
         )
 
 
@@ -75,9 +79,9 @@ def _cells(one: SpanEffect, explanation: Explanation) -> tuple[str, ...]:
         str(span.brigade),
         span.steps,
         span.text(explanation.targets(span)),
-        _percent(one.share),
-        _percent(one.share_without) if one.share_without is not None else "",
-        f"{core.span.steps}: {_percent(core.share)}" if core else "",
+        _part(one.share, explanation),
+        _part(one.share_without, explanation) if one.share_without is not None else "",
+        f"{core.span.steps}: {_part(core.share, explanation)}" if core else "",
     )
 
 
@@ -85,6 +89,11 @@ def _what_continues(explanation: Explanation) -> str:
     if explanation.why_recorded:
         return f"the recorded decisions continue, whatever happens ({explanation.why_recorded})"
     return "its own policy continues"
+
+
+def _part(share: float, explanation: Explanation) -> str:
+    """Return a share of the difference in percent; as a change of the score where the difference is small."""
+    return f"{share * explanation.difference:+.3g}" if explanation.is_small else _percent(share)
 
 
 def _percent(share: float) -> str:

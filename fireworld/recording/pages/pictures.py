@@ -9,7 +9,7 @@ from typing import Final
 from fireworld_viewer.pictures.figure_files import STILLS, plain_style, png_bytes, save_figure
 from fireworld_viewer.pictures.film import FILMS, FPS, save_film
 from fireworld_viewer.pictures.maps import draw_record, draw_steps
-from fireworld_viewer.story.steps import LAST, read_steps_between
+from fireworld_viewer.story.steps import LAST, read_steps_between, select_steps
 
 from fireworld.errors import ViewError
 from fireworld.files import check_output
@@ -40,17 +40,19 @@ def render_picture(
     output: Path | str,
     *,
     steps: Sequence[int] = (LAST,),
+    whole: bool = False,
     force: bool = False,
 ) -> None:
     """Draw steps of one recording, or of two of one city side by side, as a .png, .svg or .pdf file.
 
-    Recordings are paths or runs; those that were cut off or damaged are drawn as far as they are good. Errors:
-    OutputError, LogError, or ViewError if there is no such step, the cities differ or matplotlib is missing.
+    The part of the city in which it burns is drawn, or the `whole` of it. Recordings are paths or runs; those that were
+    cut off or damaged are drawn as far as they are good. Errors: OutputError, LogError, or ViewError if there is no
+    such step, the cities differ or matplotlib is missing.
     """
     check_output(Path(output), endings=STILLS, force=force)
-    recordings = open_to_show(logs)
+    recordings = [select_steps(one) for one in open_to_show(logs)]  # each file is read once
     with plain_style():
-        save_figure(draw_steps(recordings, steps), Path(output), force=force)
+        save_figure(draw_steps(recordings, steps, whole=whole), Path(output), force=force)
 
 
 def render_film(
@@ -61,6 +63,7 @@ def render_film(
     last_step: int | None = None,
     every: int = 1,
     fps: float = FPS,
+    whole: bool = False,
     force: bool = False,
     on_frame: Callable[[int, int], object] = lambda _, __: None,
 ) -> list[int]:
@@ -70,9 +73,12 @@ def render_film(
     the number of frames done and of all.
     """
     check_output(Path(output), endings=FILMS, force=force)
-    recordings = open_to_show(logs)
+    recordings = [select_steps(one) for one in open_to_show(logs)]
     shown = read_steps_between(recordings, first=first_step, last=last_step, every=every)
     frames = iter(range(1, len(shown) + 1))
     with plain_style():
-        save_film(recordings, shown, Path(output), fps=fps, on_frame=lambda: on_frame(next(frames), len(shown)))
+        save_film(
+            recordings, shown, Path(output), fps=fps, whole=whole,
+            on_frame=lambda: on_frame(next(frames), len(shown)),
+        )  # fmt: skip
     return [one.step for one in shown]

@@ -68,12 +68,36 @@ def page_of(
     """
     held = open_to_show(logs)
     shown: list[Recording] = [select_steps(one, first=first_step, last=last_step, every=every) for one in held]
+    return page_of_steps(shown, held)
+
+
+def page_of_steps(shown: Sequence[Recording], logs: Sequence[Recording]) -> str:
+    """Return the page of recordings of which the steps to show were read before; arguments and errors as for `play`."""
+    return play_page(shown, names=_names(logs), damages=_damages(logs), first=_first_difference(shown))
+
+
+def page_of_difference(logs: Sequence[AnyRecording], first: tuple[int | None, str] | None) -> str:
+    """Return the page of two recordings, which opens at their first difference: its step and sentence, if there is one.
+
+    A difference without a step is one before the first step. Errors as for `play`.
+    """
+    held = open_to_show(logs)
+    shown = [select_steps(one) for one in held]
+    found = None
+    if first is not None:
+        step, sentence = first
+        found = FirstDifference(step=int(shown[0].steps[0]) if step is None else step, sentence=sentence)
     return play_page(
-        shown,
-        names=[text_of(Path(run_name(one)).name) for one in held],
-        damages=[getattr(one, "damage", None) for one in held],
-        first=_first_difference(shown),
+        shown, names=_names(held), damages=_damages(held), first=found, start=None if found is None else found.step
     )
+
+
+def _names(logs: Sequence[Recording]) -> list[str]:
+    return [text_of(Path(run_name(one)).name) for one in logs]
+
+
+def _damages(logs: Sequence[Recording]) -> list[str | None]:
+    return [getattr(one, "damage", None) for one in logs]
 
 
 def _first_difference(shown: Sequence[Recording]) -> FirstDifference | None:

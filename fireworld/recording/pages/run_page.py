@@ -14,6 +14,7 @@ from fireworld_recorder.totals import final_outcome
 from fireworld_viewer.pictures.curves import draw_curves, draw_timeline
 from fireworld_viewer.pictures.figure_files import plain_style, png_bytes
 from fireworld_viewer.pictures.maps import draw_steps
+from fireworld_viewer.play.page import frame
 from fireworld_viewer.story.narration import event_lines
 from fireworld_viewer.story.series import Counts, count_choices
 from fireworld_viewer.story.steps import evenly_spaced, select_steps
@@ -23,12 +24,13 @@ from fireworld.files import check_output, write_file
 from fireworld.html_page import compared_row, html_credit, html_figure, html_page, html_table, text_cell
 from fireworld.outcome import NOT_RECORDED, QUANTITIES
 from fireworld.recording.inputs import AnyRun, open_one_or_two, run_name
+from fireworld.recording.pages.play import page_of_steps
 from fireworld.records import ACTION_NAMES, EVENT_KINDS, Recording, StoredRun, name_of
 from fireworld.version import simulator_version
 
 _STYLE: Final = """
 pre { background: #f0ede6; padding: .7rem 1rem; overflow-x: auto; font-size: 13px; }
-td.text { overflow-wrap: anywhere; } td.text:first-child { white-space: nowrap; } summary { cursor: pointer; }
+td.text:first-child { white-space: nowrap; } summary { cursor: pointer; }
 """
 ENDINGS: Final = (".html", ".htm")  # of the page's file
 SCENARIO: Final = "scenario.yaml"  # every recording has its scenario in a file of that name
@@ -55,13 +57,13 @@ def report(logs: AnyRun | Sequence[AnyRun], output: Path | str, *, force: bool =
         images = {"maps": png_bytes(draw_steps(shown, maps)), "curves": png_bytes(draw_curves(shown))}
         if any(map(_has_decisions, runs)):
             images["timeline"] = png_bytes(draw_timeline(shown))
-    write_file(Path(output), _run_page(runs, shown, images))
+    write_file(Path(output), _run_page(runs, shown, images, page_of_steps(shown, runs)))
 
 
-def _run_page(logs: Sequence[StoredRun], shown: Sequence[Recording], images: Mapping[str, bytes]) -> str:
+def _run_page(logs: Sequence[StoredRun], shown: Sequence[Recording], images: Mapping[str, bytes], played: str) -> str:
     """Write the page, with PNG files: "maps" and "curves" of all runs, "timeline" of decisions if there is one.
 
-    `shown` are the steps of the runs, to be read often.
+    `shown` are the steps of the runs, to be read often, `played` the page on which they play.
     """
     names = _names(logs)
     title = " against ".join(one_line(log.header.title) for log in logs)
@@ -74,6 +76,8 @@ def _run_page(logs: Sequence[StoredRun], shown: Sequence[Recording], images: Map
           for log in logs if log.damage is not None),
         "<h2>Outcome</h2>",
         _outcome(logs, names),
+        "<h2>Play</h2>",
+        frame(played, label="the run, which plays" if len(logs) == 1 else "both runs, side by side"),
         "<h2>Maps</h2>",
         html_figure(images["maps"], _MAPS_CAPTION if len(logs) == 1 else f"{_MAPS_CAPTION} {_ROWS_CAPTION}"),
         "<h2>Curves</h2>",

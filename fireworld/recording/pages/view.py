@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from fireworld_recorder.totals import totals_of
 from fireworld_viewer.rerun_view import app
@@ -57,6 +58,16 @@ def view(
             app.serve(write, port=port or app.WEB_PORT, announce=announce)
         else:
             app.show(write)
+
+
+def widget(logs: Sequence[AnyRecording]) -> Any:
+    """Return Rerun's widget of one recording, or of two of one city, which notebooks show.
+
+    ViewError if Rerun or its widget is not installed, or if the cities differ.
+    """
+    held = open_to_show(logs)
+    shown = [select_steps(one) for one in held]
+    return app.widget(shown, outcome=_outcome([text_of(Path(run_name(one)).name) for one in held], shown))
 
 
 def _with_air(recording: Recording, path: Path, *, source: str) -> Recording:

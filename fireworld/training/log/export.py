@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from fireworld_recorder.text_tables import ColumnDoc, text_tables
 
 from fireworld.errors import LogError, expected, nearest
 from fireworld.files import new_folder
@@ -39,6 +40,9 @@ OF_KIND: Final[Mapping[type[Any], tuple[str, ...]]] = {
     Tried: ("generations", "candidates", "fights"),
     Played: ("played", "actions"),
 }
+
+PLACE_DOCS: Final = {"scenario": "name of its scenario"}
+"""Of columns that are not what the field of the log is."""
 
 
 def tables_of(log: TrainingLog) -> tuple[str, ...]:
@@ -217,6 +221,40 @@ def export_training(
             if name == names[0]:
                 on_part()
         return {name: file.finish() for name, file in files.items()}
+
+
+def export_training_text(
+    log: TrainingLog,
+    place: Path,
+    form: str,
+    *,
+    tables: Collection[str] | None = None,
+    force: bool = False,
+    on_part: Callable[[], object] = lambda: None,
+) -> dict[str, int]:
+    """Write a training as text, a part in memory at a time: a folder of CSV files ("csv") or JSON lines ("jsonl").
+
+    Arguments, result and errors are those of `export_training`; `place` is the folder, or the file, to make.
+    """
+    names = tables_of(log) if tables is None else tuple(tables)
+    facts = {key: text for key, text in _facts(log, "").items() if key != "fireworld.table"}
+    with text_tables(form, place, tables=TABLES, facts=facts, docs=_docs(names), force=force) as text:
+        for name, rows in rows_of(log, names):
+            text.add(name, rows)
+            if name == names[0]:
+                on_part()
+    return {name: text.n_rows.get(name, 0) for name in names}
+
+
+def _docs(names: Collection[str]) -> list[ColumnDoc]:
+    """Return what the columns mean that are fields of the log."""
+    first = {of_kind[0]: kind for kind, of_kind in OF_KIND.items() if of_kind[0] in names}
+    return [
+        (table, item.name, item.metadata["unit"], PLACE_DOCS.get(item.name, item.metadata["doc"]))
+        for table, kind in first.items()
+        for item in fields(kind)
+        if "per" not in item.metadata
+    ]
 
 
 def _facts(log: TrainingLog, table: str) -> dict[str, str]:

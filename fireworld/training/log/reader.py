@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
 from fireworld_recorder.codec import decode
@@ -16,7 +16,7 @@ from fireworld_recorder.reader import RawStep, raw_commits
 from fireworld_recorder.scan import TopicSize, scan
 
 from fireworld.arguments import path_of
-from fireworld.errors import LogError, OutputError, expected, one_line
+from fireworld.errors import LogError, expected, one_line
 from fireworld.policy.teams.team import Team
 from fireworld.scenario import Scenario
 from fireworld.shown import SHOWN_MAX, Block, Shown
@@ -31,6 +31,7 @@ from fireworld.training.methods.sarsa import SarsaTrainer
 
 if TYPE_CHECKING:
     import pandas
+    import polars
 
     from fireworld.picture import Picture
 
@@ -232,13 +233,20 @@ class TrainingLog(Shown):
             LogError: there is no such table.
             OutputError: pandas is not installed.
         """
-        try:
-            import pandas as pd
-        except ImportError:
-            raise OutputError("to_pandas: pandas is not installed; try pip install pandas") from None
+        return cast("pandas.DataFrame", self._frame("pandas", table))
+
+    def to_polars(self, table: str = "") -> polars.DataFrame:
+        """Return a table of the training as a data frame of polars; as `to_pandas`."""
+        return cast("polars.DataFrame", self._frame("polars", table))
+
+    def _frame(self, library: str, table: str) -> Any:
+        from fireworld_recorder.tables import import_frames
+
         from fireworld.training.log.export import table_arrays, tables_of
 
-        return pd.DataFrame(table_arrays(self, table or tables_of(self)[0]))
+        frames = import_frames(library)
+        arrays = table_arrays(self, table or tables_of(self)[0])
+        return frames.DataFrame({name: one.tolist() if one.dtype == object else one for name, one in arrays.items()})
 
     def show(self) -> Picture:
         """Return a picture of the training, its curves over the episodes, which notebooks show.

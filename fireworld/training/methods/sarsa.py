@@ -295,6 +295,10 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
             found["agreement"] = {"": same / common} if common else {}
         return found
 
+    def numbers(self, report: EpisodeReport) -> dict[str, float]:
+        """Return the numbers of the last episode by name; its score also as a share of the best."""
+        return {**super().numbers(report), "score_share": report.score / (report.score_max or 1.0)}
+
     def play(self, report: EpisodeReport) -> Play | None:
         """Return the last scenario of a stage, played greedily by the team that has just finished it."""
         lasts = itertools.accumulate(len(stage.scenarios) for stage in self.curriculum.stages)

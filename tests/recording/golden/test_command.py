@@ -256,7 +256,7 @@ def test_a_scenario_of_ones_own_is_run_as_it_is_now(here, golden, monkeypatch):
     (here / "fires" / "own.yaml").unlink()
     done = golden("check", here / "kept")
     assert done.code == 2
-    assert "fires/own.yaml: expected a scenario file, got No such file" in done.out
+    assert "fires/own.yaml: expected a scenario file, got No such file" in " ".join(done.out.split())
 
 
 def test_settings_are_kept_and_told(here, golden):

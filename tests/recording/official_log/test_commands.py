@@ -137,7 +137,7 @@ def test_pictures_of_an_imported_log(fireworld, here, imported):
     for name in ("town.png", "town.gif"):
         assert fireworld("render", imported, "-o", name).code == 0
         assert (here / name).stat().st_size > 1000
-    assert b"PNG" in fw.open_log(imported).show()._repr_png_()[:8]
+    assert b"PNG" in fw.open_log(imported).show(-1)._repr_png_()[:8]
 
 
 def test_a_page_of_an_imported_log(fireworld, here, imported):

@@ -102,7 +102,7 @@ def test_what_cannot_be_compared(make_log, log_path, tmp_path, curriculum):
     (tmp_path / "cut.mcap").write_bytes(log_path.read_bytes()[: start + 1])
     with pytest.raises(LogError, match=r"cut\.mcap: .*there is nothing to compare"):
         diff_trainings(log_path, tmp_path / "cut.mcap", partial=True)
-    with pytest.raises(LogError, match="it is the log of a training, not of a run"):
+    with pytest.raises(LogError, match="it is the log of a training, not of a run; `fireworld replay` makes"):
         fw.open_log(log_path)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fireworld.records import ACTIVITIES, CityRecord, StepRecord
 from fireworld_viewer import colors
-from fireworld_viewer.city_mesh import city_box_m
+from fireworld_viewer.pictures.extent import MARGIN_M, Extent, whole_extent
 from fireworld_viewer.pictures.figure_files import INK
 from fireworld_viewer.story.series import existing
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 STREET: Final = "#ffffff"
 GROUND: Final = "#dedad2"
 JET_EDGE: Final = "#174a7c"
-MARGIN_M: Final = 12.0
 WIDTH_INCHES: Final = 7.6
 """Of a map on which everything has its full size; on smaller ones, balls and letters are smaller too."""
 
@@ -82,21 +81,19 @@ def state_of(city: CityRecord, record: StepRecord) -> MapState:
     )
 
 
-def extent_m(city: CityRecord) -> tuple[float, float, float, float]:
-    """Return what a map shows of the plane: west, east, south, north."""
-    (west, south), (east, north) = city_box_m(city, MARGIN_M)
-    return west, east, south - MARGIN_M, north
-
-
 class CityMap:
-    """A map on axes of a known width; `show` sets what is on it."""
+    """A map of a city, or of a part of it, on axes of a known width; `show` sets what is on it."""
 
-    def __init__(self, axes: Axes, city: CityRecord, *, inches: float, n_brigades: int = 0) -> None:
+    def __init__(
+        self, axes: Axes, city: CityRecord, *, inches: float, n_brigades: int = 0, part: Extent | None = None
+    ) -> None:
         from matplotlib.collections import LineCollection, PolyCollection
 
         self.axes, self.city = axes, city
-        west, east, south, north = extent_m(city)
+        west, east, south, north = extent = part or whole_extent(city)
         self._east_m = east
+        self._drawn = buildings_in(city, extent)
+        outlines = outlines_m(city)
         axes.set(xlim=(west, east), ylim=(south, north), aspect="equal", xticks=[], yticks=[], facecolor=GROUND)
         axes.spines[:].set_visible(False)
         self._scale = float(np.clip(inches / WIDTH_INCHES, _SMALLEST_SCALE, 1.0))
@@ -107,7 +104,9 @@ class CityMap:
         self._ways = LineCollection([], colors=INK, linewidths=1.1 * self._scale, linestyles=(0, (3, 2)), zorder=5)
         self._jet_casing = LineCollection([], colors=JET_EDGE, linewidths=4.2 * self._scale, **line)
         self._jets = LineCollection([], colors=hexadecimal(colors.WATER_RGB), linewidths=2.6 * self._scale, **line)
-        self._buildings: Any = PolyCollection(outlines_m(city), edgecolors=INK, linewidths=0.35 * self._scale, zorder=2)
+        self._buildings: Any = PolyCollection(
+            [outlines[index] for index in self._drawn], edgecolors=INK, linewidths=0.35 * self._scale, zorder=2
+        )
         bold: dict[str, Any] = {"ha": "center", "weight": "bold", "fontsize": 8 * self._scale}
         self._centers = np.column_stack([city.center_x_m, city.center_y_m])
         self._refuges = [
@@ -142,7 +141,7 @@ class CityMap:
         """Set the map to a step."""
         faces = _unit_rgb(colors.FIERYNESS_RGB)[np.asarray(state.fieryness, dtype=np.int64)]
         faces[np.asarray(self.city.refuge_building, dtype=np.int64)] = np.array(colors.REFUGE_RGB) / 255.0
-        self._buildings.set_facecolor(faces)
+        self._buildings.set_facecolor(faces[self._drawn])
         hp = np.asarray(state.civilian_hp)
         if state.civilian_xy_m is not None:
             self._civilians.set_offsets(_side_by_side(state.civilian_xy_m, self._apart_m, self._east_m))
@@ -187,25 +186,36 @@ class CityMap:
 
         axes, city = self.axes, self.city
         node = np.column_stack([city.node_x_m, city.node_y_m])
-        lines = list(zip(node[city.street_from], node[city.street_to], strict=True))
+        ends = np.stack([node[city.street_from], node[city.street_to]], axis=1)
+        (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
+        low, high = ends.min(axis=1), ends.max(axis=1)
+        seen = (low[:, 0] < east) & (high[:, 0] > west) & (low[:, 1] < north) & (high[:, 1] > south)
+        lines = list(ends[seen])
         width = 3.0 * self._scale
         axes.add_collection(LineCollection(lines, colors=STREET, linewidths=width, capstyle="round", zorder=1))
         rgb = hexadecimal(colors.HYDRANT_RGB)
         axes.scatter(city.hydrant_x_m, city.hydrant_y_m, s=14 * self._scale, color=rgb, marker="s", zorder=4)
-        (west, east), south = axes.get_xlim(), axes.get_ylim()[0]
         longest = max(10.0, (east - west) / 4)
         length = max(step for step in (10, 20, 50, 100, 200, 500, 1000, 2000) if step <= longest)
         x, y = west + 0.6 * MARGIN_M, south + 0.6 * MARGIN_M
         axes.plot([x, x + length], [y, y], color=INK, linewidth=2.5, solid_capstyle="butt", zorder=8)
         axes.annotate(
             f"{length} m", (x + length, y), xytext=(4, 0), textcoords="offset points", va="center", color=INK,
-            fontsize=10 * max(self._scale, 0.75),
+            fontsize=10 * max(self._scale, 0.75), bbox={"facecolor": GROUND, "edgecolor": "none", "pad": 1.0},
         )  # fmt: skip
 
 
 def outlines_m(city: CityRecord) -> list[NDArray[np.float64]]:
     """Return the corners of each building, (corners, 2) each."""
     return np.split(np.column_stack([city.outline_x_m, city.outline_y_m]), city.outline_ptr[1:-1])
+
+
+def buildings_in(city: CityRecord, part: Extent) -> NDArray[np.intp]:
+    """Return the indices of the buildings that are in a part of the plane, wholly or not."""
+    x, y, first = (np.asarray(one) for one in (city.outline_x_m, city.outline_y_m, city.outline_ptr[:-1]))
+    seen = (np.minimum.reduceat(x, first) < part.east) & (np.maximum.reduceat(x, first) > part.west)
+    seen &= (np.minimum.reduceat(y, first) < part.north) & (np.maximum.reduceat(y, first) > part.south)
+    return np.flatnonzero(seen)
 
 
 def hexadecimal(rgb: Sequence[int]) -> str:

@@ -26,6 +26,12 @@ _PANEL_INCHES: Final = 2.3
 _BURNING: Final = ("#d9600c", "-")
 _BURNT_OUT: Final = ("#161414", "--")
 _WATER_DAMAGED: Final = ("#4f6fc4", "-.")
+COUNT_STYLES: Final[Mapping[str, tuple[str, str]]] = {
+    "score.n_burning": _BURNING,
+    "score.n_burnt_out": _BURNT_OUT,
+    "score.n_water_damaged": _WATER_DAMAGED,
+}
+"""Color and line of the counts of buildings, by field."""
 
 
 @dataclass(frozen=True)
@@ -52,18 +58,11 @@ class Panel:
         ]
 
 
+_SCORE_STYLES: Final = {"score.score_max": ("#9a9a9a", ":"), "score.score": (INK, "-")}
+_RETURN_STYLES: Final = {"rewards.sum_so_far": (INK, "-")}
 PANELS: Final = (
-    Panel(
-        "score",
-        {"score.score_max": ("#9a9a9a", ":"), "score.score": (INK, "-"), "score.score_now": ("#8a6fb0", "--")},
-        from_zero=True,
-    ),
-    Panel(
-        "buildings",
-        {"score.n_burning": _BURNING, "score.n_burnt_out": _BURNT_OUT, "score.n_water_damaged": _WATER_DAMAGED},
-        from_zero=True,
-        counts=True,
-    ),
+    Panel("score", _SCORE_STYLES),
+    Panel("buildings", COUNT_STYLES, from_zero=True, counts=True),
     Panel(
         "reward of the step: buildings",
         {"rewards.burning": _BURNING, "rewards.burnt_out": _BURNT_OUT, "rewards.water_damaged": _WATER_DAMAGED},
@@ -72,39 +71,95 @@ PANELS: Final = (
         "reward of the step: civilians, and in all",
         {"rewards.civilians": ("#1e8f45", "-"), "rewards.total": (INK, "--")},
     ),
-    Panel("reward so far (return)", {"rewards.sum_so_far": (INK, "-")}),
+    Panel("reward so far (return)", _RETURN_STYLES),
     Panel("water in the tanks, litres", None, from_zero=True),
 )
+"""Of one run."""
+PAIR_PANELS: Final = (
+    Panel("score", _SCORE_STYLES),
+    *(Panel(f"buildings {LABELS[field]}", {field: look}, from_zero=True, counts=True)
+      for field, look in COUNT_STYLES.items()),
+    Panel("reward of the step", {"rewards.total": (INK, "-")}),
+    Panel("reward so far (return)", _RETURN_STYLES),
+)  # fmt: skip
+"""Of two runs, laid over each other: a panel for each quantity."""
 
 
 def draw_curves(recordings: Sequence[Recording]) -> Figure:
-    """Draw all panels: those of two recordings beside each other, on the same scales."""
-    pair = len(recordings) > 1
-    panels = [panel for panel in PANELS if panel.styles is None or any(map(panel.curves, recordings))]
-    n_rows = len(panels) if pair else -(-len(panels) // 2)
+    """Draw all panels of one recording, or those of two with the curves of both, in two columns."""
+    if len(recordings) > 1:
+        return draw_pair_curves(recordings)
+    panels = [panel for panel in PANELS if panel.styles is None or panel.curves(recordings[0])]
+    figure, grid = _two_columns(len(panels), between=0.52)
+    for axes, panel in zip(grid, panels, strict=False):
+        curves = panel.curves(recordings[0])
+        for numbers, label, color, line, width in curves:
+            axes.plot(recordings[0].steps, numbers, label=label, color=color, linestyle=line, linewidth=width)
+        _dress_panel(axes, panel.title, counts=panel.counts, named=bool(curves))
+        axes.set_ylim(_limits(panel, [numbers for numbers, *_ in curves]))
+    return figure
+
+
+def draw_pair_curves(
+    recordings: Sequence[Recording],
+    *,
+    more: Mapping[str, Mapping[str, tuple[Sequence[int], Sequence[float | None]]]] = {},
+    first_step: int | None = None,
+) -> Figure:
+    """Draw the curves of two recordings over each other, A and B in their colors, B dashed.
+
+    Args:
+        recordings: two.
+        more: further panels by title, of counts: by label the steps and the numbers, None where there is none.
+        first_step: that of the first difference, a dotted line.
+    """
+    panels = [panel for panel in PAIR_PANELS if any(map(panel.curves, recordings))]
+    figure, grid = _two_columns(len(panels) + len(more), between=0.2)
+    for axes, panel in zip(grid, panels, strict=False):
+        numbers = []
+        for recording, name, color, dashes in zip(recordings, "AB", PAIR_COLORS, ("-", (0, (4, 2))), strict=True):
+            curves = panel.curves(recording)
+            for values, label, own, line, width in curves:
+                is_greatest = label == LABELS["score.score_max"]
+                look = {"color": own, "linestyle": line} if is_greatest else {"color": color, "linestyle": dashes}
+                shown = (label if name == "A" else None) if is_greatest else name
+                axes.plot(recording.steps, values, label=shown, linewidth=width, **look)
+                numbers.append(values)
+        _dress_panel(axes, panel.title, counts=panel.counts, named=False)
+        axes.set_ylim(_limits(panel, numbers))
+    handles, labels = grid[0].get_legend_handles_labels()
+    grid[min(1, len(panels) - 1)].legend(handles, labels, **_BESIDE)
+    for axes, (title, curves_of) in zip(grid[len(panels) :], more.items(), strict=False):
+        for (label, (steps, counts)), color in zip(curves_of.items(), (_DIFFERS, INK), strict=False):
+            axes.plot(steps, np.array(counts, dtype=np.float64), label=label, color=color, linewidth=1.7)
+        _dress_panel(axes, title, counts=True, named=False)
+        axes.legend(fontsize=8.5, frameon=False, labelcolor=INK, loc="best")
+        axes.set_ylim(0.0, 1.05 * max(1.0, axes.get_ylim()[1]))
+    for axes in grid[: len(panels) + len(more)] if first_step is not None else ():
+        axes.axvline(first_step, color="#888888", linewidth=1.0, linestyle=":")
+    return figure
+
+
+_DIFFERS: Final = hexadecimal(colors.DIFFERS_RGB)
+_BESIDE: Final[Mapping[str, Any]] = {
+    "fontsize": 8.5, "frameon": False, "labelcolor": INK, "loc": "center left", "bbox_to_anchor": (1.0, 0.5),
+}  # fmt: skip
+"""Of a legend right of its panel."""
+
+
+def _two_columns(n: int, *, between: float) -> tuple[Figure, Any]:
+    """Return a figure with room for legends right of the columns, and its axes in order; those too many are hidden."""
+    n_rows = -(-n // 2)
     high = n_rows * _PANEL_INCHES
     figure = new_figure(_WIDTH_INCHES, high)
-    # Room for the legends: right of the second column, of two columns of one run between them too.
     figure.subplots_adjust(
-        left=0.075, right=0.872, bottom=0.55 / high, top=1.0 - 0.3 / high, wspace=0.12 if pair else 0.52, hspace=0.3
+        left=0.075, right=0.872, bottom=0.55 / high, top=1.0 - 0.3 / high, wspace=between, hspace=0.3
     )
-    grid = figure.subplots(n_rows, 2, sharex=True, sharey="row" if pair else "none", squeeze=False)
-    for index, panel in enumerate(panels):
-        places = grid[index] if pair else [grid[divmod(index, 2)]]
-        shown = [panel.curves(one) for one in recordings]
-        alike = len({tuple(label for _, label, *_ in curves) for curves in shown}) == 1
-        for axes, recording, curves, letter in zip(places, recordings, shown, "AB", strict=False):
-            for numbers, label, color, line, width in curves:
-                axes.plot(recording.steps, numbers, label=label, color=color, linestyle=line, linewidth=width)
-            named = bool(curves) and (axes is places[-1] or not alike)
-            _dress_panel(axes, f"{letter}: {panel.title}" if pair else panel.title, counts=panel.counts, named=named)
-        limits = _limits([numbers for curves in shown for numbers, *_ in curves], from_zero=panel.from_zero)
-        for axes in places:
-            axes.set_ylim(limits)
-    for axes in grid.ravel()[len(panels) if not pair else 2 * len(panels) :]:
+    grid = figure.subplots(n_rows, 2, sharex=True, squeeze=False).ravel()
+    for axes in grid[n:]:
         axes.set_visible(False)
     figure.text(0.475, 0.18 / high, "step (a simulated minute)", fontsize=10, color=INK, ha="center", va="center")
-    return figure
+    return figure, grid
 
 
 def _dress_panel(axes: Axes, title: str, *, counts: bool, named: bool) -> None:
@@ -113,8 +168,9 @@ def _dress_panel(axes: Axes, title: str, *, counts: bool, named: bool) -> None:
 
     axes.set_title(title, fontsize=10.5, loc="left", color=INK)
     if named:
-        axes.legend(fontsize=8.5, frameon=False, labelcolor=INK, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        axes.legend(**_BESIDE)
     axes.yaxis.set_major_locator(MaxNLocator(6, integer=counts))
+    axes.xaxis.set_major_locator(MaxNLocator(8, integer=True))
     axes.margins(x=0.01)
     open_frame(axes)
     axes.grid(axis="y", color="#e3dfd6", linewidth=0.8)
@@ -124,11 +180,17 @@ def _dress_panel(axes: Axes, title: str, *, counts: bool, named: bool) -> None:
     axes.yaxis.set_major_formatter(lambda number, _: f"{number:,.10g}")
 
 
-def _limits(numbers: Sequence[Array], *, from_zero: bool) -> tuple[float, float]:
-    """Return the ends of the axis: zero is in it, and a little more than the greatest number."""
-    every = np.concatenate([np.zeros(1), *(np.asarray(row, dtype=np.float64) for row in numbers)])
-    low, high = float(every.min()), float(every.max())
-    return (0.0, 1.05 * max(1.0, high)) if from_zero else (1.05 * min(-1.0, low), 1.05 * high)
+def _limits(panel: Panel, numbers: Sequence[Array]) -> tuple[float, float]:
+    """Return the ends of the axis: zero is in it, but for scores, and a little more than the greatest number.
+
+    A good run loses some hundredths of its score: on an axis from zero its curve would be a flat line.
+    """
+    every = np.concatenate([np.zeros(0), *(np.asarray(row, dtype=np.float64) for row in numbers)])
+    low, high = float(every.min(initial=0.0)), float(every.max(initial=0.0))
+    if panel.styles is _SCORE_STYLES and len(every):
+        margin = max(0.06 * (high - float(every.min())), 1e-3 * max(1.0, high))
+        return float(every.min()) - margin, high + margin
+    return (0.0, 1.05 * max(1.0, high)) if panel.from_zero else (1.05 * min(-1.0, low), 1.05 * high)
 
 
 _ROW_INCHES: Final = 0.42

@@ -4,37 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from fireworld.records import Array, CityRecord, StepRecord
 from fireworld_viewer import colors
 from fireworld_viewer.pictures.city_map import hexadecimal, outlines_m
+from fireworld_viewer.pictures.extent import Extent
 from fireworld_viewer.pictures.figure_files import INK, PAIR_COLORS, label_text, new_figure, open_frame
 from fireworld_viewer.pictures.map_grid import LEGEND_STYLE, mark
 from fireworld_viewer.pictures.maps import draw_map
+from fireworld_viewer.story.series import existing
 from fireworld_viewer.story.steps import compare_damage
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
-Gaps = Sequence[float | None]  # numbers over steps; None where a run does not have the step
-
-_VIOLET: Final = hexadecimal(colors.DIFFERS_RGB)
+_DIFFERS: Final = hexadecimal(colors.DIFFERS_RGB)
 _BRIGADE: Final = hexadecimal(colors.ACTIVITY_RGB[2])
 _KINDS: Final = {
     1: ("worse in B", hexadecimal(colors.WORSE_RGB)),
     -1: ("better in B", hexadecimal(colors.BETTER_RGB)),
-    0: ("other difference", "#cec4e6"),
+    0: ("a number only", "#c9c2c4"),
 }
 """Of buildings that differ: label and color by the sign that `compare_damage` returns."""
-BETTER: Final = "#0072b2"
-WORSE: Final = "#d55e00"
+BETTER: Final = hexadecimal(colors.BETTER_RGB)
+WORSE: Final = hexadecimal(colors.WORSE_RGB)
 EQUAL: Final = "#8a8a8a"
-"""Blue, vermilion and grey: every eye can distinguish them; side and mark say the same."""
+"""Bluish green, vermilion and grey: every eye can distinguish them; side and mark say the same."""
 _INK: Final = "#222222"
+_LEGEND_ROWS: Final = 8
 _GOLDEN: Final = 0.6180339887498949
 _SPREAD: Final = 0.3  # points lie that far above and below their line
 _DIRECTIONS: Final = {True: (1, " (more is better)"), False: (-1, " (less is better)"), None: (0, "")}
@@ -63,7 +65,7 @@ def draw_paired_differences(panels: Sequence[DifferencePanel], *, title: str) ->
         axes.remove()
     figure.suptitle(label_text(title), fontsize=12, x=0.01, ha="left")
     figure.supxlabel(
-        "a point is a seed: B - A. Blue, upward: B is better; orange, downward: A is; grey: equal. "
+        "a point is a seed: B - A. Green, mark up: B is better; orange, mark down: A is; grey: equal. "
         "Black: mean and 95 % interval.",
         fontsize=9,
     )
@@ -95,20 +97,32 @@ def _draw_panel(axes: Axes, panel: DifferencePanel) -> None:
     axes.tick_params(axis="x", labelsize=8)
 
 
-def draw_difference_map(city: CityRecord, a: StepRecord, b: StepRecord, differing: Mapping[str, Array]) -> Figure:
-    """Draw which buildings, brigades and civilians differ; brigades where they are in the second run.
+def draw_difference_map(
+    city: CityRecord, a: StepRecord, b: StepRecord, differing: Mapping[str, Array], *, part: Extent | None = None
+) -> Figure:
+    """Draw which buildings, brigades and civilians differ, and what brigades decided otherwise.
 
-    `a` and `b` are one step of both runs; `differing`: "building", "brigade" and "civilian", (n,) bool which differ.
+    Buildings of other codes have the color of better or worse, those that differ in a number only a light shade.
+    Brigades are where they are in the second run; of one that decided otherwise a line leads to its target in each.
+
+    Args:
+        city: where it is.
+        a: a step of the first run.
+        b: the same step of the second.
+        differing: "building", "brigade" and "civilian", (n,) bool which differ.
+        part: what is shown of the city; all if left out.
     """
     from matplotlib.collections import LineCollection, PolyCollection
 
-    figure = draw_map(city, civilian_hp=b.civilians.hp, title=f"what differs: step {b.step}")
+    figure = draw_map(
+        city, civilian_hp=b.civilians.hp, title=f"what differs: step {b.step}", part=part, legend_rows=_LEGEND_ROWS
+    )
     axes = figure.axes[0]
     chosen = np.flatnonzero(differing["building"])
     damage = compare_damage(a.buildings.fieryness, b.buildings.fieryness)[chosen].tolist()
     every = outlines_m(city)
-    outlines = [every[index] for index in chosen]
     faces = [_KINDS[sign][1] for sign in damage]
+    outlines = [every[index] for index in chosen]
     axes.add_collection(PolyCollection(outlines, facecolors=faces, edgecolors=INK, linewidths=0.35, zorder=3))
     moved = np.flatnonzero(differing["brigade"])
     before, now = (np.column_stack([record.brigades.x_m, record.brigades.y_m])[moved] for record in (a, b))
@@ -117,47 +131,54 @@ def draw_difference_map(city: CityRecord, a: StepRecord, b: StepRecord, differin
         axes.scatter(xy[:, 0], xy[:, 1], s=70, facecolors=face, edgecolors=INK, linewidths=1.4, zorder=8)
     hurt = np.flatnonzero(differing["civilian"])
     x, y = city.civilian_x_m[hurt], city.civilian_y_m[hurt]
-    axes.scatter(x, y, s=120, facecolors="none", edgecolors=_VIOLET, linewidths=1.8, zorder=8)
+    axes.scatter(x, y, s=120, facecolors="none", edgecolors=_DIFFERS, linewidths=1.8, zorder=8)
     entries = [
         mark(face, label=f"{label} ({damage.count(sign)})") for sign, (label, face) in _KINDS.items() if sign in damage
     ]
     if len(moved):
-        entries.append(mark(_BRIGADE, "o", label=f"brigade, from A to B ({len(moved)})"))
+        entries.append(mark(_BRIGADE, "o", label=f"brigade ({len(moved)})"))
     if len(hurt):
-        entries.append(mark("none", "o", edge=_VIOLET, label=f"civilian ({len(hurt)})"))
+        entries.append(mark("none", "o", edge=_DIFFERS, label=f"civilian ({len(hurt)})"))
+    entries += _draw_targets(axes, city, a, b)
     entries.append(mark("none", "", label="grey: the same"))
-    axes.legend(handles=entries, **LEGEND_STYLE)
+    axes.legend(handles=entries, fontsize=10.0, **LEGEND_STYLE)
     return figure
 
 
-def draw_difference_curves(
-    steps: Sequence[int],
-    curves: Mapping[str, tuple[Gaps, Gaps]],
-    n_buildings: Mapping[str, Gaps],
-    *,
-    first_step: int | None,
-) -> Figure:
-    """Draw three curves of A and of B by title, those after the first counts, and how many buildings differ by label.
+def _draw_targets(axes: Axes, city: CityRecord, a: StepRecord, b: StepRecord) -> list[Line2D]:
+    """Draw lines to the targets of the brigades that decided otherwise, and return their entries of the legend."""
+    from matplotlib.patches import Polygon
 
-    All numbers are over the steps; `first_step` is that of the first difference.
-    """
-    figure = new_figure(12.0, 6.4, dpi=110, paper="white", layout="constrained")
-    panels = figure.subplots(2, 2, sharex=True).ravel()
-    for axes, (title, both) in zip(panels, curves.items(), strict=False):
-        for name, curve, color, style in zip("AB", both, PAIR_COLORS, ("-", "--"), strict=True):
-            numbers = np.array(curve, dtype=np.float64)  # None becomes NaN: a gap
-            axes.plot(steps, numbers, color=color, linestyle=style, linewidth=1.8, label=name)
-        axes.set_title(title, fontsize=11, loc="left")
-    for (label, counts), color in zip(n_buildings.items(), (INK, _VIOLET), strict=True):
-        panels[3].plot(steps, np.array(counts, dtype=np.float64), color=color, label=label)
-    panels[3].set_title("buildings that differ", fontsize=11, loc="left")
-    for axes in panels[[0, 3]]:
-        axes.legend(fontsize=9, frameon=False)
-    for axes in panels[1:]:  # counts
-        axes.set_ylim(bottom=0, top=max(1.0, axes.get_ylim()[1]))
-    for axes in panels:
-        if first_step is not None:
-            axes.axvline(first_step, color="#888888", linewidth=1.0, linestyle=":")
-        open_frame(axes)
-    figure.supxlabel("step; dotted: the first difference", fontsize=10)
-    return figure
+    other = decided_otherwise(a, b)
+    entries: list[Line2D] = []
+    every = outlines_m(city)
+    for record, name, color, line in zip((a, b), "AB", PAIR_COLORS, ("-", (0, (3, 2))), strict=True):
+        target = existing(record.decisions.target, city)
+        aimed = [brigade for brigade in other if brigade < len(target) and target[brigade] >= 0]
+        for brigade in aimed:
+            aim = target[brigade]
+            x = record.brigades.x_m[brigade], city.center_x_m[aim]
+            y = record.brigades.y_m[brigade], city.center_y_m[aim]
+            axes.plot(x, y, color=color, linestyle=line, linewidth=2.2, zorder=7)
+            axes.add_patch(
+                Polygon(every[aim], facecolor="none", edgecolor=color, linestyle=line, linewidth=3.0, zorder=6)
+            )
+        if aimed:
+            entries.append(mark("none", edge=color, label=f"target in {name} ({len({target[one] for one in aimed})})"))
+    places = np.column_stack([b.brigades.x_m, b.brigades.y_m])[other]
+    axes.scatter(places[:, 0], places[:, 1], s=150, facecolors=_BRIGADE, edgecolors=INK, linewidths=1.4, zorder=8)
+    for brigade, (x, y) in zip(other, places.tolist(), strict=True):
+        look: dict[str, Any] = {"ha": "center", "va": "center", "color": "white", "weight": "bold", "fontsize": 8}
+        axes.annotate(str(brigade), (x, y), zorder=9, **look)
+    return entries
+
+
+def decided_otherwise(a: StepRecord, b: StepRecord) -> list[int]:
+    """Return the brigades whose action or target is another one in the second of two runs."""
+    n = len(b.brigades.x_m)
+    found = np.zeros(n, dtype=bool)
+    for name in ("action", "target"):
+        first, second = (np.asarray(getattr(record.decisions, name)) for record in (a, b))
+        if len(first) == len(second) == n:
+            found |= first != second
+    return np.flatnonzero(found).tolist()

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from fireworld.errors import ViewError, described
 from fireworld.files import check_output, written_beside
 from fireworld.interrupt import postponed
+from fireworld_viewer import colors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 DPI: Final = 120
 PAPER: Final = "#f4f2ee"
 INK: Final = "#333333"
-PAIR_COLORS: Final = ("#1f6feb", "#c2571a")
+PAIR_COLORS: Final = tuple("#" + bytes(rgb).hex() for rgb in colors.RUN_RGB)
 """Of curves of two runs or teams."""
 STILLS: Final[Mapping[str, Mapping[str, Any]]] = {
     ".png": {"Software": "fireworld"},

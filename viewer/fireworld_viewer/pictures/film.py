@@ -14,6 +14,8 @@ from fireworld.files import written_beside
 from fireworld.records import Recording
 from fireworld_viewer import colors
 from fireworld_viewer.pictures.city_map import GROUND, STREET
+from fireworld_viewer.pictures.curves import COUNT_STYLES
+from fireworld_viewer.pictures.extent import fire_extent
 from fireworld_viewer.pictures.figure_files import INK, PAPER, import_library
 from fireworld_viewer.pictures.frames import DPI, MAP_INCHES, Frame, GridFrames
 from fireworld_viewer.pictures.map_grid import MapGrid, labels_on
@@ -40,6 +42,7 @@ def save_film(
     path: Path,
     *,
     fps: float = FPS,
+    whole: bool = False,
     on_frame: Callable[[], object] = lambda: None,
 ) -> None:
     """Write a film, of the kind that the file's ending names; nothing is left of it after an error or Ctrl-C.
@@ -49,6 +52,7 @@ def save_film(
         steps: one for each frame, from `story.steps.read_steps_between`.
         path: the file; one that exists is replaced.
         fps: frames a second.
+        whole: show the whole city, not only where it burns.
         on_frame: called after each frame.
 
     Raises:
@@ -58,7 +62,7 @@ def save_film(
     write = FILMS[path.suffix.lower()]
     if write is _write_mp4:
         import_library("av", _NO_AV)
-    frames = FilmFrames(recordings, steps)
+    frames = FilmFrames(recordings, steps, whole=whole)
     with written_beside(path) as partial:
         write(frames, partial, fps, on_frame)
 
@@ -66,12 +70,14 @@ def save_film(
 class FilmFrames:
     """The frames of a film, drawn when asked for; the city is drawn once. Arguments as in `save_film`."""
 
-    def __init__(self, recordings: Sequence[Recording], steps: Sequence[ShownStep]) -> None:
+    def __init__(self, recordings: Sequence[Recording], steps: Sequence[ShownStep], *, whole: bool = False) -> None:
         self._recordings, self._steps = recordings, steps
+        self._part = None if whole else fire_extent(recordings)
         inches = MAP_INCHES if len(recordings) == 1 else _PAIR_INCHES
         labels = labels_on(cell for step in steps for cell in cells_of(recordings, step))
-        first = cells_of(recordings, steps[0])
-        self._frames = GridFrames(MapGrid(first, columns=len(recordings), map_inches=inches, labels=labels, dpi=DPI))
+        first = cells_of(recordings, steps[0], part=self._part)
+        grid = MapGrid(first, columns=len(recordings), map_inches=inches, labels=labels, curves=recordings, dpi=DPI)
+        self._frames = GridFrames(grid)
 
     def __len__(self) -> int:
         return len(self._steps)
@@ -83,7 +89,7 @@ class FilmFrames:
 
     def frame(self, index: int) -> Frame:
         """Draw a frame."""
-        return self._frames.draw(cells_of(self._recordings, self._steps[index]))
+        return self._frames.draw(cells_of(self._recordings, self._steps[index], part=self._part))
 
 
 def _write_gif(frames: FilmFrames, path: Path, fps: float, on_frame: Callable[[], object]) -> None:
@@ -120,8 +126,16 @@ def _palette(samples: Sequence[Frame]) -> Image:
     """Return a picture whose palette has every color of the table, and the most useful others of some frames."""
     from PIL import Image, ImageColor
 
-    exact = [*colors.FIERYNESS_RGB, *colors.ACTIVITY_RGB, colors.REFUGE_RGB, colors.WATER_RGB, colors.HYDRANT_RGB]
-    exact += [ImageColor.getrgb(color)[:3] for color in (PAPER, GROUND, STREET, INK)]
+    drawn = [color for color, _ in COUNT_STYLES.values()]
+    exact = [
+        *colors.FIERYNESS_RGB,
+        *colors.ACTIVITY_RGB,
+        *colors.HEALTH_RGB,
+        colors.REFUGE_RGB,
+        colors.WATER_RGB,
+        colors.HYDRANT_RGB,
+    ]
+    exact += [ImageColor.getrgb(color)[:3] for color in (PAPER, GROUND, STREET, INK, *drawn)]
     n = _TRANSPARENT - len(exact)
     mixed = Image.fromarray(np.concatenate(samples)).quantize(n, method=Image.Quantize.MEDIANCUT)
     others = np.array(mixed.getpalette(), dtype=np.int64).reshape(-1, 3)[:n]

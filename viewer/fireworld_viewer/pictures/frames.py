@@ -33,7 +33,7 @@ class GridFrames:
         with drawing():
             self._canvas.draw()
         self._ground = self._canvas.copy_from_bbox(grid.figure.bbox)
-        self._rows: dict[tuple[int, str], Any] = {}
+        self._rows: dict[tuple[int, str, Any], Any] = {}
 
     @property
     def size(self) -> tuple[int, int]:
@@ -53,7 +53,7 @@ class GridFrames:
     def _draw_legend(self) -> None:
         """Draw the rows of the legend; copy those that were drawn before: letters take most of the time."""
         for index, row in enumerate(self._grid.legend_rows):
-            key = index, row.get_text()
+            key = index, row.get_text(), row.get_color()
             if key in self._rows:
                 self._canvas.restore_region(self._rows[key])
                 continue

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from fireworld.errors import one_line
-from fireworld.records import ACTIVITIES, FIERYNESS, CityRecord
+from fireworld.records import ACTIVITIES, FIERYNESS, CityRecord, Recording
 from fireworld_viewer import colors
-from fireworld_viewer.pictures.city_map import JET_EDGE, WIDTH_INCHES, CityMap, MapState, extent_m, hexadecimal
+from fireworld_viewer.pictures.beside import CityInset, CountCurves, most_counted
+from fireworld_viewer.pictures.city_map import JET_EDGE, WIDTH_INCHES, CityMap, MapState, hexadecimal
+from fireworld_viewer.pictures.extent import Extent, whole_extent
 from fireworld_viewer.pictures.figure_files import DPI, INK, new_figure
 
 if TYPE_CHECKING:
@@ -26,6 +28,13 @@ _LINE_INCHES: Final = 0.24
 _CREDIT_INCHES: Final = 0.13
 _CREDIT_POINTS: Final = 7.5
 _LEGEND_LINE_INCHES: Final = 0.205
+_INSET_INCHES: Final = 1.9  # the longer side of the small map
+_CURVES_INCHES: Final = 0.8  # height of the curves below a map, and above and below them
+_ABOVE_CURVES_INCHES: Final = 0.3
+_BELOW_CURVES_INCHES: Final = 0.28
+_LEFT_OF_CURVES_INCHES: Final = 0.32
+_FADED: Final = "#a9a5a0"
+"""Of the rows of a film's legend that are about nothing at this step."""
 _POINTS_WIDE: Final = 0.56  # how wide a letter is on average, of its size
 _MAPS_COUNTED: Final = 2  # above this many maps, and in strips, the legend has no counts
 
@@ -67,12 +76,15 @@ class MapCell:
     state: MapState
     title: str
     facts: str = ""  # a second line of the heading
+    step: int = 0
+    part: Extent | None = None  # what is shown of the city; all of it if left out. All cells show the same
 
 
 class MapGrid:
     """A figure of maps, row by row; `show` sets all of them to another step.
 
-    The labels are the entries of the legend: what is on these maps if left out.
+    The labels are the entries of the legend: what is on these maps if left out. With `curves`, the run of each map,
+    there are curves below the maps, which are in one row then.
     """
 
     def __init__(
@@ -83,23 +95,33 @@ class MapGrid:
         map_inches: float = WIDTH_INCHES,
         heading: str = "",
         labels: Sequence[str] = (),
+        curves: Sequence[Recording] = (),
+        legend_rows: int = 0,
         dpi: int = DPI,
     ) -> None:
-        west, east, south, north = extent_m(cells[0].city)
+        part = cells[0].part or whole_extent(cells[0].city)
         self._map_inches = map_inches
-        map_height = min(max(map_inches * (north - south) / (east - west), 0.4 * map_inches), 2.0 * map_inches)
+        map_height = min(max(map_inches * part.high / part.wide, 0.4 * map_inches), 2.0 * map_inches)
         self._labels = list(labels) or labels_on(cells)
         rows = -(-len(cells) // columns)
         n_lines = 1 + any(cell.facts for cell in cells)
         row_height = map_height + n_lines * _LINE_INCHES + _GAP_INCHES
+        curves_height = _ABOVE_CURVES_INCHES + _CURVES_INCHES + _BELOW_CURVES_INCHES if curves else 0.0
         above = _GAP_INCHES / 2 + (1.7 * _LINE_INCHES if heading else 0.0)
-        needed = above + n_lines * _LINE_INCHES + (len(self._labels) + 1) * _LEGEND_LINE_INCHES + 2 * _GAP_INCHES
+        n_rows = max(len(self._labels), legend_rows)
+        needed = above + n_lines * _LINE_INCHES + (n_rows + 1) * _LEGEND_LINE_INCHES + 2 * _GAP_INCHES
+        inset_at = needed
+        has_room = not heading or needed + _INSET_INCHES < above + rows * row_height  # strips are no higher for it
+        inset = cells[0].part if has_room else None
+        needed += _INSET_INCHES + _GAP_INCHES if inset else 0.0
         self._width = _GAP_INCHES + columns * (map_inches + _GAP_INCHES) + _LEGEND_INCHES
         credit = one_line(cells[0].city.attribution)
         below = _CREDIT_INCHES / 2 if credit else 0.0
-        self._height = max(above + rows * row_height + _GAP_INCHES, needed) + below
+        self._height = max(above + rows * row_height + curves_height + _GAP_INCHES, needed) + below
         self.figure: Figure = new_figure(_even(self._width, dpi), _even(self._height, dpi), dpi=dpi)
         self._maps: list[CityMap] = []
+        self._insets: list[CityInset] = []
+        self._curves: list[CountCurves] = []
         self._facts: list[Any] = []
         if heading:
             room = self._width - 2 * _GAP_INCHES
@@ -114,6 +136,11 @@ class MapGrid:
             self._write_credit(
                 credit, _GAP_INCHES + room, above + rows * row_height - _GAP_INCHES + _CREDIT_INCHES, inches=room
             )
+        if inset:
+            self._add_inset(cells[0].city, inset, left=self._width - _LEGEND_INCHES, top=inset_at)
+        for index, run in enumerate(curves):
+            self._add_curves(curves, run, left=_GAP_INCHES + index * (map_inches + _GAP_INCHES),
+                             top=above + row_height + below - _GAP_INCHES + _ABOVE_CURVES_INCHES)  # fmt: skip
         corner = self._maps[min(columns, len(self._maps)) - 1]
         self._counted = len(cells) <= _MAPS_COUNTED and not heading
         title = "how many: (A | B)" if self._counted and len(cells) > 1 else None
@@ -127,7 +154,9 @@ class MapGrid:
     def changing(self) -> list[tuple[Any, Artist]]:
         """What `show` sets besides the legend, in the order of drawing, with the axes to draw it on."""
         on_maps = [(one.axes, item) for one in self._maps for item in one.changing]
-        return [*on_maps, *((self._maps[0].axes, item) for item in self._facts)]
+        beside: list[tuple[Any, Artist]] = [(one.axes, one.brigades) for one in self._insets]
+        beside += [(one.axes, one.cursor) for one in self._curves]
+        return [*on_maps, *beside, *((self._maps[0].axes, item) for item in self._facts)]
 
     @property
     def legend_rows(self) -> list[Any]:
@@ -139,10 +168,17 @@ class MapGrid:
         for one, facts, cell in zip(self._maps, self._facts, cells, strict=True):
             one.show(cell.state)
             facts.set_text(cell.facts)
+        for inset in self._insets:
+            inset.show(cells[0].state.brigades if len(cells) == 1 else None)
+        for curves, cell in zip(self._curves, cells, strict=False):
+            curves.show(cell.step)
         counts = [count_marks(cell.city, cell.state) for cell in cells] if self._counted else []
         for text, label in zip(self._legend.get_texts(), self._labels, strict=True):
-            numbers = " | ".join(str(count.get(label, 0)) for count in counts)
-            text.set_text(label if label in _UNCOUNTED or not counts else f"{label} ({numbers})")
+            numbers = [count.get(label, 0) for count in counts]
+            nothing = bool(counts) and not any(numbers)
+            counted = not nothing and bool(counts) and label not in _UNCOUNTED
+            text.set_text(f"{label} ({' | '.join(map(str, numbers))})" if counted else label)
+            text.set_color(_FADED if nothing else INK)
 
     def _add(self, cell: MapCell, left: float, top: float, height: float, *, alone: bool, n_lines: int) -> None:
         """Add a map whose upper left corner is there, in inches from the upper left one of the figure."""
@@ -152,12 +188,31 @@ class MapGrid:
         n_brigades = len(cell.city.brigade_tank_litres)
         if cell.state.brigades is not None:
             n_brigades = max(n_brigades, len(cell.state.brigades.xy_m))
-        self._maps.append(CityMap(axes, cell.city, inches=self._map_inches, n_brigades=n_brigades))
+        self._maps.append(CityMap(axes, cell.city, inches=self._map_inches, n_brigades=n_brigades, part=cell.part))
         room = wide - 2 * _GAP_INCHES if alone else self._map_inches
         size = 13.0 if alone else 11.0
         title_at = top - (n_lines - 1) * _LINE_INCHES
         self._write(left, title_at, cell.title, points=size, inches=room)
         self._facts.append(self._write(left, top, cell.facts, points=size - 2.0, inches=room))
+
+    def _add_inset(self, city: CityRecord, part: Extent, *, left: float, top: float) -> None:
+        """Add the small map of the whole city below the legend; places are in inches from the upper left corner."""
+        whole = whole_extent(city)
+        scale = _INSET_INCHES / max(whole.wide, whole.high)
+        wide, high = scale * whole.wide / self._width, scale * whole.high / self._height
+        axes = self.figure.add_axes((left / self._width, 1.0 - top / self._height - high, wide, high))
+        self._insets.append(CityInset(axes, city, part))
+
+    def _add_curves(self, runs: Sequence[Recording], run: Recording, *, left: float, top: float) -> None:
+        """Add the curves of one of the runs."""
+        inches = self._map_inches - _LEFT_OF_CURVES_INCHES
+        box = (
+            (left + _LEFT_OF_CURVES_INCHES) / self._width, 1.0 - (top + _CURVES_INCHES) / self._height,
+            inches / self._width, _CURVES_INCHES / self._height,
+        )  # fmt: skip
+        span = min(int(one.steps[0]) for one in runs), max(int(one.steps[-1]) for one in runs)
+        axes = self.figure.add_axes(box)
+        self._curves.append(CountCurves(axes, run, span=span, most=most_counted(list(runs)), inches=inches))
 
     def _write_credit(self, text: str, right: float, bottom: float, *, inches: float) -> None:
         """Write whom the map is by, below it in the corner; a longer text is cut."""

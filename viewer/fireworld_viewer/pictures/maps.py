@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fireworld.errors import one_line
 from fireworld.records import CityRecord, Recording, StepRecord
 from fireworld_viewer.pictures.city_map import WIDTH_INCHES, BrigadeMarks, MapState, state_of
+from fireworld_viewer.pictures.extent import Extent, fire_extent
 from fireworld_viewer.pictures.map_grid import MapCell, MapGrid
 from fireworld_viewer.story.steps import ShownStep, read_steps
 
@@ -33,6 +34,8 @@ def draw_map(
     civilian_hp: NDArray[Any] | None = None,
     civilians_xy: NDArray[Any] | None = None,
     title: str = "",
+    part: Extent | None = None,
+    legend_rows: int = 0,
 ) -> Figure:
     """Draw a city from above: buildings, streets, refuges, hydrants, civilians and brigades.
 
@@ -43,6 +46,8 @@ def draw_map(
         civilian_hp: (n_civilians,) health points; those of the start if left out.
         civilians_xy: (n_civilians, 2) positions in metres; those of the start if left out.
         title: heading; the city's name if left out.
+        part: what is shown of it; all if left out.
+        legend_rows: how many rows there is at least room for in the legend.
 
     Raises:
         ViewError: matplotlib is not installed.
@@ -56,10 +61,10 @@ def draw_map(
         brigades=brigades,
         civilian_xy_m=civilians_xy,
     )
-    return MapGrid([MapCell(city, state, one_line(title or city.name))]).figure
+    return MapGrid([MapCell(city, state, one_line(title or city.name), part=part)], legend_rows=legend_rows).figure
 
 
-def draw_record(city: CityRecord, record: StepRecord, *, title: str) -> Figure:
+def draw_record(city: CityRecord, record: StepRecord, *, title: str, part: Extent | None = None) -> Figure:
     """Draw buildings, brigades and civilians after a step, without what the brigades do; errors as in `draw_map`."""
     return draw_map(
         city,
@@ -68,25 +73,35 @@ def draw_record(city: CityRecord, record: StepRecord, *, title: str) -> Figure:
         civilian_hp=record.civilians.hp,
         civilians_xy=state_of(city, record).civilian_xy_m,
         title=title,
+        part=part,
     )
 
 
-def draw_steps(recordings: Sequence[Recording], steps: Sequence[int]) -> Figure:
+def draw_steps(recordings: Sequence[Recording], steps: Sequence[int], *, whole: bool = False) -> Figure:
     """Draw one step of a run, or a strip of several; of two runs side by side, or in two rows.
 
     Args:
         recordings: one, or two of the same city.
         steps: steps, or `story.steps.LAST`.
+        whole: show the whole city, not only where it burns.
 
     Raises:
         ViewError: there is no such step, the cities differ, or matplotlib is not installed.
     """
     shown = read_steps(recordings, steps)
+    part = None if whole else fire_extent(recordings)
     if len(shown) == 1:
         inches = WIDTH_INCHES if len(recordings) == 1 else PAIR_INCHES
-        return MapGrid(cells_of(recordings, shown[0]), columns=len(recordings), map_inches=inches).figure
+        cells = cells_of(recordings, shown[0], part=part)
+        return MapGrid(cells, columns=len(recordings), map_inches=inches, curves=recordings).figure
     cells = [
-        MapCell(one.city, state_of(one.city, record), letter + _when(record, step.step), ", ".join(facts_of(record)))
+        MapCell(
+            one.city,
+            state_of(one.city, record),
+            letter + _when(record, step.step),
+            ", ".join(facts_of(record)),
+            part=part,
+        )
         for row, (one, letter) in enumerate(zip(recordings, _letters(recordings), strict=True))
         for step in shown
         for record in [step.records[row]]
@@ -99,10 +114,17 @@ def draw_steps(recordings: Sequence[Recording], steps: Sequence[int]) -> Figure:
     return MapGrid(cells, columns=columns, map_inches=inches, heading="     ".join(_names(recordings))).figure
 
 
-def cells_of(recordings: Sequence[Recording], shown: ShownStep) -> list[MapCell]:
+def cells_of(recordings: Sequence[Recording], shown: ShownStep, *, part: Extent | None = None) -> list[MapCell]:
     """Return the maps of a step, one for each recording, headed by what it is a recording of."""
     return [
-        MapCell(one.city, state_of(one.city, record), name, "   ".join([_when(record, shown.step), *facts_of(record)]))
+        MapCell(
+            one.city,
+            state_of(one.city, record),
+            name,
+            "   ".join([_when(record, shown.step), *facts_of(record)]),
+            step=shown.step,
+            part=part,
+        )
         for one, record, name in zip(recordings, shown.records, _names(recordings), strict=True)
     ]
 

@@ -2,7 +2,7 @@
 import { css, seenOn } from "./colour.js";
 import { brief, shown, ticks, write } from "./numbers.js";
 
-const ROOM = { left: 46, right: 10, top: 8, bottom: 20 };
+const ROOM = { left: 52, right: 10, top: 8, bottom: 20 };
 const DASHES = { dotted: [2, 3], second: [7, 4] };
 
 // A panel: curves of the same quantity, each {label, letter, rgb, digits, dotted, second, steps, numbers}.

@@ -40,9 +40,9 @@ PANELS: Final = (
         "score",
         (
             Curve("score.score", None, digits=3),
-            Curve("score.score_now", colors.TOTAL_RGB, digits=3),
             Curve("score.score_max", colors.GREY_RGB, dotted=True),
         ),
+        from_zero=False,
     ),
     Panel(
         "buildings",
@@ -91,6 +91,7 @@ def look() -> dict[str, Any]:
         "hydrant": colors.HYDRANT_RGB,
         "water": colors.WATER_RGB,
         "differs": colors.DIFFERS_RGB,
+        "pair": list(colors.RUN_RGB),
         "panels": [
             {
                 "title": panel.title,

@@ -37,7 +37,7 @@ class Page {
     this.panels = words.look.panels.map((panel) => this.addPanel(panel)).filter(Boolean);
     this.chosen = new Chosen(this.runs, this.player, this.theme, () => this.draw());
     this.legend = new Legend(this.runs, this.theme, () => this.draw());
-    this.player.readAddress();
+    this.player.readAddress(words.start);
     this.listen();
     this.resize();
   }
@@ -89,6 +89,7 @@ class Page {
     const caption = document.createElement("figcaption");
     caption.textContent = this.alone ? "" : `${run.letter}: ${run.policy}`;
     caption.hidden = this.alone;
+    caption.style.borderLeft = `6px solid rgb(${this.words.look.pair[run.index]})`;
     figure.append(canvas, caption, buttons);
     byId("maps").append(figure);
     followHands(canvas, this.view, (left, top) => {

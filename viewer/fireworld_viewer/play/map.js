@@ -7,6 +7,8 @@ const SHADES = 6;
 const DARKEST = 0.6;
 const CORE = 0.55;
 const STREET_M = 4;
+const MANY = 6000; // buildings in sight above which they are drawn as boxes, without edges and heat
+const BATCH = 500; // outlines or lines of one path: browsers take far too long for paths of many thousands
 const LENGTHS_M = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000];
 
 // How dark the middle of a building is, by its heat: its edge keeps the color of its code, which every eye can tell.
@@ -17,6 +19,15 @@ export function shadeOf(temperature, look) {
 
 export function shadeFill(shade) {
   return `rgba(0, 0, 0, ${(DARKEST * shade) / (SHADES - 1)})`;
+}
+
+// Call `add` for each of some things, and `finish` after every batch; each batch is a path of its own.
+function inBatches(pen, things, add, finish) {
+  for (let from = 0; from < things.length; from += BATCH) {
+    pen.beginPath();
+    for (const thing of things.slice(from, from + BATCH)) add(thing);
+    finish();
+  }
 }
 
 export class CityMap {
@@ -62,13 +73,26 @@ export class CityMap {
     pen.lineCap = "round";
     pen.strokeStyle = theme.street;
     pen.lineWidth = Math.max(1, Math.min(14, STREET_M * view.scale));
-    pen.beginPath();
-    for (let k = 0; k < city.street_from.length; k += 1) {
-      const [a, b] = [city.street_from[k], city.street_to[k]];
-      pen.moveTo(...view.toScreen(city.node_x_m[a], city.node_y_m[a]));
-      pen.lineTo(...view.toScreen(city.node_x_m[b], city.node_y_m[b]));
-    }
-    pen.stroke();
+    inBatches(pen, this.streetsInSight(), ([from, to]) => {
+      pen.moveTo(...from);
+      pen.lineTo(...to);
+    }, () => pen.stroke());
+  }
+
+  // The ends of the streets that can be seen, on the screen.
+  streetsInSight() {
+    const { city, view } = this;
+    const place = (node) => view.toScreen(city.node_x_m[node], city.node_y_m[node]);
+    const found = city.street_from.map((node, k) => [place(node), place(city.street_to[k])]);
+    return found.filter(([[x0, y0], [x1, y1]]) => Math.max(x0, x1) >= 0 && Math.min(x0, x1) <= view.width
+      && Math.max(y0, y1) >= 0 && Math.min(y0, y1) <= view.height);
+  }
+
+  // Add the box of a building to a path.
+  box(pen, building) {
+    const { view } = this;
+    const [west, south, east, north] = this.city.boxes[building];
+    pen.rect(...view.toScreen(west, north), (east - west) * view.scale, (north - south) * view.scale);
   }
 
   // Add the outline of a building to a path, or its middle: the same, smaller.
@@ -86,7 +110,7 @@ export class CityMap {
     pen.closePath();
   }
 
-  // The buildings that can be seen; `edges` are their outlines. Both are worked out once for a view.
+  // The buildings that can be seen; `edges` are their outlines, in batches. Both are worked out once for a view.
   inSight() {
     const { view } = this;
     if (this.seenAt === view.version) return this.seen;
@@ -96,8 +120,12 @@ export class CityMap {
     this.city.boxes.forEach(([w, s, e, n], k) => {
       if (e >= west && w <= east && n >= south && s <= north) found.push(k);
     });
-    this.edges = new Path2D();
-    for (const building of found) this.outline(this.edges, building);
+    this.edges = [];
+    for (let from = 0; from < found.length && found.length <= MANY; from += BATCH) {
+      const path = new Path2D();
+      for (const building of found.slice(from, from + BATCH)) this.outline(path, building);
+      this.edges.push(path);
+    }
     Object.assign(this, { seenAt: view.version, seen: found });
     return found;
   }
@@ -119,9 +147,8 @@ export class CityMap {
     }
     for (const [fill, those] of byFill) {
       pen.fillStyle = fill;
-      pen.beginPath();
-      for (const building of those) this.outline(pen, building, size);
-      pen.fill();
+      const add = this.seen.length > MANY ? (one) => this.box(pen, one) : (one) => this.outline(pen, one, size);
+      inBatches(pen, those, add, () => pen.fill());
     }
   }
 
@@ -129,24 +156,23 @@ export class CityMap {
     const { run, city, view, theme } = this;
     const sight = this.inSight();
     this.paint(pen, sight, (building) => this.fill(row, building));
+    const many = sight.length > MANY;
     const heat = (building) => shadeOf(run.value("buildings.temperature", row, building), run.look);
-    this.paint(pen, sight.filter((one) => heat(one) > 0), (building) => shadeFill(heat(building)), CORE);
+    if (!many) this.paint(pen, sight.filter((one) => heat(one) > 0), (building) => shadeFill(heat(building)), CORE);
     const edge = (chosen, color, width) => {
       if (!chosen.length) return;
       pen.strokeStyle = color;
       pen.lineWidth = width;
-      pen.beginPath();
-      for (const building of chosen) this.outline(pen, building);
-      pen.stroke();
+      inBatches(pen, chosen, (building) => this.outline(pen, building), () => pen.stroke());
     };
     pen.strokeStyle = theme.edge;
     pen.lineWidth = Math.max(0.4, Math.min(1, view.scale * 0.3));
-    pen.stroke(this.edges);
+    for (const path of this.edges) pen.stroke(path);
     if (differs) {
       const color = css(seenOn(run.look.differs, theme.ground));
       const [numbers, codes] = [1, 2].map((much) => sight.filter((k) => differs[k] === much));
       const wide = Math.max(0.4, Math.min(1, view.scale / 1.6));
-      edge(numbers, color, 1.4 * wide);
+      if (!many) edge(numbers, color, 1.4 * wide);
       edge(codes, theme.casing, 5 * wide);
       edge(codes, color, 3 * wide);
     }

@@ -46,6 +46,7 @@ def play_page(
     names: Sequence[str],
     damages: Sequence[str | None] = (None, None),
     first: FirstDifference | None = None,
+    start: int | None = None,
 ) -> str:
     """Write the page of one recording, or of two of one city.
 
@@ -54,13 +55,14 @@ def play_page(
         names: of the recordings.
         damages: what is wrong with each, or None.
         first: where two first differ; None if they are the same.
+        start: the step that it opens at, unless its address names one; the first if left out.
 
     Raises:
         ViewError: a recording has no steps, or the cities differ.
     """
     steps_of(recordings)
     titles = [one_line(one.header.title) for one in recordings]
-    data = base64.b64encode(_data(recordings, names, damages, first)).decode()
+    data = base64.b64encode(_data(recordings, names, damages, first, start)).decode()
     script, style = program(), _text("play.css")
     parts = {
         "title": escape(f"fireworld: {' against '.join(titles)}"),
@@ -96,6 +98,7 @@ def _data(
     names: Sequence[str],
     damages: Sequence[str | None],
     first: FirstDifference | None,
+    start: int | None,
 ) -> bytes:
     """Pack everything that is shown: the length of the words, the words as JSON, the columns; deflated."""
     columns = Columns()
@@ -111,6 +114,7 @@ def _data(
         "city": city,
         "runs": runs,
         "first": first and {"step": first.step, "sentence": one_line(first.sentence)},
+        "start": start,
         "columns": columns.table,
     }
     text = json.dumps(words, separators=(",", ":"), allow_nan=False).encode()

@@ -86,8 +86,10 @@ export class Player {
     }
   }
 
-  readAddress() {
+  // Go to the step that the address names, else to the one given.
+  readAddress(start = null) {
     const found = /^#(\d{1,9})$/.exec(location.hash);
-    if (found) this.goToStep(Number(found[1]));
+    const step = found ? Number(found[1]) : start;
+    if (step !== null) this.goToStep(step);
   }
 }

@@ -14,12 +14,13 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from fireworld.errors import OutputError, ViewError, expected
 from fireworld.files import check_output, write_file, written_beside
 from fireworld.records import Recording
 from fireworld_viewer.rerun_view.pages import OutcomePage
+from fireworld_viewer.story.steps import check_same_city
 
 if TYPE_CHECKING:
     import rerun
@@ -28,6 +29,8 @@ RERUN_MINOR: Final = "0.41."
 INSTALL_HINT: Final = "try pip install 'fireworld[view]'"
 LOCALHOST: Final = "127.0.0.1"
 WEB_PORT: Final = 9090
+WIDGET_PIXELS: Final = (1200, 800)
+"""Width and height of what a notebook shows."""
 APPLICATION_ID: Final = "fireworld"
 _END_BYTES: Final = 32  # of a Rerun file, after its table of contents
 
@@ -95,6 +98,24 @@ def serve(write: Callable[[Path], None], *, port: int = WEB_PORT, announce: Call
     _run_viewer(write, ["--serve-web", *ports], announce=lambda: announce(address))
 
 
+def widget(recordings: Sequence[Recording], *, outcome: OutcomePage | None = None) -> Any:
+    """Return Rerun's widget, which notebooks show, with one recording, or two side by side.
+
+    ViewError if Rerun or its widget is missing, or the cities differ.
+    """
+    _import_rerun()
+    from rerun import notebook
+
+    if not notebook.HAS_NOTEBOOK:
+        raise ViewError(f"show: Rerun's widget is not installed; try pip install 'rerun-sdk[notebook]~={RERUN_MINOR}0'")
+    check_same_city(*(one.city for one in recordings))
+    stream = new_stream(recording_id=_identity(recordings))
+    viewer = notebook.Viewer(width=WIDGET_PIXELS[0], height=WIDGET_PIXELS[1], recording=stream)
+    _send(stream, recordings, (), outcome)
+    stream.flush()
+    return viewer
+
+
 def check_display(option: str, others: str) -> None:
     """Raise ViewError where no window can be opened; the message names the option and what others to try."""
     if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
@@ -145,18 +166,9 @@ def _write_rrd(
     would fill gigabytes of memory before it is compressed. It does so in a thread of its own that reports no error, so
     the end is checked.
     """
-    rerun = _import_rerun()
-    from fireworld_viewer.rerun_view import blueprint
-    from fireworld_viewer.rerun_view.pages import OUTCOME_PATH, log_legend, log_page
-    from fireworld_viewer.rerun_view.plots import first_burning
-    from fireworld_viewer.rerun_view.run_layers import RunLayers, log_comparison
-    from fireworld_viewer.story.steps import check_same_city
-
-    comparing = len(recordings) > 1
-    if comparing:
-        check_same_city(*(one.city for one in recordings))
+    check_same_city(*(one.city for one in recordings))
     stream = new_stream(recording_id=_identity(recordings))
-    with tempfile.TemporaryDirectory(prefix="fireworld-") as folder, warnings.catch_warnings():
+    with tempfile.TemporaryDirectory(prefix="fireworld-") as folder:
         path = Path(folder) / "view.rrd"
         stream.save(path)
 
@@ -166,6 +178,30 @@ def _write_rrd(
             except RuntimeError:  # the thread that writes has given up
                 raise _no_room(path) from None
 
+        _send(stream, recordings, focus, outcome, after_block=write_out)
+        stream.disconnect()
+        if not is_whole(path):
+            raise _no_room(path)
+        shutil.copyfile(path, output)
+
+
+def _send(
+    stream: rerun.RecordingStream,
+    recordings: Sequence[Recording],
+    focus: Sequence[int],
+    outcome: OutcomePage | None,
+    *,
+    after_block: Callable[[], object] | None = None,
+) -> None:
+    """Send everything that is shown, `after_block` after each block of wide data."""
+    rerun = _import_rerun()
+    from fireworld_viewer.rerun_view import blueprint
+    from fireworld_viewer.rerun_view.pages import OUTCOME_PATH, log_legend, log_page
+    from fireworld_viewer.rerun_view.plots import first_burning
+    from fireworld_viewer.rerun_view.run_layers import RunLayers, log_comparison
+
+    comparing = len(recordings) > 1
+    with warnings.catch_warnings():
         # Rerun warns of data it cannot take and continues; a view that lacks something is worse than none.
         warnings.simplefilter("error", rerun.error_utils.RerunWarning)
         plotted = focus or first_burning(recordings[0])
@@ -176,14 +212,13 @@ def _write_rrd(
         log_legend(stream, comparing=comparing, acting=acting, map_by=recordings[0].city.attribution)
         if outcome is not None:
             log_page(stream, OUTCOME_PATH, outcome.markdown)
+        look: dict[str, Any] = {
+            "focus": plotted, "names_apart_m": blueprint.names_apart_m(recordings), "after_block": after_block,
+        }  # fmt: skip
         if comparing:
-            log_comparison(stream, *recordings, focus=plotted, outcome=outcome, after_block=write_out)
+            log_comparison(stream, *recordings, outcome=outcome, **look)
         else:
-            RunLayers(stream, recordings[0].city, focus=plotted, after_block=write_out).add(recordings[0])
-        stream.disconnect()
-        if not is_whole(path):
-            raise _no_room(path)
-        shutil.copyfile(path, output)
+            RunLayers(stream, recordings[0].city, **look).add(recordings[0], complete=True)
 
 
 def _no_room(path: Path) -> OutputError:

@@ -19,15 +19,17 @@ _BALL_RADIUS_M: Final = 4.0
 _BALL_HEIGHT_M: Final = 6.0
 _GAUGE_HEIGHT_M: Final = 20.0
 _GAUGE_HALF_WIDTH_M: Final = 1.5
-_NAME_RISE_M: Final = 31.0
-_NAME_STACK_M: Final = 12.0
-_CROWD_M: Final = 22.0
+_NAME_BELOW_M: Final = 4.0
+NAMES_APART_M: Final = 22.0  # where it is not known from how far they are seen
 _QUEUE_M: Final = 8.0
 _JET_POINTS: Final = 9
 
 
-def log_brigades(layers: Layers, recording: Recording) -> None:
-    """Draw each brigade as a ball in the color of its activity, with a gauge of its tank and a label."""
+def log_brigades(layers: Layers, recording: Recording, *, names_apart_m: float) -> None:
+    """Draw each brigade as a ball in the color of its activity, with a gauge of its tank and a name.
+
+    Brigades that are nearer to each other than `names_apart_m` share a label.
+    """
     position = positions_m(recording)
     k, n = position.shape[:2]
     if n == 0:
@@ -52,15 +54,7 @@ def log_brigades(layers: Layers, recording: Recording) -> None:
     layers.static("team/brigades", rerun.Points3D.from_fields(radii=[_BALL_RADIUS_M]))
     layers.rows("team/brigades", balls.partition(width), number_columns("Brigade", numbers))
 
-    prefix = "" if layers.name else "brigade "  # there is less room beside another map
-    labels = [f"{prefix}{index} · {litres} l" for row in tank.tolist() for index, litres in enumerate(row)]
-    above = position.copy()
-    above[..., 2] += _NAME_RISE_M + _NAME_STACK_M * crowding(position[..., 0], position[..., 1], within_m=_CROWD_M)
-    names = rerun.Points3D.columns(positions=above.reshape(-1, 3), labels=labels)
-    style = rerun.Points3D.from_fields(radii=[0.1], colors=colors.single(colors.LABEL_RGB), show_labels=[True])
-    layers.static("team/names", style)
-    layers.rows("team/names", names.partition(width))
-
+    _log_names(layers, position, names_apart_m)
     if not recorded(recording, "city.brigade_tank_litres"):
         return
     full = np.maximum(np.asarray(recording.city.brigade_tank_litres, dtype=np.float32), 1.0)
@@ -73,6 +67,21 @@ def log_brigades(layers: Layers, recording: Recording) -> None:
     style = rerun.Boxes3D.from_fields(colors=colors.single(colors.WATER_RGB), fill_mode=rerun.components.FillMode.Solid)
     layers.static("team/tanks", style)
     layers.rows("team/tanks", gauges.partition(width))
+
+
+def _log_names(layers: Layers, position: NDArray[np.float32], apart_m: float) -> None:
+    """Write the number of each brigade on the ground before it; those that stand together share a label."""
+    leader = leaders(position[..., 0], position[..., 1], within_m=apart_m)
+    places, labels, width = [], [], []
+    for row, led_by in zip(position, leader, strict=True):
+        groups = [np.flatnonzero(led_by == first) for first in np.unique(led_by)]
+        places += [row[group].mean(axis=0) * (1, 1, 0) - (0, _NAME_BELOW_M, 0) for group in groups]
+        labels += [", ".join(map(str, group)) for group in groups]
+        width.append(len(groups))
+    style = rerun.Points3D.from_fields(radii=[0.1], colors=colors.single(colors.LABEL_RGB), show_labels=[True])
+    layers.static("team/names", style)
+    names = rerun.Points3D.columns(positions=np.array(places, dtype=np.float32), labels=labels)
+    layers.rows("team/names", names.partition(width))
 
 
 def log_water(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
@@ -90,16 +99,20 @@ def log_water(layers: Layers, recording: Recording, mesh: CityMesh) -> None:
         layers.strips(path, arcs, shown.sum(axis=1), radius_m=radius_m, rgb=rgb)
 
 
-def log_states(layers: Layers, recording: Recording) -> None:
-    """Send two timelines for each brigade: its activity, and the action that it chose."""
+def log_states(layers: Layers, recording: Recording, *, complete: bool) -> None:
+    """Send two timelines for each brigade: its activity, and the action that it chose.
+
+    complete: the recording is the whole run, so that short bands are known; they get no label, for it would be cut.
+    """
     activity = recording.column("/brigades", "activity")
     action = chosen_actions(recording)  # -1 is the last of the names: refilling, dead, or no fire
     codes = range(max(len(ACTION_NAMES), int(action.max(initial=-1)) + 1))
     actions, rgb = [*map(action_name, codes), "no choice"], [*map(colors.action_rgb, codes), colors.NO_CHOICE_RGB]
     for brigade in range(activity.shape[1]):
-        layers.states(f"activity/brigade_{brigade}", activity[:, brigade], ACTIVITIES, colors.ACTIVITY_RGB)
+        path = f"brigade_{brigade}"
+        layers.states(path, activity[:, brigade], ACTIVITIES, colors.ACTIVITY_RGB, complete=complete)
     for brigade in range(action.shape[1] if recorded(recording, "decisions") else 0):
-        layers.states(f"action/brigade_{brigade}", action[:, brigade], actions, rgb)
+        layers.states(f"chosen/brigade_{brigade}", action[:, brigade], actions, rgb, complete=complete)
 
 
 def positions_m(recording: Recording) -> NDArray[np.float32]:
@@ -107,6 +120,19 @@ def positions_m(recording: Recording) -> NDArray[np.float32]:
     x, y = recording.column("/brigades", "x_m"), recording.column("/brigades", "y_m")
     place = crowding(x, y, within_m=0.0)
     return np.stack([x + _QUEUE_M * place, y, np.full(x.shape, _BALL_HEIGHT_M)], axis=-1).astype(np.float32)
+
+
+def leaders(x: NDArray[Any], y: NDArray[Any], *, within_m: float) -> NDArray[np.int64]:
+    """Group brigades: the lowest number within a distance in x and in y that leads a group: (k, n) twice to (k, n)."""
+    k, n = x.shape
+    leader = np.tile(np.arange(n), (k, 1))
+    for brigade in range(1, n):
+        near = (np.abs(x[:, :brigade] - x[:, [brigade]]) <= within_m) & (
+            np.abs(y[:, :brigade] - y[:, [brigade]]) <= within_m
+        )
+        leads = near & (leader[:, :brigade] == np.arange(brigade))
+        leader[:, brigade] = np.where(leads.any(axis=1), leads.argmax(axis=1), brigade)
+    return leader
 
 
 def crowding(x: NDArray[Any], y: NDArray[Any], *, within_m: float) -> NDArray[np.int64]:

@@ -22,6 +22,7 @@ _SHADE_RGB: Final = colors.shaded_table([(255, 255, 255)], SHADES_PERCENT)[0]
 _GROUND_M: Final = -0.4
 _GROUND_MARGIN_M: Final = 15.0
 _ABOVE_ROOFS_M: Final = 4.0
+_NAME_RISE_M: Final = 28.0
 HOTTEST: Final = 600.0  # degrees above ambient at which the color of air is at its end
 _COLDEST: Final = 1.0
 _OPACITY: Final = 0.999  # below 1, or the viewer takes the air for opaque
@@ -45,8 +46,10 @@ def log_city(layers: Layers, city: CityRecord, mesh: CityMesh) -> None:
         roof = mesh.roof_xyz_m[city.refuge_building] + np.array([0, 0, 3], dtype=np.float32)
         labels = [f"refuge {city.building_id[index]}" for index in city.refuge_building]
         rgb = colors.single(colors.REFUGE_RGB)
-        marks = rerun.Points3D(roof, colors=rgb, radii=[3.0], labels=labels, show_labels=True)
-        layers.static("city/refuges", marks)
+        layers.static("city/refuges", rerun.Points3D(roof, colors=rgb, radii=[3.0]))
+        above = roof + np.array([0, 0, _NAME_RISE_M], dtype=np.float32)  # those of brigades are before the house
+        names = rerun.Points3D(above, colors=rgb, radii=[0.1], labels=labels, show_labels=True)
+        layers.static("city/refuge_names", names)
     if len(city.hydrant_x_m):
         position = np.column_stack([city.hydrant_x_m, city.hydrant_y_m, np.full(len(city.hydrant_x_m), 1.0)])
         hydrants = rerun.Points3D(position, colors=colors.single(colors.HYDRANT_RGB), radii=[1.2])

@@ -17,6 +17,11 @@ CHUNK_BYTES: Final = 1 << 20
 """Size of the pieces in which wide data is sent: a viewer loads and drops whole chunks."""
 
 
+_UNNAMED: Final = ", unnamed"
+_LETTER_SHARE: Final = 0.0085
+"""Width of a letter by that of a timeline."""
+
+
 class Layers:
     """Sends static entities and whole columns to a Rerun stream, all below one entity path.
 
@@ -100,18 +105,43 @@ class Layers:
         self.static(path, rerun.LineStrips3D.from_fields(radii=[radius_m], colors=colors.single(rgb)))
         self.rows(path, rerun.LineStrips3D.columns(strips=strips).partition(per_step))
 
-    def states(self, path: str, codes: NDArray[np.integer], names: Sequence[str], rgb: Sequence[colors.Rgb]) -> None:
-        """Send a timeline of states: a row wherever the code, (k,) index into names and colors, changes."""
-        self.static(path, rerun.StateConfiguration(values=list(names), colors=colors.packed_table(rgb)))
+    def states(
+        self,
+        path: str,
+        codes: NDArray[np.integer],
+        names: Sequence[str],
+        rgb: Sequence[colors.Rgb],
+        *,
+        complete: bool = False,
+    ) -> None:
+        """Send a timeline of states: a row wherever the code, (k,) index into names and colors, changes.
+
+        complete: there are no further parts, so that it is known which bands are too short for their names. Rerun cuts
+        names where a band ends; these get a state of their own, without one.
+        """
+        unnamed = [name + _UNNAMED for name in names]
+        configuration = rerun.StateConfiguration(
+            values=[*names, *unnamed], labels=[*names, *(" " for _ in names)], colors=colors.packed_table([*rgb, *rgb])
+        )
+        self.static(path, configuration)
         changed = self.changed(path, codes[:, np.newaxis])
-        if len(changed):
-            columns = rerun.StateChange.columns(state=[names[code] for code in codes[changed]])
-            self.rows(path, columns, steps=self.steps[changed])
+        if not len(changed):
+            return
+        states = [names[code] for code in codes[changed]]
+        if complete:
+            ends = np.append(self.steps[changed[1:]], self.steps[-1] + 1)
+            share = (ends - self.steps[changed]) / (self.steps[-1] + 1 - self.steps[0])
+            states = [
+                name if one >= _LETTER_SHARE * (len(name) + 1) else name + _UNNAMED
+                for name, one in zip(states, share, strict=True)
+            ]
+        self.rows(path, rerun.StateChange.columns(state=states), steps=self.steps[changed])
 
     def text(self, path: str, lines: Iterable[LogLine]) -> None:
-        """Send lines of text, each at its step; nothing if there is none."""
+        """Send lines of text, each at its step, with which it begins: Rerun's own column cuts steps from 100 on."""
         if table := list(lines):
-            steps, levels, texts, rgb = zip(*table, strict=True)
+            steps, levels, words, rgb = zip(*table, strict=True)
+            texts = [f"{step}  {text}" for step, text in zip(steps, words, strict=True)]
             columns = rerun.TextLog.columns(text=texts, level=levels, color=colors.packed_table(rgb))
             self.rows(path, columns, steps=np.array(steps, dtype=np.int64))
 

@@ -42,6 +42,7 @@ class RunLayers:
         name: of the run beside another, "" where it is alone.
         focus: ids of buildings whose temperatures are plotted.
         mesh: of the city, if it was made before.
+        names_apart_m: brigades nearer to each other share a label.
         after_block: called when a block of wide data has been sent.
 
     Raises:
@@ -57,30 +58,36 @@ class RunLayers:
         name: str = "",
         focus: Sequence[int] = (),
         mesh: CityMesh | None = None,
+        names_apart_m: float = brigades.NAMES_APART_M,
         after_block: Callable[[], object] | None = None,
     ) -> None:
+        self._names_apart_m = names_apart_m
         self._focus_index = _building_indices(city, focus)
         self._layers = Layers(stream, prefix, np.zeros(0, dtype=np.int64), name=name, after_block=after_block)
         self._mesh = build_mesh(city) if mesh is None else mesh
         self._layers.static("", rerun.ViewCoordinates.RIGHT_HAND_Z_UP)
         city_layers.log_city(self._layers, city, self._mesh)
 
-    def add(self, recording: Recording) -> None:
-        """Send the next steps of the run, which are in a recording of this city: one, all, or any number of them."""
+    def add(self, recording: Recording, *, complete: bool = False) -> None:
+        """Send the next steps of the run, which are in a recording of this city: one, all, or any number of them.
+
+        complete: these are all.
+        """
         for part in _parts(recording):
             self._add(part)
+        self._layers.steps = recording.steps
+        brigades.log_states(self._layers, recording, complete=complete)
 
     def _add(self, recording: Recording) -> None:
         layers, mesh = self._layers, self._mesh
         layers.steps = recording.steps
         city_layers.log_buildings(layers, recording, mesh)
         city_layers.log_air(layers, recording, mesh)
-        brigades.log_brigades(layers, recording)
+        brigades.log_brigades(layers, recording, names_apart_m=self._names_apart_m)
         brigades.log_water(layers, recording, mesh)
         city_layers.log_civilians(layers, recording, mesh)
         city_layers.log_sites(layers, recording)
         log_plots(layers, recording, self._focus_index)
-        brigades.log_states(layers, recording)
         _log_text(layers, recording)
 
 
@@ -128,11 +135,13 @@ def log_comparison(
     *,
     focus: Sequence[int] = (),
     outcome: OutcomePage | None = None,
+    names_apart_m: float = brigades.NAMES_APART_M,
     after_block: Callable[[], object] | None = None,
 ) -> None:
     """Send two runs, below /a and /b, and their difference; where they first differ is marked if the outcome is given.
 
-    `after_block` is called when a block of wide data has been sent.
+    Brigades nearer to each other than `names_apart_m` share a label; `after_block` is called when a block of wide data
+    has been sent.
     ViewError if the runs are of different cities, one has no steps, or a building of the focus is unknown.
     """
     check_same_city(first.city, second.city)
@@ -141,8 +150,8 @@ def log_comparison(
     for recording, name in ((first, "A"), (second, "B")):
         RunLayers(
             stream, recording.city, prefix=f"/{name.lower()}", name=name, focus=focus, mesh=mesh,
-            after_block=after_block,
-        ).add(recording)  # fmt: skip
+            names_apart_m=names_apart_m, after_block=after_block,
+        ).add(recording, complete=True)  # fmt: skip
 
     layers = Layers(stream, "/diff", steps, after_block=after_block)
     city_layers.log_city(layers, first.city, mesh)
@@ -154,7 +163,7 @@ def log_comparison(
     layers.numbers("city/handles", "Difference", codes)
 
     counts = np.column_stack([np.count_nonzero(change == sign, axis=1) for sign in (1, -1)]).astype(np.float64)
-    log_plot(layers, "plots/buildings", counts, ("worse in B", "better in B"), (colors.WORSE_RGB, colors.BETTER_RGB))
+    log_plot(layers, "plots/buildings", counts, ("worse", "better"), (colors.WORSE_RGB, colors.BETTER_RGB))
     if outcome is not None:
         _mark_first_difference(layers, outcome, np.any(change != 0, axis=1))
 
@@ -166,11 +175,11 @@ def _mark_first_difference(layers: Layers, outcome: OutcomePage, buildings_diffe
     if first is not None:
         states[layers.steps >= first] = 1
         states[buildings_differ] = 2
-    layers.states("agreement", states, AGREEMENT, _AGREEMENT_RGB)
+    layers.states("agreement", states, AGREEMENT, _AGREEMENT_RGB, complete=True)
     if first is None:
         return
     style = rerun.SeriesPoints(
-        names=[f"first difference, step {first}"],
+        names=["first"],
         colors=colors.single(colors.MARK_RGB),
         markers="diamond",
         marker_sizes=[6.0],

@@ -75,7 +75,7 @@ def select_steps(
     They are in memory then; of many steps of a large city only what does not fill it. Events and choices of steps that
     are left out are left out, too. ViewError if no step is left.
     """
-    chosen = set(_between("view", recording.steps, first, last)[::every].tolist())
+    chosen = set(_between(recording.steps, first, last)[::every].tolist())
     if len(chosen) * len(recording.city.building_id) > HELD_MAX:
         return SelectedSteps(recording, chosen)
     return MemoryRecording(recording.header, recording.city, [one for one in recording if one.step in chosen])
@@ -91,7 +91,7 @@ def read_steps(recordings: Sequence[Recording], steps: Sequence[int]) -> list[Sh
     chosen = [int(held[-1]) if step == LAST else step for step in steps]
     for step in chosen:
         if step not in held:
-            raise ViewError(expected("pictures", "step", f"a step from {held[0]} to {held[-1]}", step))
+            raise ViewError(expected("step", "", f"a step from {held[0]} to {held[-1]}", step))
     by_step = {shown.step: shown for shown in _read(recordings, sorted(set(chosen)))}
     return [by_step[step] for step in chosen]
 
@@ -104,7 +104,7 @@ def read_steps_between(
     Raises:
         ViewError: no step is left, or the cities differ.
     """
-    between = _between("pictures", steps_of(recordings), first, last)
+    between = _between(steps_of(recordings), first, last)
     return _read(recordings, sorted({*between[::every].tolist(), int(between[-1])}))
 
 
@@ -119,21 +119,21 @@ def steps_of(recordings: Sequence[Recording]) -> NDArray[np.int64]:
     """Return the steps that can be shown, (k,) int64; errors as in `read_steps`."""
     if len(recordings) == 1:
         if len(recordings[0].steps) == 0:
-            raise ViewError(expected("pictures", "", "a recording with steps", "one without"))
+            raise ViewError(expected("recording", "", "one with steps", "one without"))
         return recordings[0].steps
     first, second = recordings
     check_same_city(first.city, second.city)
     return common_steps(first.steps, second.steps)[0]
 
 
-def _between(doing: str, steps: NDArray[np.int64], first: int | None, last: int | None) -> NDArray[np.int64]:
+def _between(steps: NDArray[np.int64], first: int | None, last: int | None) -> NDArray[np.int64]:
     """Return the steps from `first` to `last`, of which there is at least one."""
     low = int(steps.min(initial=0)) if first is None else first
     high = int(steps.max(initial=0)) if last is None else last
     between = steps[(steps >= low) & (steps <= high)]
     if len(between) == 0:
         held = f"steps from {steps[0]} to {steps[-1]}" if len(steps) else "a recording with steps"
-        raise ViewError(expected(doing, "--from and --to", held, f"steps {low} to {high}"))
+        raise ViewError(expected("--from and --to", "", held, f"steps {low} to {high}"))
     return between
 
 
@@ -163,18 +163,23 @@ def common_steps(
     A run that has ended stays in its last state. ViewError if a run has no steps.
     """
     if len(steps_a) == 0 or len(steps_b) == 0:
-        raise ViewError(expected("view", "", "two recordings with steps", f"{len(steps_a)} and {len(steps_b)} steps"))
+        raise ViewError(expected("recordings", "", "two with steps", f"{len(steps_a)} and {len(steps_b)} steps"))
     steps = np.union1d(steps_a, steps_b)
     steps = steps[steps >= max(steps_a[0], steps_b[0])]
     rows_a, rows_b = (np.searchsorted(own, steps, side="right") - 1 for own in (steps_a, steps_b))
     return steps, rows_a, rows_b
 
 
-def check_same_city(first: CityRecord, second: CityRecord) -> None:
-    """Check that two runs took place in the same city; ViewError, with what differs, if one building does."""
+def check_same_city(first: CityRecord, second: CityRecord | None = None) -> None:
+    """Check that two runs took place in the same city; ViewError, with what differs, if one building does.
+
+    One alone is in the same city as itself.
+    """
+    if second is None:
+        return
     for name in ("building_id", "outline_ptr", "outline_x_m", "outline_y_m", "floors"):
         if not np.array_equal(getattr(first, name), getattr(second, name)):
             n, m = len(first.building_id), len(second.building_id)
             cities = f"{first.name!r} with {n} buildings and {second.name!r} with {m}"
             hint = f"{name} differs; try to view them one by one"
-            raise ViewError(expected("view", "", "two recordings of one city", cities, hint))
+            raise ViewError(expected("recordings", "", "two of one city", cities, hint))
