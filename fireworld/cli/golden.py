@@ -129,12 +129,13 @@ def check(
 
 def _folder_and_names(folder: Path, names: tuple[str, ...]) -> tuple[Path, tuple[str, ...]]:
     """Take the first name for the folder where it is one: it has a slash, or is a folder and no golden."""
+    from fireworld.recording.golden.digest import DIGEST_SUFFIX
+    from fireworld.recording.golden.store import SUFFIX
+
     first = Path(names[0]) if names else None
-    if (
-        first is None
-        or folder != FOLDER
-        or any((folder / f"{first.name}{end}").exists() for end in (".mcap", ".digest"))
-    ):
+    if first is None or folder != FOLDER:
+        return folder, names
+    if any((folder / f"{first.name}{suffix}").exists() for suffix in (SUFFIX, DIGEST_SUFFIX)):
         return folder, names
     is_folder = first.is_dir() or len(first.parts) > 1 or str(first) in {".", ".."}
     return (first, names[1:]) if is_folder else (folder, names)

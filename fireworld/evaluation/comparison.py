@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 from xml.etree import ElementTree as Xml
 
 from fireworld.arguments import ArgumentError
-from fireworld.cause import DIGEST_SHOWN
+from fireworld.cause import with_digest
 from fireworld.errors import OutputError, ViewError, expected, one_line
 from fireworld.evaluation.inputs import in_a_row, seeds_text
 from fireworld.evaluation.paired import N_SEEDS_ENOUGH, Judgement, Pairing, Verdict, judge, over_all
@@ -282,9 +282,9 @@ _HEADS: Final = ("", "A", "B", "B - A", "P", "CRN", "B is")
 def _finding(one: Comparison, picture: str) -> Finding:
     a, b = one.policies
     judged, pairing = one.judgement, over_all(one.pairings, one.metric)
-    names = [f"{policy.name} ({policy.digest[:DIGEST_SHOWN]})" for policy in (b, a)]
+    names = [with_digest(policy.name, policy.digest) for policy in (b, a)]
     cause = f"policy: {names[0]}, against {names[1]}" if not one.same_policy else f"{names[0]}: the same policy"
-    scenarios = ", ".join(f"{name} ({digest[:DIGEST_SHOWN]})" for name, digest in one.scenarios)
+    scenarios = ", ".join(with_digest(name, digest) for name, digest in one.scenarios)
     return Finding(
         name=f"{b.name} against {a.name}",
         verdict=_VERDICTS[judged],

@@ -142,7 +142,7 @@ def test_what_tells_policies_apart():
 
 
 def test_the_version_follows_all_that_computes_a_run():
-    """What the runs import is digested, but for what makes no run: errors, executors, what shows objects."""
+    """What the runs import is digested, but for what makes no run: errors, executors, pages, names of measures."""
     graph = grimp.build_graph("fireworld")
     needed = graph.find_upstream_modules("fireworld.evaluation.runs")
     needed |= graph.find_upstream_modules("fireworld.planning.planner")
