@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
+from fireworld.shown import at_most
 from fireworld.version import simulator_version
 
 if TYPE_CHECKING:
@@ -69,9 +70,9 @@ def cause_of(changes: Mapping[str, Sequence[str] | None]) -> Cause:
     )
 
 
-def at_most(lines: Sequence[str], most: int) -> list[str]:
-    """Return the first lines, and how many more there are."""
-    return [*lines[:most], *([f"and {len(lines) - most} more"] if len(lines) > most else [])]
+def with_digest(name: str, digest: str) -> str:
+    """Return a name with the digits of a digest that identify what it names."""
+    return f"{name} ({digest[:DIGEST_SHOWN]})"
 
 
 def value_changes(a: Mapping[str, Any], b: Mapping[str, Any], *, prefix: str = "") -> list[str]:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import errno
+import json
+import math
 import os
 import secrets
 import shutil
 import stat
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, Final
+from typing import IO, Any, Final
 
 from fireworld.errors import FireworldError, OutputError, expected
 
@@ -318,6 +320,12 @@ def name_from(path: Path, folder: Path) -> str:
 def text_of(name: str) -> str:
     """Return the name of a file as text: bytes in it that are none are written as Python writes them."""
     return name.encode("utf-8", "backslashreplace").decode()
+
+
+def json_line(values: Mapping[str, Any]) -> str:
+    """Return plain values as a line of JSON; null stands for what is no finite number."""
+    plain = {key: None if isinstance(one, float) and not math.isfinite(one) else one for key, one in values.items()}
+    return json.dumps(plain) + "\n"
 
 
 def make_folder(folder: Path) -> None:

@@ -10,6 +10,7 @@ from typing import Final
 from urllib.parse import quote
 
 from fireworld.findings import VERDICTS, Finding, Verdict
+from fireworld.shown import at_most
 
 SHOWN: Final = 20
 """Findings that are shown in full; of more the headline."""
@@ -57,8 +58,7 @@ def _section(finding: Finding, beside: Path) -> Iterator[str]:
     if head:
         yield f"**{escaped(head)}**"
     if more:
-        rest = [f"and {len(more) - LINES_SHOWN} more"] if len(more) > LINES_SHOWN else []
-        yield "\n".join(f"- {escaped(line)}" for line in [*more[:LINES_SHOWN], *rest])
+        yield "\n".join(f"- {escaped(line)}" for line in at_most(more, LINES_SHOWN))
     yield escaped(finding.first or finding.headline)
     if finding.rows:
         yield markdown_table(finding.heads, finding.rows)

@@ -291,9 +291,11 @@ class Recorder:
 
     def _path(self, name: str, *, digest_only: bool = False) -> Path:
         """Return where the golden is; fail where it is missing, or another of this test has been compared with it."""
+        from fireworld.recording.golden.store import digest_path
+
         stem = golden_name(self._node, name)
         recording: Path = self._folder / f"{stem}.mcap"
-        digest: Path = self._folder / f"{stem}.digest"
+        digest = digest_path(recording)
         path, other = (digest, recording) if digest_only else (recording, digest)
         if stem in self._stems:
             raise _failure("recording: a second one in a test needs a name of its own: recording(..., name=...)")
@@ -327,7 +329,7 @@ class Recorder:
 
     def _complaint(self, result: GoldenResult) -> str:
         """Return what differs, and record the new run where it can be looked at."""
-        from fireworld.recording.golden.store import recording_path, store_recording
+        from fireworld.recording.golden.store import is_digest, recording_path, store_recording
 
         lines = [result.headline, f"{_shown(result.path)}: the {result.kind} is not the same any more"]
         if result.fresh is not None and result.differs:
@@ -338,8 +340,8 @@ class Recorder:
             else:
                 new = self._factory.mktemp("fireworld") / recording_path(result.path).name
                 store_recording(new, result.fresh)
-                with_it = "" if result.path.suffix == ".digest" else "; compare it with the golden by `fireworld diff`"
-                lines.append(f"the new {result.kind}: {new}{with_it}{' or `fireworld view`' if with_it else ''}")
+                how = "; compare it with the golden by `fireworld diff` or `fireworld view`"
+                lines.append(f"the new {result.kind}: {new}{'' if is_digest(result.path) else how}")
         return "\n".join([*lines, f"if that is meant, run with {UPDATE}"])
 
     def _note(self, result: GoldenResult) -> None:

@@ -85,3 +85,8 @@ def _html(block: Block) -> str:
         for row in block.rows
     ]
     return html_table([escape(head) for head in block.heads], rows, n_text=block.n_left)
+
+
+def at_most(lines: Sequence[str], most: int) -> list[str]:
+    """Return the first lines, and how many more there are."""
+    return [*lines[:most], *([f"and {len(lines) - most} more"] if len(lines) > most else [])]

@@ -12,7 +12,7 @@ import click
 
 from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.installed import check_matplotlib
-from fireworld.cli.options import SEED_MAX
+from fireworld.cli.options import SEED_MAX, executor_of, on_option
 from fireworld.cli.progress import BAR, COUNT, DESCRIPTION, LEFT, bars
 from fireworld.cli.reporting import check_reporting, print_annotations, reporting_options
 from fireworld.outcome import METRICS
@@ -36,6 +36,7 @@ EXIT_CODES: Final = {"not worse": 0, "worse": 1, "cannot tell": 3}
     help="Seeds are counted from here.",
 )  # fmt: skip
 @click.option("--jobs", metavar="N", type=click.IntRange(1, 1000), help="Runs at a time.  [default: cores]")
+@on_option
 @click.option("--set", "settings", metavar="KEY=VALUE", multiple=True, help="Set a key of all scenarios; repeatable.")
 @click.option("--gate", is_flag=True, help="Turn the verdict into the exit code.")
 @click.option(
@@ -63,6 +64,7 @@ def command(
     n_seeds: int,
     first_seed: int,
     jobs: int | None,
+    on: str | None,
     settings: tuple[str, ...],
     gate: bool,
     gate_metric: str | None,
@@ -82,6 +84,7 @@ def command(
     fireworld compare old.npz new.npz --results runs.parquet   what is known is not run again
     fireworld compare chief my:Policy --gate --margin 0.01     for CI: exit code 1 if worse
     fireworld compare chief random --scenarios quick,own.yaml --seeds 30 --plot difference.png
+    fireworld compare chief my:Policy --on dask://head:8786    on a cluster
 
     Policies are named as for `fireworld run --policy`. Both run every scenario with the same seeds, so they see the
     same random draws (common random numbers), and are compared run by run: score as a share of its maximum, buildings
@@ -115,7 +118,7 @@ def command(
             seeds=n_seeds,
             first_seed=first_seed,
             set={key: read_yaml(text, source=f"--set {key}") for key, text in split_settings(settings).items()},
-            executor=jobs or n_cores(),
+            executor=executor_of(on, jobs) or n_cores(),
             results=results,
             metric=gate_metric or METRICS[0].name,
             margin=margin or 0.0,

@@ -10,4 +10,4 @@ def announce_compilation() -> None:
     from fireworld import kernels
 
     if kernels.is_cold():
-        click.echo("compiling the simulator for this machine, once; this takes about 10 seconds ...", err=True)
+        click.echo("compiling the simulator for this machine, once; this takes about 15 seconds ...", err=True)

@@ -10,6 +10,7 @@ import click
 
 from fireworld.cli import INTERRUPTED
 from fireworld.cli.opening import open_to_replay
+from fireworld.cli.options import executor_of, on_option
 from fireworld.cli.progress import BAR, ELAPSED, bar
 from fireworld.cli.tables import print_table
 
@@ -32,9 +33,21 @@ REPLAYS: Final = "replay {task.completed:.0f} of at most {task.total:.0f}"
     type=click.IntRange(min=1),
     help="List N spans at most.",
 )
+@click.option("--jobs", metavar="N", type=click.IntRange(1, 1000), help="Replays at a time.  [default: 2]")
+@on_option
 @click.option("--json", "as_json", is_flag=True, help="Write JSON, with all spans.")
 @click.pass_context
-def command(context: click.Context, *, first: Path, second: Path, budget: int, limit: int, as_json: bool) -> None:
+def command(
+    context: click.Context,
+    *,
+    first: Path,
+    second: Path,
+    budget: int,
+    limit: int,
+    jobs: int | None,
+    on: str | None,
+    as_json: bool,
+) -> None:
     """Find out which decisions make up how much of the difference between the scores of recordings A and B.
 
     \b
@@ -57,7 +70,7 @@ def command(context: click.Context, *, first: Path, second: Path, budget: int, l
     from fireworld.recording.explanation.text import HEADS, closing_lines, opening_lines, rows
 
     with bar("explain", budget, REPLAYS, BAR, ELAPSED) as advance:
-        explanation = explain(*runs, budget=budget, on_replay=advance)
+        explanation = explain(*runs, budget=budget, executor=executor_of(on, jobs), on_replay=advance)
     if as_json:
         click.echo(json.dumps(explanation.to_dict(), indent=2))
     else:

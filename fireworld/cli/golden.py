@@ -12,7 +12,7 @@ import click
 
 from fireworld.cli import USER_ERROR
 from fireworld.cli.compiling import announce_compilation
-from fireworld.cli.options import seed_option, steps_option
+from fireworld.cli.options import executor_of, on_option, seed_option, steps_option
 from fireworld.cli.progress import BAR, COUNT, DESCRIPTION, LEFT, bar
 from fireworld.cli.reporting import check_reporting, print_annotations, reporting_options
 from fireworld.cli.tables import print_lines, print_table
@@ -51,6 +51,7 @@ def command() -> None:
 @_folder_option
 @click.option("-k", "matching", metavar="EXPR", default="", help="Only names that match, as 'quick and not planner'.")
 @click.option("--jobs", metavar="N", default=1, show_default=True, type=click.IntRange(1, 1000), help="Runs at a time.")
+@on_option
 @click.option("--json", "as_json", is_flag=True, help="Write JSON.")
 @click.option("--junit", metavar="FILE", type=click.Path(path_type=Path), help="Write JUnit XML for a CI server.")
 @click.option("--keep", metavar="KEEP", type=_DIRECTORY, help="Keep what differs in KEEP: recording, pages, picture.")
@@ -64,6 +65,7 @@ def check(
     folder: Path,
     matching: str,
     jobs: int,
+    on: str | None,
     as_json: bool,
     junit: Path | None,
     keep: Path | None,
@@ -101,7 +103,14 @@ def check(
     place = keep or (files_beside(summary) if summary is not None else None)
     with bar("running", n_all, DESCRIPTION, BAR, COUNT, LEFT, quiet=as_json) as advance:
         checks = check_goldens(
-            folder, names, matching=matching, keep=place, force=force, jobs=jobs, on_result=lambda _: advance()
+            folder,
+            names,
+            matching=matching,
+            keep=place,
+            force=force,
+            jobs=jobs,
+            executor=None if on is None else executor_of(on, jobs),
+            on_result=lambda _: advance(),
         )
         results = [replace(result, fresh=None) for result in checks]  # of many long runs not all are held at a time
     if junit is not None:
@@ -120,12 +129,13 @@ def check(
 
 def _folder_and_names(folder: Path, names: tuple[str, ...]) -> tuple[Path, tuple[str, ...]]:
     """Take the first name for the folder where it is one: it has a slash, or is a folder and no golden."""
+    from fireworld.recording.golden.digest import DIGEST_SUFFIX
+    from fireworld.recording.golden.store import SUFFIX
+
     first = Path(names[0]) if names else None
-    if (
-        first is None
-        or folder != FOLDER
-        or any((folder / f"{first.name}{end}").exists() for end in (".mcap", ".digest"))
-    ):
+    if first is None or folder != FOLDER:
+        return folder, names
+    if any((folder / f"{first.name}{suffix}").exists() for suffix in (SUFFIX, DIGEST_SUFFIX)):
         return folder, names
     is_folder = first.is_dir() or len(first.parts) > 1 or str(first) in {".", ".."}
     return (first, names[1:]) if is_folder else (folder, names)

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
 from fireworld.evaluation.contested import HELD_ABOVE, LOST_BELOW
 from fireworld.policy.teams import team_names
+
+if TYPE_CHECKING:
+    from fireworld.executors import AnyExecutor
 
 POLICY_HELP: Final = (
     "easiest, nearest-to-civilian, nearest-to-center, nearest-to-me, each-another, random, chief, planner; "
@@ -28,6 +31,18 @@ steps_option = click.option(
 settings_option = click.option(
     "--set", "settings", metavar="KEY=VALUE", multiple=True, help="Set a key of the scenario; repeatable."
 )
+
+on_option = click.option(
+    "--on", metavar="WHERE",
+    help="Who does the work: threads, processes, dask, dask://HOST:PORT or MODULE:make_executor.",
+)  # fmt: skip
+
+
+def executor_of(on: str | None, jobs: int | None) -> AnyExecutor:
+    """Return the executor that --on and --jobs ask for; without --on a number of threads."""
+    from fireworld.executors import On
+
+    return jobs if on is None else On(on, jobs)
 
 
 def _numbers(context: click.Context, option: click.Parameter, text: str | None) -> list[int] | None:

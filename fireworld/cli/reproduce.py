@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from fireworld.cli.compiling import announce_compilation
+from fireworld.cli.options import executor_of, on_option
 from fireworld.cli.progress import BAR, COUNT, DESCRIPTION, ELAPSED, bars
 
 
@@ -15,6 +16,7 @@ from fireworld.cli.progress import BAR, COUNT, DESCRIPTION, ELAPSED, bars
 @click.option("--repetitions", metavar="N", type=click.IntRange(1, 1000), help="Trainings.  [default: 20; quick: 2]")
 @click.option("--seeds", metavar="N", type=click.IntRange(1, 1000), help="Runs a test.  [default: 20; quick: 5]")
 @click.option("--jobs", metavar="N", type=click.IntRange(1, 1000), help="Trainings at a time.  [default: cores]")
+@on_option
 @click.option(
     "--out",
     metavar="DIR",
@@ -43,6 +45,7 @@ def command(
     repetitions: int | None,
     seeds: int | None,
     jobs: int | None,
+    on: str | None,
     out: Path,
     quick: bool,
     record_trainings: bool,
@@ -85,7 +88,7 @@ def command(
             record_trainings=record_trainings,
             resume=resume,
             force=force,
-            executor=jobs,
+            executor=executor_of(on, jobs),
             on_progress=lambda what, n_done, n_all: progress.update(tasks[what], completed=n_done, total=n_all),
         )
     click.echo(reproduction)

@@ -14,7 +14,7 @@ import click
 from fireworld.cli import INTERRUPTED
 from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.live import find_screen, view_options, watched_trainings
-from fireworld.cli.options import seed_option
+from fireworld.cli.options import executor_of, on_option, seed_option
 from fireworld.cli.progress import BAR, DESCRIPTION, ELAPSED, bars, is_watched
 from fireworld.training.methods import method_names
 
@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     metavar="N",
     help="Teams to train, or fights to search with, at a time.  [default: cores]",
 )
+@on_option
 @click.option(
     "--log",
     metavar="F.csv",
@@ -100,6 +101,7 @@ def command(
     seed: int,
     repetitions: int,
     jobs: int | None,
+    on: str | None,
     log: Path | None,
     record: Path | None,
     full_every: int | None,
@@ -161,7 +163,7 @@ def command(
     for number, training in enumerate(trainings, 1):
         training.attach(_hooks(training, number, len(trainings), jsonl, tensorboard, mlflow))
     with _progress(trainings) as progress, watched_trainings(screen, trainings) as watched:
-        train_all(trainings, jobs=jobs, callbacks=(progress, watched))
+        train_all(trainings, jobs=jobs, executor=executor_of(on, jobs), callbacks=(progress, watched))
     for training in trainings:
         _print_result(training)
     if any(training.team is None for training in trainings):

@@ -15,7 +15,7 @@ from fireworld.evaluation.comparison_runs import ComparisonRuns, RunnablePolicy,
 from fireworld.evaluation.inputs import scenarios_of, seeds_of
 from fireworld.evaluation.paired import compare_outcomes
 from fireworld.evaluation.results import open_results
-from fireworld.executors import AnyExecutor, in_processes, workers_for
+from fireworld.executors import AnyExecutor, in_this_process, workers_for
 from fireworld.interrupt import gentle_interrupt
 from fireworld.policy.names import note_on_team
 from fireworld.scenario import Scenario
@@ -53,8 +53,8 @@ def compare(
         first_seed: the first, where only their number is given.
         set: values of scenario keys, as in {"brigades.n": 7}; of all scenarios.
         executor: who makes the runs. None: all cores, in threads for policies that run in compiled code, in processes
-            for others that processes can find again; a number: as many at a time, likewise; "threads" or "processes":
-            all of them in these; or an executor of concurrent.futures.
+            for others that processes can find again; a number: as many at a time, likewise; a word of `--on` or an `On`
+            of `fireworld.executors`: all of them there; or an executor of concurrent.futures.
         results: a file (.parquet) to take known runs from, and to add the others to.
         metric: what the judgement is about: "score", "burnt-out", "time" or "civilians".
         margin: a loss that does not matter, in the metric's unit.
@@ -83,7 +83,7 @@ def compare(
     for policy in found:
         if known.path is not None:
             policy.named.require_identity("results")
-        if in_processes(executor):
+        if not in_this_process(executor):
             policy.named.require_found_again("executor")
     cities = CityCache()
     built = {name: cities.build(one) for name, one in scenarios_of(scenarios, settings_of(set)).items()}

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 from xml.etree import ElementTree as Xml
 
 from fireworld.arguments import ArgumentError
-from fireworld.cause import DIGEST_SHOWN
+from fireworld.cause import with_digest
 from fireworld.errors import OutputError, ViewError, expected, one_line
 from fireworld.evaluation.inputs import in_a_row, seeds_text
 from fireworld.evaluation.paired import N_SEEDS_ENOUGH, Judgement, Pairing, Verdict, judge, over_all
@@ -37,7 +37,7 @@ _VERDICTS: Final[Mapping[Judgement, FindingVerdict]] = {
 }
 _WORDS: Final[Mapping[FindingVerdict, str]] = {verdict: judgement for judgement, verdict in _VERDICTS.items()}
 _MARKS: Final = {"better": "good", "worse": "bad", "equal": "open", "cannot tell": "open", "the same policy": "open"}
-_CAPTION: Final = "means; B - A [95 % interval]; P: a run of B is the better one"
+_CAPTION: Final = "means; B - A [95 % interval]; P: a run of B is the better one; CRN: what pairing is worth"
 
 
 @dataclass(frozen=True)
@@ -262,7 +262,7 @@ class Comparison:
 
     def __repr__(self) -> str:
         def text(one: Comparison) -> str:
-            table = text_table(_HEADS, _text_rows(one), "<>>>><")
+            table = text_table(_HEADS, _text_rows(one), "<>>>>><")
             return "\n".join([_title(one), table, _CAPTION, *one.notes])
 
         return "\n\n".join(map(text, self.each))
@@ -276,15 +276,15 @@ class Comparison:
         )
 
 
-_HEADS: Final = ("", "A", "B", "B - A", "P", "B is")
+_HEADS: Final = ("", "A", "B", "B - A", "P", "CRN", "B is")
 
 
 def _finding(one: Comparison, picture: str) -> Finding:
     a, b = one.policies
     judged, pairing = one.judgement, over_all(one.pairings, one.metric)
-    names = [f"{policy.name} ({policy.digest[:DIGEST_SHOWN]})" for policy in (b, a)]
+    names = [with_digest(policy.name, policy.digest) for policy in (b, a)]
     cause = f"policy: {names[0]}, against {names[1]}" if not one.same_policy else f"{names[0]}: the same policy"
-    scenarios = ", ".join(f"{name} ({digest[:DIGEST_SHOWN]})" for name, digest in one.scenarios)
+    scenarios = ", ".join(with_digest(name, digest) for name, digest in one.scenarios)
     return Finding(
         name=f"{b.name} against {a.name}",
         verdict=_VERDICTS[judged],

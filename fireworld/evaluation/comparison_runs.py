@@ -7,7 +7,6 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from threading import Event
 from typing import Any, Final
 
@@ -17,10 +16,11 @@ from fireworld.evaluation.runs import Outcomes, Row, row_of, run_compiled, run_s
 from fireworld.executors import AnyExecutor, Workers, n_cores, processes, threads, workers_for
 from fireworld.interrupt import Interrupted
 from fireworld.policy.asking import describe
+from fireworld.policy.importing import make_policy
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.names import NamedPolicy, find_policy
-from fireworld.scenario import Scenario
-from fireworld.simulation.built import BuiltScenario, build_scenario
+from fireworld.policy.protocol import Policy
+from fireworld.simulation.built import BuiltScenario
 from fireworld.version import simulator_version
 
 SAVE_EVERY_RUNS: Final = 100
@@ -41,10 +41,15 @@ class RunnablePolicy:
 def runnable(given: Any, place: int) -> RunnablePolicy:
     """Find a policy by its name, file, class, object, or function; errors as for `find_policy`."""
     named = find_policy(given)
+    name = str(given) if isinstance(given, str | os.PathLike) else named.name
+    if isinstance(named.policy, KernelPolicy):
+        given = named.policy
+    elif named.thing is not None:
+        given = OwnPolicy(named.thing, named.parameters, f"--policy: {named.name}")
     return RunnablePolicy(
-        given=named.policy if isinstance(named.policy, KernelPolicy) else given,
+        given=given,
         named=named,
-        name=str(given) if isinstance(given, str | os.PathLike) else named.name,
+        name=name,
         key=named.identity or f"policy {place}",
     )
 
@@ -63,13 +68,22 @@ class PolicyRun:
         if isinstance(self.policy, KernelPolicy):
             return row_of(run_compiled(self.built, self.policy, seed=self.seed))
         try:
-            return row_of(run_step_by_step(self.built, find_policy(_copied(self.policy)).policy, seed=self.seed))
+            return row_of(run_step_by_step(self.built, _made(self.policy), seed=self.seed))
         except PolicyError as error:
             raise PolicyError(f"{self.label}, seed {self.seed}: {error}") from error
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Send the scenario only; the other process builds it once."""
-        return _sent_run, (self.built.scenario, self.label, self.policy, self.seed)
+
+@dataclass(frozen=True)
+class OwnPolicy:
+    """A policy of a user's own that was named: what its name led to, and how it is made of that."""
+
+    thing: Any
+    parameters: Mapping[str, Any]
+    where: str  # what errors call it
+
+    def make(self) -> Policy:
+        """Make it anew; PolicyError if it cannot be made."""
+        return make_policy(_copied(self.thing), self.parameters, where=self.where)
 
 
 @dataclass(frozen=True)
@@ -161,10 +175,6 @@ def _copied(policy: Any) -> Any:
         raise PolicyError(f"policy: {type(policy).__name__} cannot be copied: {describe(error)}") from error
 
 
-def _sent_run(scenario: Scenario, label: str, policy: Any, seed: int) -> PolicyRun:
-    return PolicyRun(_built_once(scenario), label, policy, seed)
-
-
-@lru_cache(maxsize=16)
-def _built_once(scenario: Scenario) -> BuiltScenario:
-    return build_scenario(scenario)
+def _made(given: Any) -> Policy:
+    """Make a policy for a run."""
+    return given.make() if isinstance(given, OwnPolicy) else find_policy(_copied(given)).policy

@@ -55,6 +55,8 @@ class Pairing:
     improvement: Estimate
     """Probability that a run of B is better than its pair; a tie counts as half."""
     same_policy: bool
+    pairing_worth: float | None = None
+    """Variance of B - A with other seeds for either side, over that of the pairs; None: all pairs differ alike."""
 
     @property
     def verdict(self) -> Verdict:
@@ -101,11 +103,16 @@ class Pairing:
 
     @property
     def cells(self) -> list[str]:
-        """Cells of a table for people: metric, A, B, B - A, P, verdict."""
+        """Cells of a table for people: metric, A, B, B - A, P, what pairing is worth, verdict."""
         digits = self.metric.digits
         difference = self.difference.text(digits=digits, sign=True)
         sides = (f"{side.mean:.{digits}f}" for side in (self.a, self.b))
-        return [self.metric.label, *sides, difference, f"{self.improvement.mean:.2f}", self.verdict]
+        return [self.metric.label, *sides, difference, f"{self.improvement.mean:.2f}", self._worth, self.verdict]
+
+    @property
+    def _worth(self) -> str:
+        worth = self.pairing_worth
+        return "-" if worth is None else f"{worth:.{1 if worth < 10 else 0}f}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values (docs/comparing-policies.md)."""
@@ -118,6 +125,7 @@ class Pairing:
             "b": asdict(self.b),
             "difference": self.difference.ends(),
             "improvement": self.improvement.ends(),
+            "pairing_worth": self.pairing_worth,
             "n_differing": self.n_differing,
             "verdict": self.verdict,
             "more_seeds": self.more_seeds,
@@ -199,7 +207,20 @@ def _pair(
         difference=paired_difference(mean_b, mean_a),
         improvement=estimate(_over_scenarios(chances)),
         same_policy=same_policy,
+        pairing_worth=_pairing_worth(mean_a[0], mean_b[0]),
     )
+
+
+def _pairing_worth(a: Array, b: Array) -> float | None:
+    """Return how many times as many runs would be needed without common random numbers, for the same precision."""
+    paired = _squares(b - a)
+    return (_squares(a) + _squares(b)) / paired if paired > 0.0 else None
+
+
+def _squares(values: Array) -> float:
+    """Return the sum of squared deviations from the mean."""
+    middle = mean(values)
+    return math.fsum(((values - middle) ** 2).tolist())
 
 
 def _side(outcomes: Sequence[Outcomes], values: Sequence[Array]) -> Side:

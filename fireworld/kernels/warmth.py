@@ -1,9 +1,10 @@
 """Where heat is, or may come in a step: the work of a step goes with that, not with the size of the city.
 
 Every call of a kernel that runs steps begins with lists of everything, so whatever state it was given, nothing is
-missed. Its second step, and every PERIOD-th after that, lists what is warm by then. The steps between add what heat
-reaches and take nothing away: to look at what is cold costs time and changes nothing. Lists rise, so that sums over
-them come in the order of the buildings, which digests hang on.
+missed; in a batch of worlds the first call does, and the next ones continue, as long as nobody else sets a state. The
+second step, and every PERIOD-th after that, lists what is warm by then. The steps between add what heat reaches and
+take nothing away: to look at what is cold costs time and changes nothing. Lists rise, so that sums over them come in
+the order of the buildings, which digests hang on.
 """
 
 from __future__ import annotations

@@ -169,7 +169,8 @@ class Planner(Policy):
             rollouts: of each assignment.
             over: a policy that kernels follow, in any form that `find_policy` takes: to decide as it does is an
                 option of each brigade, so that the planner improves it. None: only the four actions are.
-            milliseconds: of processor time a step at most; 0: no limit. With a limit no two runs need be the same.
+            milliseconds: of processor time a step to search in, before the options are valued once more; 0: no limit.
+                With a limit no two runs need be the same.
 
         Raises:
             PolicyError: there is no such policy, or kernels cannot follow it; a number is out of range.
@@ -178,23 +179,14 @@ class Planner(Policy):
         self._followed = None if over is None else _followed(over)
         self._options = ACTION_OPTIONS if over is None else (FOLLOW, *ACTION_OPTIONS)
         self._milliseconds = checked_option("milliseconds", milliseconds, least=0, most=MILLISECONDS_MAX)
-        self.digest = hashlib.sha256(repr(self._identity()).encode()).hexdigest()
+        identity: tuple[object, ...] = (astuple(self.options), BURNING_COST)
+        if self._followed is not None or self._milliseconds:
+            identity += ("" if self._followed is None else self._followed.digest, self._milliseconds)
+        self.digest = hashlib.sha256(repr(identity).encode()).hexdigest()
         self._room: WorldState | None = None
         self._planned_at = -1
         self._plan: Assignment = ()
         self._values: tuple[dict[int, float], ...] = ()
-
-    def _identity(self) -> tuple[object, ...]:
-        own = (astuple(self.options), BURNING_COST)
-        return (
-            own
-            if self._followed is None and not self._milliseconds
-            else (*own, self._followed_digest, self._milliseconds)
-        )
-
-    @property
-    def _followed_digest(self) -> str:
-        return "" if self._followed is None else self._followed.digest
 
     def begin(self, city: CityArrays, n_brigades: int, seed: int) -> None:
         """Forget the run before."""
@@ -212,10 +204,8 @@ class Planner(Policy):
             self._make_plan(observation)
         option, values, worth = self._plan[brigade], None, None
         if step == self._planned_at:
-            values, worth = (
-                tuple(self._values[brigade][action] for action in ACTION_OPTIONS),
-                self._values[brigade][option],
-            )
+            own = self._values[brigade]
+            values, worth = tuple(own[action] for action in ACTION_OPTIONS), own[option]
         if option != FOLLOW:
             return Decision(option, q_values=values)
         assert self._followed is not None  # noqa: S101 - nobody else has the option

@@ -73,11 +73,11 @@ def digest_of_module(module: ModuleType) -> str:
     Brought in are its package, and the modules that it, and these in turn, name or take names from, as far as they are
     neither fireworld's, nor Python's, nor installed as a library.
     """
-    own, others = _digest_of_file(module), _brought_in(module)
+    own, others = _digest_of_file(module), modules_brought_in(module)
     return covering(own, {one.__name__: _digest_of_file(one) for one in others})
 
 
-def _brought_in(module: ModuleType) -> list[ModuleType]:
+def modules_brought_in(module: ModuleType) -> list[ModuleType]:
     """Return the modules of a user's that a module needs, besides itself."""
     found, left = {module.__name__: module}, [module]
     while left:

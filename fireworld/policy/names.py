@@ -89,6 +89,8 @@ class NamedPolicy:
     """What it was made with."""
     given: object = field(default=None, repr=False)
     """What `find_policy` was given to find it."""
+    thing: object = field(default=None, repr=False)
+    """The class, function or object of a user's own that its name led to; None of other policies."""
 
     def __post_init__(self) -> None:
         """Complete what has not all of a policy's methods."""
@@ -234,7 +236,8 @@ def _by_name(text: str, more: Parameters) -> NamedPolicy:
     thing = find_in(module, target or "", where=f"--policy: {source}")
     policy = make_policy(thing, values, where=where)
     digest = covering(digest_of(thing) if module.__name__ == NOTEBOOK else digest_of_module(module), values)
-    return NamedPolicy(name, digest, policy, part=target or thing.__qualname__, parameters=values, given=name)
+    part = target or thing.__qualname__
+    return NamedPolicy(name, digest, policy, part=part, parameters=values, given=name, thing=thing)
 
 
 def _split(text: str) -> tuple[str, str | None, str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fireworld.cause import DIGEST_SHOWN, SIMULATOR, Cause, cause_of, scenario_changes, simulator_changes
+from fireworld.cause import DIGEST_SHOWN, SIMULATOR, Cause, cause_of, scenario_changes, simulator_changes, with_digest
 from fireworld.errors import FireworldError
 from fireworld.records import RunHeader
 
@@ -24,7 +24,7 @@ def run_cause(a: RunHeader, b: RunHeader) -> Cause:
 
 def scenario_text(header: RunHeader) -> str:
     """Name a run's scenario, so that those of one name are not taken for the same."""
-    return f"{header.scenario} ({header.scenario_digest[:DIGEST_SHOWN]})"
+    return with_digest(header.scenario, header.scenario_digest)
 
 
 def _scenario_changes(a: RunHeader, b: RunHeader) -> list[str]:

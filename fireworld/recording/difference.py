@@ -318,8 +318,8 @@ def diff(
 
 def _check_same_scenario(difference: Difference) -> None:
     """Raise LogError if two runs are of different scenarios, with the keys that differ."""
-    from fireworld.cause import at_most
     from fireworld.recording.cause import scenario_text
+    from fireworld.shown import at_most
 
     found = difference.cause.changes.get("scenario")
     if found:

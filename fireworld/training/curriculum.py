@@ -112,8 +112,10 @@ def curriculum_names() -> list[str]:
 
 def names_curriculum(given: str | Path) -> bool:
     """Return whether a name or a path is that of a curriculum; a file that cannot be read is none."""
-    if str(given) in curriculum_names() or str(given) in scenario_names():
-        return str(given) in curriculum_names()
+    if str(given) in curriculum_names():
+        return True
+    if str(given) in scenario_names():
+        return False
     try:
         document = _read_document(Path(given), source=str(given))
     except FireworldError:

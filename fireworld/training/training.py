@@ -15,7 +15,7 @@ import numpy as np
 from fireworld_recorder.writer import PARTIAL_SUFFIX
 
 from fireworld.errors import OutputError, TrainingError, expected
-from fireworld.executors import Workers, threads
+from fireworld.executors import AnyExecutor, Workers, in_this_process, threads, workers_for
 from fireworld.files import check_output, check_outputs, write_file
 from fireworld.interrupt import gentle_interrupt
 from fireworld.policy.teams.npz import SUFFIX
@@ -245,6 +245,25 @@ class Training:
         if self.path is None:
             self._write_log()
 
+    def take(
+        self, reports: Sequence[Report], team: Team, state: Mapping[str, Any], callbacks: Sequence[Callback]
+    ) -> None:
+        """Take in a part that was trained elsewhere: its reports, and where the training stands then.
+
+        Raises:
+            OutputError: something cannot be written; the last checkpoint stays.
+        """
+        self.trainer.restore(team, state, source=f"seed {self.seed}")
+        for report in reports:
+            self._take(report, callbacks)
+        if self.trainer.done:
+            self._finish()
+
+    def leave(self) -> None:
+        """Write a checkpoint of a training that is not done."""
+        if self.team is None:
+            self._write_checkpoint()
+
     def _recorder(self) -> AbstractContextManager[TrainingWriter | None]:
         """Return what records the training, if anything does and it is not recorded whole already."""
         if self.record is None or (self._before is not None and self._before.path == self.record):
@@ -312,13 +331,20 @@ Callback = Callable[[Training, Report], object]
 """Called with a training and its last report."""
 
 
-def train_all(trainings: Sequence[Training], *, jobs: int | None = None, callbacks: Sequence[Callback] = ()) -> None:
+def train_all(
+    trainings: Sequence[Training],
+    *,
+    jobs: int | None = None,
+    executor: AnyExecutor = None,
+    callbacks: Sequence[Callback] = (),
+) -> None:
     """Train teams until all are done, or until Ctrl-C, which leaves checkpoints.
 
     Args:
         trainings: of one method.
         jobs: trainings at a time, or parts of one training at a time where its method uses all workers; None: as many
             as there are cores.
+        executor: who trains instead, as for `fw.compare`: elsewhere every training is done by one worker at a time.
         callbacks: called after every report: in this thread, where trainings come one after another; else in the
             threads that train.
 
@@ -326,6 +352,11 @@ def train_all(trainings: Sequence[Training], *, jobs: int | None = None, callbac
         FireworldError: one training failed; the others have stopped, with a checkpoint.
     """
     with gentle_interrupt() as stop:
+        if not in_this_process(executor):
+            from fireworld.training.elsewhere import train_elsewhere
+
+            train_elsewhere(trainings, workers_for(executor, stop=stop), callbacks)
+            return
         workers = threads(jobs, stop=stop)
         if len(trainings) == 1 or trainings[0].trainer.uses_workers:
             for training in trainings:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -12,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from fireworld.errors import LogError, OutputError, expected
-from fireworld.files import check_output, new_folder, written_beside
+from fireworld.files import check_output, json_line, new_folder, written_beside
 from fireworld.records import Array, StepRecord, StoredRun
 from fireworld_recorder.reader import Log
 from fireworld_recorder.tables import TABLES, arrays_of, facts_of, find_table
@@ -80,8 +79,7 @@ class _Jsonl(TextTables):
 
     def _write(self, table: str, names: Sequence[str], rows: Iterator[tuple[Any, ...]]) -> None:
         for row in rows:
-            plain = [None if isinstance(one, float) and not math.isfinite(one) else one for one in row]
-            self._put(json.dumps({OF: table, **dict(zip(names, plain, strict=True))}) + "\n")
+            self._put(json_line({OF: table, **dict(zip(names, row, strict=True))}))
 
 
 @contextmanager
@@ -112,7 +110,7 @@ def text_tables(
         check_output(place, force=force)
         with written_beside(place) as partial, partial.open("w", encoding="utf-8") as file:
             columns = [dict(zip(COLUMNS_HEAD, one, strict=True)) for one in docs]
-            file.write(json.dumps({OF: "", "facts": facts, "columns": columns}) + "\n")
+            file.write(json_line({OF: "", "facts": facts, "columns": columns}))
             yield _Jsonl(file.write)
     else:
         raise OutputError(expected("export", "form", f"parquet, {', '.join(TEXT_FORMS)}", form))

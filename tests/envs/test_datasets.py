@@ -204,7 +204,7 @@ def test_the_command(logs, tmp_path, fireworld):
     assert f"{tmp_path / 'd'}: " in done.out
     assert fw.load_dataset(tmp_path / "d").shape["observation"] == "targets"
     for words, text in [
-        ((logs[0],), "Give one of --parquet, --rlds and --minari"),
+        ((logs[0],), "Give one of --parquet, --csv, --jsonl, --rlds and --minari"),
         ((logs[0], logs[1], "--parquet", "x"), "--parquet takes one LOG"),
         ((logs[0], "--parquet", "x", "--reward", "score"), "--parquet takes one LOG"),
         ((logs[0], "--rlds", "x", "--tables", "steps"), "--tables goes with --parquet"),

@@ -74,7 +74,8 @@ def test_json_has_what_its_page_says(fireworld):
         for metric in ("score", "burnt-out", "time", "civilians")
     ]
     assert list(row(found)) == [
-        "scenario", "metric", "unit", "higher_is_better", "a", "b", "difference", "improvement", "n_differing",
+        "scenario", "metric", "unit", "higher_is_better", "a", "b", "difference", "improvement",
+            "pairing_worth", "n_differing",
         "verdict", "more_seeds", "reason",
     ]  # fmt: skip
     assert list(row(found)["a"]) == ["mean", "interquartile_mean", "n_truncated"]

@@ -101,7 +101,7 @@ def test_a_comparison_shows_itself(tmp_path):
     assert found.gate.startswith("gate: burnt out, margin 1 buildings: ")
     title, head, line, scenario, *rows = repr(found).splitlines()
     assert title == "A: nearest-to-me, B: nearest-to-civilian, seeds 1 to 6"
-    assert head.split() == ["A", "B", "B", "-", "A", "P", "B", "is"]
+    assert head.split() == ["A", "B", "B", "-", "A", "P", "CRN", "B", "is"]
     assert (set(line), scenario) == ({"-"}, "quick")
     assert [row.startswith(f" {metric.label} ") for row, metric in zip(rows, METRICS, strict=False)] == [True] * 4
     assert rows[-1] == found.notes[-1]

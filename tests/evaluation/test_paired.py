@@ -40,6 +40,16 @@ def test_random_draws_that_both_see_are_taken_out():
     assert shifted(-1.0).improvement.mean == 0.0
 
 
+def test_what_pairing_is_worth():
+    """Sums of squares by hand: of 0 to 7 it is 42; of the differences 0, 1, 0, 1 ... it is 2, of the other side 48."""
+    other = [value + k % 2 for k, value in enumerate(GROWING)]
+    found = score_of(GROWING, other)
+    assert found.pairing_worth == pytest.approx((42 + 48) / 2)
+    assert found.to_dict()["pairing_worth"] == found.pairing_worth
+    assert "45" in found.cells
+    assert shifted(1.0).pairing_worth is None or shifted(1.0).pairing_worth > 1e20
+
+
 def test_fewer_of_the_burnt_out_is_better_and_so_is_less_time():
     a = {"s": runs(GROWING, burnt_out=100, steps=200)}
     b = {"s": runs(GROWING, burnt_out=90, steps=201)}

@@ -142,11 +142,12 @@ def test_what_tells_policies_apart():
 
 
 def test_the_version_follows_all_that_computes_a_run():
-    """What the runs import is digested, but for what makes no run: errors, executors, names of what is measured."""
+    """What the runs import is digested, but for what makes no run: errors, executors, pages, names of measures."""
     graph = grimp.build_graph("fireworld")
     needed = graph.find_upstream_modules("fireworld.evaluation.runs")
     needed |= graph.find_upstream_modules("fireworld.planning.planner")
     parts = {name.split(".")[1] for name in needed - {"fireworld"}}
-    no_run = {"errors", "evaluation", "executors", "files", "interrupt", "npz", "outcome", "records", "version"}
+    no_run = {"errors", "evaluation", "executors", "files", "html_page", "interrupt", "npz", "outcome", "records"}
+    no_run |= {"shown", "version"}
     assert parts - no_run <= {name.removesuffix(".py") for name in version._SIMULATOR}
     assert version.simulator_version().startswith("0.")

@@ -122,6 +122,11 @@ def packed_table(colors: Sequence[Rgb]) -> UInt32Array:
     return packed_array(np.array(colors).reshape(-1, 3))
 
 
+def hexadecimal(rgb: Sequence[int]) -> str:
+    """Write a color as #rrggbb."""
+    return "#" + bytes(rgb).hex()
+
+
 def single(rgb: Rgb) -> UInt32Array:
     """Pack one color for all: (1,) uint32."""
     return packed_table((rgb,))

@@ -16,7 +16,7 @@ from fireworld_recorder.totals import plain
 
 from fireworld.cause import Cause
 from fireworld.errors import FireworldError, OutputError, expected
-from fireworld.executors import processes
+from fireworld.executors import AnyExecutor, On, workers_for
 from fireworld.files import check_output, read_text_file
 from fireworld.findings import Finding
 from fireworld.junit import clean, report
@@ -187,6 +187,7 @@ def check_goldens(
     keep: Path | None = None,
     force: bool = False,
     jobs: int = 1,
+    executor: AnyExecutor = None,
     on_result: Callable[[GoldenResult], object] = lambda _: None,
 ) -> Iterator[GoldenResult]:
     """Run goldens again, or train them again, one at each step of the iteration, and compare.
@@ -200,10 +201,12 @@ def check_goldens(
         keep: folder in which the new runs and trainings that differ are recorded, with pages.
         force: replace files in `keep`.
         jobs: how many are run at a time; with more than one each in a process, and the results are without new runs.
+        executor: who runs them instead, as for `fw.compare`; workers elsewhere find the same files at the same paths.
         on_result: called as soon as one is done.
 
     Raises:
         OutputError: there are no such goldens, or `keep` cannot be used.
+        ExecutorError: an executor that is none, or workers that died.
     """
     paths = find_goldens(folder, names, matching=matching)
     if keep is not None and keep.resolve() == folder.resolve():
@@ -211,7 +214,9 @@ def check_goldens(
     if keep is not None and not force:
         for taken in (new for path in paths for new in kept_paths(path, keep) if new.exists()):
             check_output(taken)
-    return _in_turn(paths, keep, on_result) if jobs == 1 else _side_by_side(paths, keep, on_result, jobs)
+    if executor is None and jobs == 1:
+        return _in_turn(paths, keep, on_result)
+    return _side_by_side(paths, keep, on_result, executor or On("processes", min(jobs, len(paths))))
 
 
 def _in_turn(
@@ -225,10 +230,10 @@ def _in_turn(
 
 
 def _side_by_side(
-    paths: Sequence[Path], keep: Path | None, on_result: Callable[[GoldenResult], object], jobs: int
+    paths: Sequence[Path], keep: Path | None, on_result: Callable[[GoldenResult], object], executor: AnyExecutor
 ) -> Iterator[GoldenResult]:
     tasks = [partial(_check_alone, path, keep) for path in paths]
-    yield from processes(min(jobs, len(tasks))).run(tasks, lambda _, result: on_result(result)) or ()
+    yield from workers_for(executor).run(tasks, lambda _, result: on_result(result)) or ()
 
 
 def _check_alone(path: Path, keep: Path | None) -> GoldenResult:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Final
@@ -54,10 +54,13 @@ def find_goldens(folder: Path = FOLDER, names: Collection[str] = (), *, matching
     return kept
 
 
+def _files_in(folder: Path) -> list[Path]:
+    return [*folder.glob(f"*{SUFFIX}"), *folder.glob(f"*{DIGEST_SUFFIX}")]
+
+
 def _goldens_by_name(folder: Path) -> dict[str, Path]:
     found: dict[str, Path] = {}
-    paths = [*folder.glob(f"*{SUFFIX}"), *folder.glob(f"*{DIGEST_SUFFIX}")]
-    for path in sorted(paths, key=lambda path: path.stem):
+    for path in sorted(_files_in(folder), key=lambda path: path.stem):
         if path.stem in found:
             both = f"{path.stem}{SUFFIX} and {path.stem}{DIGEST_SUFFIX}"
             raise OutputError(
@@ -86,7 +89,7 @@ def unused_goldens(folder: Path, *, used: Collection[Path], ran: Collection[Path
     stems = {path.with_suffix("") for path in used}
     return [
         path
-        for path in sorted([*folder.glob(f"*{SUFFIX}"), *folder.glob(f"*{DIGEST_SUFFIX}")])
+        for path in sorted(_files_in(folder))
         if path.with_suffix("") not in stems and _is_unused(path, ran=ran, whole=whole)
     ]
 
@@ -120,20 +123,21 @@ class _Reader:
 
     def either(self) -> Matches:
         """Read parts that are joined by or."""
-        parts = [self._both()]
-        while self._take("or"):
-            parts.append(self._both())
-        return lambda name: any(part(name) for part in parts)
+        return self._joined("or", self._both, any)
 
     def error(self) -> OutputError:
         """Return what says how it should be written."""
         return OutputError(expected("-k", "", _SYNTAX, self._expression))
 
     def _both(self) -> Matches:
-        parts = [self._one()]
-        while self._take("and"):
-            parts.append(self._one())
-        return lambda name: all(part(name) for part in parts)
+        return self._joined("and", self._one, all)
+
+    def _joined(self, word: str, read: Callable[[], Matches], decide: Callable[[Iterable[bool]], bool]) -> Matches:
+        """Read parts that are joined by a word; `decide` says what they come to."""
+        parts = [read()]
+        while self._take(word):
+            parts.append(read())
+        return lambda name: decide(part(name) for part in parts)
 
     def _one(self) -> Matches:
         if self._take("not"):

@@ -6,16 +6,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from fireworld_recorder.diff import RunComparison
 from fireworld_recorder.reader import open_log
 
 from fireworld.errors import ViewError
 from fireworld.files import make_folder, write_file
 from fireworld.recording.difference import diff
 from fireworld.recording.golden.store import is_digest, recording_path, store_recording
-from fireworld.recording.pages.pictures import map_png, render_picture
+from fireworld.recording.pages.pictures import map_png
 from fireworld.recording.pages.play import play
+from fireworld.recording.pages.summary import write_first_maps, write_played
 from fireworld.recording.run import Run
-from fireworld.records import StoredRun
 
 if TYPE_CHECKING:
     from fireworld.recording.golden.check import GoldenResult
@@ -29,9 +30,9 @@ class Kept:
     page: Path | None = None
     """It plays the golden and the new run side by side; of a digest-only golden the new run alone."""
     difference: Path | None = None
-    """The page of the difference; not of a digest-only golden, nor without matplotlib."""
+    """The page of the difference; not of a digest-only golden, of runs that begin otherwise, nor without matplotlib."""
     picture: Path | None = None
-    """A map of the step where they first differ; not without matplotlib."""
+    """A map of the step where they first differ, if there is one; not without matplotlib."""
 
     @property
     def links(self) -> dict[str, str]:
@@ -64,22 +65,24 @@ def keep_new(result: GoldenResult, folder: Path) -> GoldenResult:
 
 
 def _with_pages(kept: Kept, result: GoldenResult, page: Path, difference: Path, picture: Path) -> Kept:
-    new: StoredRun = open_log(kept.recording)
-    runs = [new] if is_digest(result.path) else [open_log(result.path), new]
-    try:
-        kept = replace(kept, page=play(*runs, output=page, force=True))
-    except ViewError:  # of two cities
+    new = open_log(kept.recording)
+    first = result.difference.first if isinstance(result.difference, RunComparison) else None
+    if is_digest(result.path):
+        kept = replace(kept, page=play(new, output=page, force=True))
+        last = int(new.steps[-1])
+        png = map_png(new, new.step(last if first is None or first.step is None else min(first.step, last)))
+        if png is None:
+            return kept
+        write_file(picture, png)
+        return replace(kept, picture=picture)
+    runs = (open_log(result.path), new)
+    if not write_played(runs, page):  # of two cities
         return replace(kept, page=play(new, output=page, force=True))
-    step = result.difference.first.step if result.difference is not None and result.difference.first else None
-    try:
-        if len(runs) == 1:
-            png = map_png(new, new.step(int(new.steps[-1]) if step is None else min(step, int(new.steps[-1]))))
-            if png is None:
-                return kept
-            write_file(picture, png)
-            return replace(kept, picture=picture)
-        render_picture(runs, picture, steps=() if step is None else (step,), force=True)
-        diff(*runs, any_scenario=True).save_html(difference, force=True)
-    except ViewError:  # no matplotlib, or one run has no such step
+    kept = replace(kept, page=page, picture=picture if write_first_maps(runs, first, picture) else None)
+    if first is None or first.step is None:  # they begin otherwise: nothing of their steps can be compared
         return kept
-    return replace(kept, difference=difference, picture=picture)
+    try:
+        diff(*runs, any_scenario=True).save_html(difference, force=True)
+    except ViewError:  # no matplotlib
+        return kept
+    return replace(kept, difference=difference)

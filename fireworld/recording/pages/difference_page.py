@@ -66,8 +66,7 @@ def difference_page(compared: Difference) -> str:
 
 def played_difference(compared: Difference) -> str:
     """Return the page on which both runs play, at their first difference; ViewError where one has no steps."""
-    first = compared.first
-    return page_of_difference(compared.runs, None if first is None else (first.step, first.sentence))
+    return page_of_difference(compared.runs, None if compared.known_same else compared.found)
 
 
 def difference_body(compared: Difference, images: Mapping[str, bytes], *, played: str = "") -> list[str]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from fireworld_recorder.diff import RunComparison
 from fireworld_viewer.play.page import FirstDifference, play_page
 from fireworld_viewer.story.steps import select_steps
 
@@ -76,19 +77,16 @@ def page_of_steps(shown: Sequence[Recording], logs: Sequence[Recording]) -> str:
     return play_page(shown, names=_names(logs), damages=_damages(logs), first=_first_difference(shown))
 
 
-def page_of_difference(logs: Sequence[AnyRecording], first: tuple[int | None, str] | None) -> str:
-    """Return the page of two recordings, which opens at their first difference: its step and sentence, if there is one.
+def page_of_difference(logs: Sequence[AnyRecording], difference: RunComparison | None) -> str:
+    """Return the page of two recordings, which opens at their first difference; None: they are the same.
 
-    A difference without a step is one before the first step. Errors as for `play`.
+    Errors as for `play`.
     """
     held = open_to_show(logs)
     shown = [select_steps(one) for one in held]
-    found = None
-    if first is not None:
-        step, sentence = first
-        found = FirstDifference(step=int(shown[0].steps[0]) if step is None else step, sentence=sentence)
+    first = None if difference is None else _marked(difference, shown[0])
     return play_page(
-        shown, names=_names(held), damages=_damages(held), first=found, start=None if found is None else found.step
+        shown, names=_names(held), damages=_damages(held), first=first, start=None if first is None else first.step
     )
 
 
@@ -105,5 +103,9 @@ def _first_difference(shown: Sequence[Recording]) -> FirstDifference | None:
     if len(shown) < 2:
         return None
     a, b = shown
-    found = first_shown(compare_shown(a, b), a)
+    return _marked(compare_shown(a, b), a)
+
+
+def _marked(difference: RunComparison, first: Recording) -> FirstDifference | None:
+    found = first_shown(difference, first)
     return None if found is None else FirstDifference(step=found[0], sentence=found[1])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,8 +11,11 @@ from fireworld.files import check_output, make_folder, write_file
 from fireworld.markdown import files_beside, markdown_page
 from fireworld.recording.pages.pictures import render_picture
 from fireworld.recording.pages.play import play
+from fireworld.records import StoredRun
 
 if TYPE_CHECKING:
+    from fireworld_recorder.diff import FirstDifference
+
     from fireworld.recording.difference import Difference
 
 
@@ -23,27 +27,28 @@ def save_summary(difference: Difference, path: Path, *, force: bool) -> None:
     links, shown = {}, ""
     if not difference.same:
         make_folder(page.parent)
-        if _played(difference, page):
+        if write_played(difference.runs, page):
             links["page that plays"] = str(page)
-        shown = str(picture) if _drawn(difference, picture) else ""
+        shown = str(picture) if write_first_maps(difference.runs, difference.first, picture) else ""
     finding = difference.finding(links=links, picture=shown)
     write_file(path, markdown_page("diff", [finding], beside=path.parent))
 
 
-def _played(difference: Difference, page: Path) -> bool:
+def write_played(runs: Sequence[StoredRun], page: Path) -> bool:
+    """Write the page that plays two runs, replacing what is there; return whether it can be made."""
     try:
-        play(*difference.runs, output=page, force=True)
+        play(*runs, output=page, force=True)
     except ViewError:  # of two cities, or a run without steps
         return False
     return True
 
 
-def _drawn(difference: Difference, picture: Path) -> bool:
-    first = difference.first
+def write_first_maps(runs: Sequence[StoredRun], first: FirstDifference | None, picture: Path) -> bool:
+    """Draw two runs at the step where they first differ, replacing what is there; return whether it can be drawn."""
     if first is None or first.step is None:
         return False
     try:
-        render_picture(difference.runs, picture, steps=(first.step,), force=True)
+        render_picture(runs, picture, steps=(first.step,), force=True)
     except ViewError:  # no matplotlib, or one of them has no such step
         return False
     return True

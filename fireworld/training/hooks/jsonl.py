@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Final
 
 from fireworld.arguments import path_of
 from fireworld.errors import OutputError, expected
-from fireworld.files import check_outputs, read_text_file, write_file
+from fireworld.files import check_outputs, json_line, read_text_file, write_file
 from fireworld.training.hooks.hook import Hook
 
 if TYPE_CHECKING:
@@ -48,13 +47,13 @@ class JsonlCallback(Hook):
 
     def begin(self, training: Training) -> None:
         """Write the first line; or take out what is after the checkpoint that a training continues from."""
-        head = _line({"kind": HEAD, **training.parameters})
+        head = json_line({"kind": HEAD, **training.parameters})
         lines = [head]
         if training.continues and self._path.exists():
             found = read_lines(self._path)
-            if found and _line(found[0]) != head:
+            if found and json_line(found[0]) != head:
                 raise OutputError(expected(str(self._path), "", "the lines of this training", "those of another one"))
-            lines += [_line(one) for one in found[1:] if one.get("n", training.n_reports) < training.n_reports]
+            lines += [json_line(one) for one in found[1:] if one.get("n", training.n_reports) < training.n_reports]
         write_file(self._path, "".join(lines))
         self._file = self._path.open("a", encoding="utf-8", buffering=1)  # a line at a time
 
@@ -76,7 +75,7 @@ class JsonlCallback(Hook):
 
     def _write(self, values: Mapping[str, Any]) -> None:
         if self._file is not None:
-            self._file.write(_line(values))
+            self._file.write(json_line(values))
 
 
 def read_lines(path: Path) -> list[dict[str, Any]]:
@@ -95,8 +94,3 @@ def read_lines(path: Path) -> list[dict[str, Any]]:
             break
         found.append(value)
     return found
-
-
-def _line(values: Mapping[str, Any]) -> str:
-    plain = {key: None if isinstance(one, float) and not math.isfinite(one) else one for key, one in values.items()}
-    return json.dumps(plain) + "\n"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import zip_longest
 
-from fireworld.cause import DIGEST_SHOWN, SIMULATOR, Cause, cause_of, scenario_changes, simulator_changes, value_changes
+from fireworld.cause import SIMULATOR, Cause, cause_of, scenario_changes, simulator_changes, value_changes, with_digest
 from fireworld.training.log.first_difference import Trained
 
 
@@ -32,5 +32,5 @@ def _curriculum_changes(a: Trained, b: Trained) -> list[str]:
     changes = [f"scenario {y}, was {x}" for x, y in zip_longest(*names, fillvalue="none") if x != y]
     for x, y in zip(a.scenarios, b.scenarios, strict=False):
         changes += scenario_changes(x, y, prefix=y.name) if x.name == y.name else []
-    digests = (f"{header.curriculum} ({header.curriculum_digest[:DIGEST_SHOWN]})" for header in (other, one))
+    digests = (with_digest(header.curriculum, header.curriculum_digest) for header in (other, one))
     return changes or [", was ".join(digests)]

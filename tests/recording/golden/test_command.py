@@ -139,6 +139,18 @@ def test_keep_records_the_new_runs_that_differ(kept, golden, here, change_policy
     assert "recordings/../recordings/golden: expected another folder" in refused.err
 
 
+def test_keep_shows_runs_that_begin_otherwise(here, golden, monkeypatch):
+    scenario = command_line.call(monkeypatch, "scenarios", "show", "quick", "--yaml").out
+    (here / "own.yaml").write_text(scenario)
+    assert golden("add", "own.yaml", "--policy", "chief", "--steps", 4, "--dir", "kept", "--name", "own").code == 0
+    (here / "own.yaml").write_text(scenario.replace("civilians:\n  n: 4", "civilians:\n  n: 3"))
+    done = golden("check", "--dir", "kept", "--keep", "new", "--summary", "new.md")
+    assert done.code == 1, done.err
+    assert "changed: scenario: civilians.n: 3, was 4" in done.out
+    assert {path.name for path in (here / "new").iterdir()} == {"own.mcap", "own.html"}
+    assert "[page that plays](new/own.html)" in (here / "new.md").read_text()
+
+
 def test_update_renews_what_changed_and_keeps_the_reason(kept, golden, change_policy):
     before = contents(kept)
     change_policy("EASIEST")

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from fireworld.records import CityRecord, Recording
 from fireworld_viewer import colors
-from fireworld_viewer.pictures.city_map import GROUND, BrigadeMarks, hexadecimal, outlines_m
+from fireworld_viewer.colors import hexadecimal
+from fireworld_viewer.pictures.city_map import GROUND, BrigadeMarks, outlines_m
 from fireworld_viewer.pictures.curves import COUNT_STYLES
 from fireworld_viewer.pictures.extent import Extent, whole_extent
 from fireworld_viewer.pictures.figure_files import INK, open_frame

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fireworld.records import ACTIVITIES, CityRecord, StepRecord
 from fireworld_viewer import colors
+from fireworld_viewer.colors import hexadecimal
 from fireworld_viewer.pictures.extent import MARGIN_M, Extent, whole_extent
 from fireworld_viewer.pictures.figure_files import INK
 from fireworld_viewer.story.series import existing
@@ -216,11 +217,6 @@ def buildings_in(city: CityRecord, part: Extent) -> NDArray[np.intp]:
     seen = (np.minimum.reduceat(x, first) < part.east) & (np.maximum.reduceat(x, first) > part.west)
     seen &= (np.minimum.reduceat(y, first) < part.north) & (np.maximum.reduceat(y, first) > part.south)
     return np.flatnonzero(seen)
-
-
-def hexadecimal(rgb: Sequence[int]) -> str:
-    """Write a color as #rrggbb."""
-    return "#" + bytes(rgb).hex()
 
 
 def contrasting(rgb: Sequence[int]) -> str:

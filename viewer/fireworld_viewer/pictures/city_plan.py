@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fireworld_viewer import colors
-from fireworld_viewer.pictures.city_map import GROUND, STREET, contrasting, hexadecimal
+from fireworld_viewer.colors import hexadecimal
+from fireworld_viewer.pictures.city_map import GROUND, STREET, contrasting
 from fireworld_viewer.pictures.figure_files import INK, label_text, new_figure
 
 if TYPE_CHECKING:

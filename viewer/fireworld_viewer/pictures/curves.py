@@ -11,7 +11,7 @@ import numpy as np
 
 from fireworld.records import ACTIVITIES, Array, Recording
 from fireworld_viewer import colors
-from fireworld_viewer.pictures.city_map import hexadecimal
+from fireworld_viewer.colors import hexadecimal
 from fireworld_viewer.pictures.figure_files import INK, PAIR_COLORS, label_text, new_figure, open_frame
 from fireworld_viewer.story.series import LABELS, action_name, chosen_actions, recorded, series
 

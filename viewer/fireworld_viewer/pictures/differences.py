@@ -10,7 +10,8 @@ import numpy as np
 
 from fireworld.records import Array, CityRecord, StepRecord
 from fireworld_viewer import colors
-from fireworld_viewer.pictures.city_map import hexadecimal, outlines_m
+from fireworld_viewer.colors import hexadecimal
+from fireworld_viewer.pictures.city_map import outlines_m
 from fireworld_viewer.pictures.extent import Extent
 from fireworld_viewer.pictures.figure_files import INK, PAIR_COLORS, label_text, new_figure, open_frame
 from fireworld_viewer.pictures.map_grid import LEGEND_STYLE, mark

@@ -75,7 +75,7 @@ def widened(part: Extent | None, places: NDArray[np.float64], city: CityRecord) 
         return None
     corners = np.array([(part.west, part.south), (part.east, part.north)])
     whole = whole_extent(city)
-    west, east, south, north = _around(np.concatenate([corners, *([places - MARGIN_M, places + MARGIN_M])]), 0.0)
+    west, east, south, north = _around(np.concatenate([corners, places - MARGIN_M, places + MARGIN_M]), 0.0)
     box = Extent(max(west, whole.west), min(east, whole.east), max(south, whole.south), min(north, whole.north))
     return None if box.wide * box.high > _MOST * whole.wide * whole.high else box
 

@@ -14,6 +14,7 @@ from fireworld.errors import ViewError, described
 from fireworld.files import check_output, written_beside
 from fireworld.interrupt import postponed
 from fireworld_viewer import colors
+from fireworld_viewer.colors import hexadecimal
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 DPI: Final = 120
 PAPER: Final = "#f4f2ee"
 INK: Final = "#333333"
-PAIR_COLORS: Final = tuple("#" + bytes(rgb).hex() for rgb in colors.RUN_RGB)
+PAIR_COLORS: Final = tuple(map(hexadecimal, colors.RUN_RGB))
 """Of curves of two runs or teams."""
 STILLS: Final[Mapping[str, Mapping[str, Any]]] = {
     ".png": {"Software": "fireworld"},

@@ -12,8 +12,9 @@ import numpy as np
 from fireworld.errors import one_line
 from fireworld.records import ACTIVITIES, FIERYNESS, CityRecord, Recording
 from fireworld_viewer import colors
+from fireworld_viewer.colors import hexadecimal
 from fireworld_viewer.pictures.beside import CityInset, CountCurves, most_counted
-from fireworld_viewer.pictures.city_map import JET_EDGE, WIDTH_INCHES, CityMap, MapState, hexadecimal
+from fireworld_viewer.pictures.city_map import JET_EDGE, WIDTH_INCHES, CityMap, MapState
 from fireworld_viewer.pictures.extent import Extent, whole_extent
 from fireworld_viewer.pictures.figure_files import DPI, INK, new_figure
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fireworld.records import ACTIONS
 from fireworld_viewer import colors
-from fireworld_viewer.pictures.city_map import hexadecimal
+from fireworld_viewer.colors import hexadecimal
 from fireworld_viewer.pictures.figure_files import INK, PAIR_COLORS, label_text, new_figure, open_frame
 from fireworld_viewer.table_pixels import UNSEEN_RGB, table_pixels
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import Field, dataclass, replace
+from itertools import product
 from typing import Any, Final
 
 import numpy as np
@@ -170,14 +171,10 @@ def common_steps(
     return steps, rows_a, rows_b
 
 
-def check_same_city(first: CityRecord, second: CityRecord | None = None) -> None:
-    """Check that two runs took place in the same city; ViewError, with what differs, if one building does.
-
-    One alone is in the same city as itself.
-    """
-    if second is None:
-        return
-    for name in ("building_id", "outline_ptr", "outline_x_m", "outline_y_m", "floors"):
+def check_same_city(first: CityRecord, *others: CityRecord) -> None:
+    """Check that runs took place in the same city; ViewError, with what differs, if one building does."""
+    names = ("building_id", "outline_ptr", "outline_x_m", "outline_y_m", "floors")
+    for second, name in product(others, names):
         if not np.array_equal(getattr(first, name), getattr(second, name)):
             n, m = len(first.building_id), len(second.building_id)
             cities = f"{first.name!r} with {n} buildings and {second.name!r} with {m}"

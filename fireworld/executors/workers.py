@@ -1,41 +1,34 @@
-"""Executors for work that comes in many parts: threads, processes, or one that is given, with the same results."""
+"""Workers: who does a list of tasks, in threads of this process or elsewhere."""
 
 from __future__ import annotations
 
-import multiprocessing
 import os
-import signal
-import threading
-import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-    wait,
-)
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from threading import Event
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
-from fireworld.errors import FireworldError, expected
+from fireworld.errors import FireworldError
 
 Result = TypeVar("Result")
-AnyExecutor = Executor | int | str | None
-"""What an argument `executor` may be; see `workers_for`."""
+OnResult = Callable[[int, Any], object]
 
 LOOK_EVERY_SECONDS: Final = 0.2
-PARENT_SECONDS: Final = 1.0
-"""How often a process looks whether its parent is still there."""
 """How long Ctrl-C waits at most until it is seen."""
 
 
 class ExecutorError(FireworldError):
     """An executor that cannot do the work it was given."""
+
+
+@dataclass(frozen=True)
+class Unfinished:
+    """A result of a task that is not done: `rest` is the task that continues it."""
+
+    part: Any
+    rest: Callable[[], Any]
 
 
 @dataclass(frozen=True)
@@ -45,12 +38,16 @@ class Workers:
     Attributes:
         n: tasks at a time.
         stop: set it, and no further task begins; tasks that run in threads may look at it too.
-        make_pool: makes the executor; what runs in processes must be picklable.
+        make_pool: makes the executor.
+        elsewhere: tasks are sent: they can be pickled, and travel as `fireworld.executors.packing` says.
+        name: what errors call the executor.
     """
 
     n: int
     stop: Event = field(default_factory=Event)
     make_pool: Callable[[int], AbstractContextManager[Executor]] = ThreadPoolExecutor
+    elsewhere: bool = False
+    name: str = "executor"
 
     def run(
         self, tasks: Sequence[Callable[[], Result]], on_result: Callable[[int, Result], object] = lambda *_: None
@@ -60,19 +57,20 @@ class Workers:
         Args:
             tasks: what to do.
             on_result: called on this thread as tasks are done, with their number and result; also for those that
-                were under way when all stopped, if they got done.
+                were under way when all stopped, if they got done. Of a task that is done in parts, which is for
+                workers elsewhere, with every part: `Unfinished`, but for the last.
 
         Raises:
-            ExecutorError: a process died.
+            ExecutorError: workers died again and again, were refused, or cannot be sent the tasks.
         """
+        if self.elsewhere:
+            from fireworld.executors.sending import Sending
+
+            return Sending(self, tasks, on_result).run()
         results: dict[int, Result] = {}
-        try:
-            with self.make_pool(self.n) as pool:
-                numbers = {pool.submit(task): number for number, task in enumerate(tasks)}
-                self._wait(numbers, results, on_result)
-        except BrokenExecutor:
-            hint = "it crashed, or its script starts work without `if __name__ == '__main__':`; try one job"
-            raise ExecutorError(f"executor: a process that did a part of the work died; {hint}") from None
+        with self.make_pool(self.n) as pool:
+            numbers = {pool.submit(task): number for number, task in enumerate(tasks)}
+            self._wait(numbers, results, on_result)
         if len(results) == len(tasks):
             return [results[number] for number in range(len(tasks))]
         for future, number in numbers.items():
@@ -119,7 +117,9 @@ def processes(n: int | None = None, *, stop: Event | None = None) -> Workers:
         n: processes; None: as many as there are cores.
         stop: asks to stop.
     """
-    return Workers(n or n_cores(), stop or Event(), _pool_of_processes)
+    from fireworld.executors.pools import pool_of_processes
+
+    return Workers(n or n_cores(), stop or Event(), pool_of_processes, elsewhere=True, name="processes")
 
 
 def given(executor: Executor, *, stop: Event | None = None) -> Workers:
@@ -129,61 +129,10 @@ def given(executor: Executor, *, stop: Event | None = None) -> Workers:
         executor: of concurrent.futures, or one that behaves like it (Dask, loky, mpi4py).
         stop: asks to stop.
     """
-    return Workers(1, stop or Event(), lambda _: nullcontext(executor))
-
-
-def workers_for(executor: AnyExecutor, *, stop: Event | None = None) -> Workers:
-    """Return the workers that an argument `executor` asks for.
-
-    Args:
-        executor: None, or "threads": as many threads as there are cores; a number of threads; "processes": as many
-            processes as there are cores; or an executor of the caller's.
-        stop: asks to stop.
-
-    Raises:
-        ExecutorError: it is none of these.
-    """
-    if executor is None or executor == "threads":
-        return threads(stop=stop)
-    if executor == "processes":
-        return processes(stop=stop)
-    if isinstance(executor, int) and not isinstance(executor, bool) and executor >= 1:
-        return threads(executor, stop=stop)
-    if isinstance(executor, Executor):
-        return given(executor, stop=stop)
-    wanted = '"threads", "processes", a number from 1 on, or an executor of concurrent.futures'
-    raise ExecutorError(expected("executor", "", wanted, executor))
-
-
-def in_processes(executor: AnyExecutor) -> bool:
-    """Return whether an argument `executor` asks for processes, to which tasks must be sent."""
-    return executor == "processes" or isinstance(executor, ProcessPoolExecutor)
-
-
-def in_this_process(executor: AnyExecutor) -> bool:
-    """Return whether an argument `executor` is known to do all work in this process."""
-    return executor is None or executor == "threads" or isinstance(executor, int | ThreadPoolExecutor)
+    here = isinstance(executor, ThreadPoolExecutor)
+    return Workers(n_cores(), stop or Event(), lambda _: nullcontext(executor), elsewhere=not here)
 
 
 def n_cores() -> int:
     """Return how many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _pool_of_processes(n: int) -> Executor:
-    """Make processes that leave Ctrl-C to this one."""
-    fresh = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(n, mp_context=fresh, initializer=_begin_process, initargs=(os.getpid(),))
-
-
-def _begin_process(parent: int) -> None:
-    """Leave Ctrl-C to the parent, and end when it has ended."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(PARENT_SECONDS)
-        os._exit(1)
-
-    threading.Thread(target=watch, name="parent", daemon=True).start()
