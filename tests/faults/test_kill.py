@@ -33,7 +33,7 @@ def check(path, n_safe, whole):
     """Compare what a killed process left with the whole run; return how many steps were rescued, -1 for no log."""
     partial = path.with_name(path.name + ".partial")
     if path.exists():
-        assert not partial.exists() or partial.samefile(path), "both names of one file, killed between giving and taking"
+        assert not partial.exists() or partial.samefile(path), "killed while the file had both of its names"
         assert path.read_bytes() == (path.parent / "whole.mcap").read_bytes()
         return len(whole)
     if not partial.exists():
