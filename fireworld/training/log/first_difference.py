@@ -131,15 +131,22 @@ def _place(
     return FirstDifference(
         part=number,
         scenario=of.scenarios[record.scenario].name if is_episode else "",
-        number=record.episode if is_episode else getattr(record, "generation", number),
+        number=record.episode if is_episode else getattr(record, "generation", getattr(record, "lesson", number)),
         phase=phase,
         what=what,
         **rest,
     )
 
 
-PHASE_OF: Final = {"fire": "draw", "seed": "draw", "weights": "draw", "scores": "choose"}
-"""Of what a search holds; the rest is known at the end of a generation."""
+PHASE_OF: Final = {
+    "fire": "draw",
+    "seed": "draw",
+    "weights": "draw",
+    "scores": "choose",
+    "score": "choose",
+    "numbers": "learn",
+}
+"""Of what a generation or a lesson holds; the rest is known at its end."""
 
 
 def _in_generation(a: Trained, number: int, record: Any, name: str, x: Any, y: Any) -> FirstDifference:
