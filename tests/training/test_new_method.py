@@ -178,7 +178,7 @@ def test_a_module_in_the_folder_is_all_it_takes(here, fireworld, monkeypatch, gu
     assert fireworld(*guessing, "-o", "a.npz").code == 2
     (here / "guess.py").write_text("from tests.training.test_new_method import Guess\n\nMETHOD = Guess()\n")
     monkeypatch.setattr(methods, "__path__", [*methods.__path__, str(here)])
-    assert method_names() == ["paper", "sarsa", "search", "guess"]
+    assert method_names() == ["paper", "sarsa", "search", "targets", "guess"]
     assert fireworld(*guessing, "-o", "a.npz").code == 0
     monkeypatch.delitem(sys.modules, f"{methods.__name__}.guess")
 

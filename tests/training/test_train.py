@@ -125,7 +125,7 @@ def test_stopped_without_an_output(here, files):
     assert len((here / "a.csv").read_text().splitlines()) == 5
 
 
-@pytest.mark.parametrize("method", ["paper", "search"])
+@pytest.mark.parametrize("method", ["paper", "search", "targets"])
 def test_ctrl_c_leaves_a_checkpoint(here, files, method, monkeypatch):
     monkeypatch.setattr(signal, "getsignal", lambda _: signal.default_int_handler)
     options = {"method": method, "set": FEW if method == "paper" else SEARCH, "output": "a.npz"}

@@ -248,6 +248,13 @@ class PartCommit:
     hash: bytes = value(3, "bytes", "32 bytes, chained to the commit before: the digest of the training up to here")
 
 
+def part_number(record: Any) -> int:
+    """Return the number that the first record of a part has: of its episode, generation or lesson; else 0."""
+    return int(
+        next((getattr(record, name) for name in ("episode", "generation", "lesson") if hasattr(record, name)), 0)
+    )
+
+
 def check_places(record: Any, n_brigades: Sequence[int]) -> None:
     """Check that a record is of scenarios that the plan has, of seeds that a run can have, and of columns that fit.
 

@@ -279,7 +279,7 @@ class TargetsTrainer(Trainer[Targets, LessonReport]):
             scores[k], errors[k] = world.outcome.score_share, math.fsum(np.abs(learner.td_error)) / world.n_brigades
         if not np.isfinite(network.number).all():
             raise TrainingError(
-                f"lesson {number + 1}: the numbers of the network grow without end; a smaller alpha helps"
+                f"lesson {number + 1}: the network's numbers grow without end; a smaller alpha helps"
             )
         return Lesson(
             lesson=number,
