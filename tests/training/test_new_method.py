@@ -169,7 +169,7 @@ def test_from_the_command_line(here, fireworld, guessing):
         "fireworld: method: n_guesses: expected a whole number from 1 to 1000000, got 0\n"
     )
     assert fireworld("train", "-o", "b.npz", "--method", "gues").err == (
-        "fireworld: --method: expected one of paper, sarsa, search, guess, got 'gues'\n"
+        "fireworld: --method: expected one of paper, sarsa, search, targets, guess, got 'gues'\n"
     )
 
 

@@ -278,9 +278,7 @@ class TargetsTrainer(Trainer[Targets, LessonReport]):
             lengths[k] = world.run(ready, learner)
             scores[k], errors[k] = world.outcome.score_share, math.fsum(np.abs(learner.td_error)) / world.n_brigades
         if not np.isfinite(network.number).all():
-            raise TrainingError(
-                f"lesson {number + 1}: the network's numbers grow without end; a smaller alpha helps"
-            )
+            raise TrainingError(f"lesson {number + 1}: the network's numbers grow without end; a smaller alpha helps")
         return Lesson(
             lesson=number,
             epsilon=epsilon,
