@@ -30,6 +30,9 @@ if TYPE_CHECKING:
     from fireworld.evaluation.new_scenarios import new_scenarios as new_scenarios
     from fireworld.evaluation.scenario_check import ScenarioCheck as ScenarioCheck
     from fireworld.evaluation.scenario_check import ScenarioChecks as ScenarioChecks
+    from fireworld.evaluation.suites import Suite as Suite
+    from fireworld.evaluation.suites import suite as suite
+    from fireworld.evaluation.suites import suites as suites
     from fireworld.maps.exporting import export_city as export_city
     from fireworld.maps.importing import ImportedCity as ImportedCity
     from fireworld.maps.importing import import_city as import_city
@@ -94,6 +97,7 @@ _ROOMS = {
     "ScenarioCheck": "evaluation.scenario_check",
     "ScenarioChecks": "evaluation.scenario_check",
     "Session": "simulation.session",
+    "Suite": "evaluation.suites",
     "TableTeam": "policy.teams.table_team",
     "Team": "policy.teams.team",
     "TrainingLog": "training.log.reader",
@@ -123,6 +127,8 @@ _ROOMS = {
     "reproduce": "reproduction.reproduce",
     "run": "recording.record",
     "scenarios": "scenario",
+    "suite": "evaluation.suites",
+    "suites": "evaluation.suites",
     "train": "training.train",
     "verify": "recording.verify",
     "world": "simulation.session",

@@ -25,7 +25,11 @@ EXIT_CODES: Final = {"not worse": 0, "worse": 1, "cannot tell": 3}
 @click.argument("policy_a", metavar="POLICY_A")
 @click.argument("policy_b", metavar="POLICY_B")
 @click.option(
-    "--scenarios", metavar="NAMES", default=TESTS, show_default=True, help="Shipped names or YAML files, with commas."
+    "--scenarios",
+    metavar="NAMES",
+    default=TESTS,
+    show_default=True,
+    help="Scenarios, suites or YAML files, with commas.",
 )
 @click.option(
     "--seeds", "n_seeds", metavar="N", default=100, show_default=True, type=click.IntRange(1, 10_000),
@@ -84,6 +88,7 @@ def command(
     fireworld compare old.npz new.npz --results runs.parquet   what is known is not run again
     fireworld compare chief my:Policy --gate --margin 0.01     for CI: exit code 1 if worse
     fireworld compare chief random --scenarios quick,own.yaml --seeds 30 --plot difference.png
+    fireworld compare chief my:Policy --scenarios contested,larger --seeds 20   suites: a row each
     fireworld compare chief my:Policy --on dask://head:8786    on a cluster
 
     Policies are named as for `fireworld run --policy`. Both run every scenario with the same seeds, so they see the
