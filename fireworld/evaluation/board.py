@@ -21,7 +21,7 @@ OVERALL: Final = "overall"
 N_CELLS: Final = 3
 """Columns of suites in a table of text, which has 80 characters."""
 NAME_CHARACTERS: Final = 20
-_CAPTION: Final = "mean share of the greatest score [95 % interval]; overall every suite counts the same"
+_CAPTION: Final = "share of the greatest score [95 % interval]; overall, suites count the same"
 
 
 @dataclass(frozen=True)
@@ -61,9 +61,9 @@ class Leaderboard(Shown):
         """What a reader has to know besides."""
         notes = []
         if any(standing.rank is None for standing in self.standings):
-            notes.append("- : not all runs of any of these seeds are known; without all suites there is no rank")
+            notes.append("- : a suite without a seed of which all runs are known, so without a rank")
         if any(standing.n_seeds != len(self.seeds) for standing in self.standings):
-            notes.append("seeds: as many of these as a policy was run with, in every suite")
+            notes.append("seeds: of these, how many a policy was run with in every suite")
         if any(standing.n_seeds < N_SEEDS_ENOUGH for standing in self.standings):
             notes.append(f"intervals of fewer than {N_SEEDS_ENOUGH} seeds are too narrow")
         return notes
@@ -74,7 +74,8 @@ class Leaderboard(Shown):
         Args:
             limit: policies at most of each other simulator.
         """
-        yield f"{self._title}; fireworld {self.version}"
+        yield self._title
+        yield f"fireworld {self.version}"
         yield from self._tables(self.standings)
         yield ""
         yield _CAPTION
@@ -147,8 +148,8 @@ class Leaderboard(Shown):
     @property
     def _title(self) -> str:
         n_scenarios = sum(one.n_scenarios for one in self.suites)
-        where = f"{n_scenarios} scenarios in {len(self.suites)} suites"
-        return f"{len(self.standings)} policies, {where}, {seeds_text(self.seeds)}"
+        counts = ((len(self.standings), "policies"), (len(self.suites), "suites"), (n_scenarios, "scenarios"))
+        return f"{', '.join(f'{word}: {n}' for n, word in counts)}; {seeds_text(self.seeds)}"
 
     def _found(self, standing: Standing) -> list[Estimate | None]:
         """Return overall and the suites."""
