@@ -29,7 +29,7 @@ from fireworld.cli.progress import runs_bar
     "--results", metavar="FILE.parquet", type=click.Path(path_type=Path),
     help="Take known runs from here, rank its policies too, and add new.",
 )  # fmt: skip
-@click.option("--resume", is_flag=True, help="Go on with what an interrupted call left in --results.")
+@click.option("--resume", is_flag=True, help="Continue what an interrupted call left in --results.")
 @click.option("--html", metavar="FILE.html", type=click.Path(path_type=Path), help="Write a page.")
 @click.option("--force", is_flag=True, help="Replace an existing page.")
 @click.option("--markdown", "as_markdown", is_flag=True, help="Write a table of Markdown.")
@@ -59,7 +59,7 @@ def command(
 
     Suites are fixed sets of fires that nobody learned or chose in; `fireworld scenarios` lists them. All policies see
     the same random draws. With --results the policies that the file has runs of, made by the same simulator, are ranked
-    too; what another simulator measured is shown apart. After Ctrl-C the same call goes on where it stopped.
+    too; what another simulator measured is shown apart. After Ctrl-C the same call continues where it stopped.
 
     Exit code: 0; 2 could not be done; 130 interrupted (--results keeps every run that is done).
     """

@@ -48,7 +48,7 @@ def leaderboard(
         executor: who makes the runs, as for `fw.compare`.
         results: a file (.parquet) to take known runs from, and to add the others to. Policies in it that were measured
             by the same simulator are ranked too, by the runs that it has of these seeds.
-        resume: go on with what an interrupted call left in `results`, which has to be there.
+        resume: continue what an interrupted call left in `results`, which has to be there.
         on_run: called with the number of runs that are done or known, and of all.
         stop: set it, and no further run begins.
 
@@ -95,10 +95,10 @@ def _make(
 
 
 def _results(given: Path | str | None, *, resume: bool) -> Results:
-    """Open the results; ArgumentError or OutputError if there is nothing to go on with."""
+    """Open the results; ArgumentError or OutputError if there is nothing to continue."""
     path = None if given is None else path_of("results", given)
     if resume and path is None:
-        raise ArgumentError(expected("resume", "", "results to go on with", "none"))
+        raise ArgumentError(expected("resume", "", "results to continue", "none"))
     if resume and path is not None and not path.exists():
         raise OutputError(expected(str(path), "", "the results of an interrupted call", "no such file"))
     return open_results(path)

@@ -241,7 +241,7 @@ def test_mistakes_take_one_line(fireworld, here, words, message):
     ("words", "message"),
     [
         ({"policies": 3}, 'policies: expected a list, as in ["chief", "best"], got 3'),
-        ({"policies": ["chief"], "resume": True}, "resume: expected results to go on with"),
+        ({"policies": ["chief"], "resume": True}, "resume: expected results to continue"),
         ({"policies": ["chief"], "suites": 3}, "scenarios: expected one or more names"),
     ],
 )
