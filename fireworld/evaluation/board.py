@@ -20,7 +20,8 @@ FORMAT: Final = "fireworld-leaderboard/1"
 OVERALL: Final = "overall"
 N_CELLS: Final = 3
 """Columns of suites in a table of text, which has 80 characters."""
-NAME_CHARACTERS: Final = 20
+NAME_CHARACTERS, HEAD_CHARACTERS = 20, 14
+"""Of a policy and of a suite, as far as they are shown in a table of text."""
 _CAPTION: Final = "share of the greatest score [95 % interval]; overall, suites count the same"
 
 
@@ -162,9 +163,14 @@ class Leaderboard(Shown):
         heads = [OVERALL, *(one.name for one in self.suites)]
         for first in range(0, len(heads), N_CELLS):
             shown = slice(first, first + N_CELLS)
-            rows = [[_rank(one), _short(one.name), str(one.n_seeds), *self._cells(one)[shown]] for one in standings]
+            rows = [
+                [_rank(one), _short(one.name, NAME_CHARACTERS), str(one.n_seeds), *self._cells(one)[shown]]
+                for one in standings
+            ]
             yield ""
-            yield TextTable(["#", "policy", "seeds", *map(_short, heads[shown])], rows, n_left=2)
+            yield TextTable(
+                ["#", "policy", "seeds", *(_short(head, HEAD_CHARACTERS) for head in heads[shown])], rows, n_left=2
+            )
 
     def _html(self, standings: Sequence[Standing]) -> str:
         heads = ["rank", "policy", "digest", "seeds", OVERALL, *(escape(one.name) for one in self.suites)]
@@ -190,13 +196,14 @@ def _code(name: str) -> str:
     return "`" + name.replace("|", "\\|").replace("`", "'") + "`"
 
 
-def _short(name: str) -> str:
-    return name if len(name) <= NAME_CHARACTERS else name[: NAME_CHARACTERS - 3] + "..."
+def _short(name: str, n_characters: int) -> str:
+    return name if len(name) <= n_characters else name[: n_characters - 3] + "..."
 
 
 def _share(value: float) -> str:
-    """Write a share without the zero before its point."""
-    return f"{value:.2f}".removeprefix("0")
+    """Write a share without the zero before its point, and all of it as 1.0."""
+    text = f"{value:.2f}"
+    return "1.0" if text == "1.00" else text.removeprefix("0")
 
 
 def _cell(found: Estimate | None) -> str:

@@ -15,9 +15,10 @@ import pytest
 import fireworld as fw
 from fireworld.errors import FireworldError
 from fireworld.evaluation import comparison_runs
+from fireworld.evaluation.board import BoardSuite, Leaderboard
 from fireworld.evaluation.inputs import rows_of
 from fireworld.evaluation.results import Result, Results, RunKey, read_results
-from fireworld.evaluation.standings import known_policies, standings_of
+from fireworld.evaluation.standings import Standing, known_policies, standings_of
 from fireworld.evaluation.statistics import estimate, estimate_over
 from fireworld.interrupt import Interrupted
 from fireworld.policy.names import find_policy
@@ -159,6 +160,16 @@ def test_the_table_fits_in_eighty_columns_and_ranks(fireworld):
     board = fw.leaderboard(["chief", "best"], suites=["quick", "three-sites"], seeds=1)
     assert all(len(line) <= 80 for line in repr(board).splitlines())
     assert board._repr_html_().count("<table>") == 1
+
+
+def test_the_widest_table_has_eighty_columns():
+    cell = estimate(np.array([[1.0, 1.0], [0.99, 0.99]]))
+    names = [f"{k:02} {'n' * 30}" for k in range(120)]
+    suites = tuple(BoardSuite("a-suite-of-a-long-name", "", "", 20) for _ in range(5))
+    standings = tuple(Standing(name, "", {suites[0].name: cell}, cell, 1 + k) for k, name in enumerate(names))
+    lines = repr(Leaderboard(suites, range(1, 10_001), "0.1.0+" + "0" * 12, standings)).splitlines()
+    assert max(map(len, lines)) == 80
+    assert any("[.99, 1.0]" in line for line in lines)
 
 
 def test_a_page_and_a_table_for_pages(fireworld, here):
