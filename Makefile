@@ -94,6 +94,7 @@ docs: install  ## Renew what is made from the code in docs/, and what the comman
 	$(BIN)/python -m tests.docs.foxglove_schema
 	$(BIN)/python -m tests.docs.scenario_reference
 	$(BIN)/python -m tests.docs.contested_table
+	$(BIN)/python -m tests.docs.suites_table
 	$(BIN)/python -m tests.docs.cli_reference
 	$(BIN)/python -m tests.docs.blocks --renew
 
