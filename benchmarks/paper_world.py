@@ -1,9 +1,9 @@
-"""The world that is most like the paper's: found by teams that learn nothing, from a small grid that is declared here.
+"""The world that is most like the paper's, found by teams that learn nothing, in a small grid that is declared here.
 
-`python -m benchmarks.paper_world` runs a team that acts at random in every world of the grid, in the three tests with 4 and with 7
-and 8 brigades, and compares steps and burnt-out buildings with the rows "without cooperation" of the paper's Tables 2 and 3:
-nothing that anybody learned, and nothing with cooperation, has a part in the choice. It prints the fits, today's tests among
-them, and says whether the shipped scenarios `paper-1` ... are those of the best fit; `--write` writes them. Some minutes.
+`python -m benchmarks.paper_world` runs a team that acts at random in every world of the grid, in the three tests with
+4 and with 7 and 8 brigades, and compares steps and burnt-out buildings with the rows "without cooperation" of the
+paper's Tables 2 and 3: nothing that anybody learned has a part in the choice. It prints the fits, today's tests among
+them, and says whether the shipped scenarios `paper-1` ... are those of the best fit; `--write` writes them. Minutes.
 """
 
 from __future__ import annotations
@@ -27,13 +27,14 @@ from fireworld.scenario import Scenario, load_scenario
 from fireworld.scenario.shipped import shipped_folder
 from fireworld.simulation.built import CityCache
 
-STREETS_M: Final = (8.0, 10.0, 12.0, 14.0)
+STREETS_M: Final = (8.0, 10.0, 12.0, 14.0, 16.0)
 FILLS: Final = ((0.5, 0.8), (0.6, 0.85), (0.7, 0.97))
 FIRES: Final = (1.0, 1.5, 2.0, 2.5)
 """How many times as many buildings burn at first as in today's tests."""
 CITY_SEEDS: Final = (167, 168, 169)
 FROM_M, TO_M = 90, 220
-"""Farther off than today's 65 to 150, and the same in the whole grid: the paper's figures that are compared say nothing of them."""
+"""Where civilians are: farther off than today's 65 to 150, and the same in the whole grid, as nothing that is compared
+tells of them."""
 N_SHOWN: Final = 12
 SEEDS: Final = range(500, 510)
 """Of the runs. Nobody is tested with them."""
@@ -74,7 +75,6 @@ class Fit:
     Attributes:
         steps: means of the rows of Tables 2 and 3, in their order.
         burnt_out: likewise.
-        distance: mean size of the logarithms of ours / the paper's; .1 is a tenth too much or too little.
     """
 
     steps: Sequence[float]
@@ -82,6 +82,7 @@ class Fit:
 
     @property
     def distance(self) -> float:
+        """Mean size of the logarithms of ours / the paper's; .1 is a tenth too much or too little."""
         pairs = [*zip(self.steps, (row.steps[0] for row in ROWS), strict=True)]
         pairs += zip(self.burnt_out, (row.burnt_out[0] for row in ROWS), strict=True)
         return fmean(abs(math.log(max(ours, 1.0) / theirs)) for ours, theirs in pairs)
@@ -127,7 +128,7 @@ def text_of(world: World, name: str) -> str:
     for number, line in enumerate(lines):
         new = line
         if number == 0:
-            new = f"{line.removesuffix('.')}, in a world like the paper's: made by `python -m benchmarks.paper_world --write`."
+            new = f"{line.removesuffix('.')}, in a world like the paper's; `python -m benchmarks.paper_world` makes it."
         new = re.sub(r"seed: 167", city, new)
         new = re.sub(r"n_buildings: \d+", f"n_buildings: {world.n_burning(base)}", new)
         found.append(re.sub(r"from_m: \d+, to_m: \d+", f"from_m: {FROM_M}, to_m: {TO_M}", new))
@@ -141,7 +142,8 @@ def table(fits: Mapping[World, Fit], n: int) -> Iterator[str]:
     yield _row("the paper, without cooperation", Fit([r.steps[0] for r in ROWS], [r.burnt_out[0] for r in ROWS]))
     for world in sorted(fits, key=lambda one: fits[one].distance)[:n]:
         low, high = world.fill
-        name = f"streets {world.street_m:g} m, {low:.0%} to {high:.0%} built, fires x {world.fires:g}, city {world.city_seed}"
+        built = f"{low:.0%} to {high:.0%} built"
+        name = f"streets {world.street_m:g} m, {built}, fires x {world.fires:g}, city {world.city_seed}"
         yield _row(name, fits[world])
 
 
