@@ -4,23 +4,31 @@ from __future__ import annotations
 
 import csv
 import itertools
+from importlib import import_module
 from pathlib import Path
 from threading import Event
 
 import numpy as np
 import pytest
 
-from fireworld.errors import OutputError, TrainingError
+import fireworld as fw
+from fireworld.errors import FireworldError, OutputError, TrainingError
+from fireworld.executors import On
+from fireworld.interrupt import Interrupted
 from fireworld.reproduction import paper
 from fireworld.reproduction.readings.choices import SHIPPED, load_choices, read_as
 from fireworld.reproduction.readings.design import N_BASIC, design, designed, generators
 from fireworld.reproduction.readings.effects import main_effects, permutation_p, student_95
-from fireworld.reproduction.readings.report import write_readings
-from fireworld.reproduction.readings.study import RUNS, ReadingsSize, findings_text, try_readings
-from fireworld.reproduction.readings.trial import Trial
+from fireworld.reproduction.readings.runs import RUNS
+from fireworld.reproduction.readings.study import ReadingsSize
+from fireworld.reproduction.readings.timing import Timing, longest_first
+from fireworld.reproduction.readings.trial import Trial, setting_of
 from fireworld.training.curriculum import load_curriculum
 from fireworld.training.methods.sarsa import Sarsa
 from tests.evaluation.test_reproduce import CURRICULUM, SMALL_PAPER
+from tests.executors.test_elsewhere import dask
+
+try_readings_module = import_module("fireworld.reproduction.readings.try_readings")
 
 
 def test_the_file_has_the_22_choices_and_a_level_that_changes_nothing_is_ours():
@@ -111,38 +119,92 @@ def test_quantiles_of_students_t(freedom, quantile):
     assert student_95(freedom) == pytest.approx(quantile, rel=0.02)
 
 
-SIZE = ReadingsSize("quick", 1, 2, Sarsa(n_episodes_max=3, n_episodes_unchanged=2))
+METHOD = Sarsa(n_episodes_max=3, n_episodes_unchanged=2)
 
 
 @pytest.fixture
 def small(tmp_path, monkeypatch):
     for name, rows in SMALL_PAPER.items():
         monkeypatch.setattr(paper, name, rows)
+    monkeypatch.setattr(try_readings_module, "QUICK", ReadingsSize("quick", 1, 2, METHOD))
     path = tmp_path / "small.yaml"
     path.write_text(CURRICULUM)
     return path
 
 
+def tables(folder):
+    """The bytes of all that a study leaves."""
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
 @pytest.mark.slow
 def test_a_study_is_resumed_and_comes_out_the_same(small, tmp_path):
-    whole = try_readings(tmp_path / "a", size=SIZE, curriculum=small)
-    page = write_readings(whole, tmp_path / "a")
+    whole = fw.try_readings(tmp_path / "a", quick=True, curriculum=small)
     rows = [*csv.DictReader((tmp_path / "a" / RUNS).read_text().splitlines())]
     assert len(rows) == (8 + 3) * 2
-    assert len(whole.confirmed) == 3
-    assert "in 8 readings" not in page.read_text()
-    for sentence in findings_text(whole):
-        assert sentence.endswith(".")
+    assert len(whole.study.confirmed) == 3
+    assert "Main effects" in whole.report.read_text()
+    assert all(sentence.endswith(".") for sentence in whole.findings)
     with pytest.raises(OutputError, match="--resume continues it"):
-        try_readings(tmp_path / "a", size=SIZE, curriculum=small)
-    try_readings(tmp_path / "b", size=SIZE, curriculum=small)
+        fw.try_readings(tmp_path / "a", quick=True, curriculum=small)
+    fw.try_readings(tmp_path / "b", quick=True, curriculum=small)
     runs = tmp_path / "b" / RUNS
     runs.write_bytes(runs.read_bytes()[: runs.stat().st_size // 2])  # as after a kill
-    again = try_readings(tmp_path / "b", size=SIZE, curriculum=small, resume=True)
-    assert runs.read_bytes() == (tmp_path / "a" / RUNS).read_bytes()
-    assert findings_text(again) == findings_text(whole)
+    again = fw.try_readings(tmp_path / "b", quick=True, curriculum=small, resume=True)
+    assert tables(tmp_path / "b") == tables(tmp_path / "a")
+    assert again.findings == whole.findings
+    assert 0 < len(again.study.timing.parts[0]) < 8, "the times of those that were made now"
     with pytest.raises(TrainingError, match="trainings"):
-        try_readings(tmp_path / "b", size=ReadingsSize("quick", 2, 2, SIZE.method), curriculum=small, resume=True)
+        fw.try_readings(tmp_path / "b", quick=True, repetitions=2, curriculum=small, resume=True)
+    other = tmp_path / "other.yaml"
+    other.write_text(SHIPPED.read_text().replace("epsilon_schedule: compounding", "epsilon_schedule: training"))
+    with pytest.raises(TrainingError, match="choices"):
+        fw.try_readings(tmp_path / "b", file=other, quick=True, curriculum=small, resume=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("word", ["processes", dask, "tests.executors.far:make_executor"])
+def test_a_study_has_the_same_bytes_whoever_makes_it(word, small, tmp_path):
+    fw.try_readings(tmp_path / "here", quick=True, curriculum=small, executor=1)
+    found = fw.try_readings(tmp_path / "there", quick=True, curriculum=small, executor=On(word, 2))
+    assert tables(tmp_path / "there") == tables(tmp_path / "here")
+    assert [len(part) for part in found.study.timing.parts] == [8, 3]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("word", ["threads", "processes"])
+def test_a_study_that_is_stopped_keeps_its_trials(word, small, tmp_path):
+    stop = Event()
+
+    def after_two(what, n_done, n_all):
+        if n_done >= 2:
+            stop.set()
+
+    words = {"quick": True, "curriculum": small, "executor": On(word, 1)}
+    with pytest.raises(Interrupted, match=r"[2-7] trials are kept in .*: --resume continues"):
+        fw.try_readings(tmp_path / "a", on_progress=after_two, stop=stop, **words)
+    fw.try_readings(tmp_path / "a", resume=True, **words)
+    fw.try_readings(tmp_path / "b", **words)
+    assert tables(tmp_path / "a") == tables(tmp_path / "b")
+
+
+@pytest.mark.parametrize(("words", "name"), [({"design": "all"}, "design"), ({"seeds": 0}, "seeds")])
+def test_arguments_are_checked_first(words, name, tmp_path):
+    with pytest.raises(FireworldError, match=f"{name}: expected"):
+        fw.try_readings(tmp_path / "a", **words)
+    assert not (tmp_path / "a").exists()
+
+
+def test_times_of_trials():
+    timing = Timing(2)
+    assert timing.text == ""
+    timing.add([3.0, 2.0, 2.0, 1.0], 4.4)
+    timing.add([1.0], 1.1)
+    assert timing.predicted(1) == timing.total == 9.0
+    assert timing.predicted(2) == 4.0 + 1.0
+    assert timing.predicted(64) == 3.0 + 1.0, "the parts wait for one another"
+    assert "5 trials took 9 s added up, 4 s for each of 2 workers; all of it took 6 s, 1.22 times" in timing.text
+    assert longest_first([], 3) == 0.0
 
 
 @pytest.mark.slow
@@ -153,6 +215,6 @@ def test_a_study_is_resumed_and_comes_out_the_same(small, tmp_path):
 )
 def test_every_level_can_be_tried(level, small):
     reading = read_as(load_choices(), dict([level]))
-    shares = Trial(0, reading, 1, load_curriculum(small), SIZE.method, [1000], Event())()
+    shares = Trial(setting_of(reading, load_curriculum(small), METHOD), 1, [1000])().shares
     assert len(shares) == 1
     assert all(0.0 <= share <= 1.0 for share in shares[0])

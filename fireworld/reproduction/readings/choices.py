@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import hashlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -101,7 +102,12 @@ def load_choices(path: Path | str = SHIPPED) -> tuple[OpenChoice, ...]:
     return found.choices
 
 
-def read_as(choices: tuple[OpenChoice, ...], levels: Mapping[str, str]) -> Reading:
+def digest_of(choices: Sequence[OpenChoice]) -> str:
+    """Return the SHA-256 of all that choices say."""
+    return hashlib.sha256(msgspec.json.encode([*choices], order="sorted")).hexdigest()
+
+
+def read_as(choices: Sequence[OpenChoice], levels: Mapping[str, str]) -> Reading:
     """Return the reading with these levels, by the names of their choices."""
     parts: dict[str, dict[str, Any]] = {part: {} for part in Level.__struct_fields__}
     for choice in choices:

@@ -11,7 +11,8 @@ from fireworld_viewer.pictures.specification import draw_specification
 
 from fireworld.files import write_file
 from fireworld.html_page import html_figure, html_page, html_table, text_cell
-from fireworld.reproduction.readings.study import ReadingsStudy, findings_text
+from fireworld.reproduction.readings.findings import findings_text
+from fireworld.reproduction.readings.study import ReadingsStudy
 
 PAGE: Final = "readings.html"
 EFFECTS: Final = "readings-effects.csv"
