@@ -47,9 +47,9 @@ class Timing:
             return ""
         share, n = self.total / self.n_workers, sum(map(len, self.parts))
         return (
-            f"{n} trials took {self.total:.0f} s added up, {share:.0f} s for each of {self.n_workers} workers; all of "
-            f"it took {self.elapsed:.0f} s, {self.elapsed / share:.2f} times as long. On {MANY} workers as fast it would "
-            f"take {self.predicted(MANY):.0f} s: predicted from these times, the longest trial first."
+            f"{n} trials took {self.total:.0f} s added up, {share:.0f} s for each of {self.n_workers} workers; "
+            f"all of it took {self.elapsed:.0f} s, {self.elapsed / share:.2f} times as long. On {MANY} workers as fast "
+            f"it would take {self.predicted(MANY):.0f} s: predicted from these times, the longest trial first."
         )
 
 
