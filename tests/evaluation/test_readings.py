@@ -18,7 +18,7 @@ from fireworld.interrupt import Interrupted
 from fireworld.reproduction import paper
 from fireworld.reproduction.readings.choices import SHIPPED, load_choices, read_as
 from fireworld.reproduction.readings.design import N_BASIC, design, designed, generators
-from fireworld.reproduction.readings.effects import main_effects, permutation_p, student_95
+from fireworld.reproduction.readings.effects import main_effects, over_trainings, permutation_p, student_95
 from fireworld.reproduction.readings.runs import RUNS
 from fireworld.reproduction.readings.study import ReadingsSize
 from fireworld.reproduction.readings.timing import Timing, longest_first
@@ -114,9 +114,47 @@ def test_effects_of_made_up_readings():
     assert permutation_p(signs, noise) > 0.01
 
 
-@pytest.mark.parametrize(("freedom", "quantile"), [(3, 3.182), (10, 2.228), (42, 2.018), (1000, 1.962)])
+@pytest.mark.parametrize(
+    ("freedom", "quantile"), [(1, 12.706), (2, 4.303), (3, 3.182), (6, 2.447), (10, 2.228), (42, 2.018), (1000, 1.962)]
+)
 def test_quantiles_of_students_t(freedom, quantile):
-    assert student_95(freedom) == pytest.approx(quantile, rel=0.02)
+    assert student_95(freedom) == pytest.approx(quantile, rel=0.002)
+
+
+@pytest.mark.parametrize("uneven", [False, True])
+def test_intervals_of_main_effects_hold_what_is_true_in_95_of_100_studies(uneven):
+    """Trainings and seeds of a reading have much in common; with `uneven`, readings scatter more at some levels."""
+    draws, n_held, n_all = np.random.default_rng(7), 0, 0
+    signs = design(21, 6)
+    for _ in range(400):
+        true = draws.normal(0.0, 0.1, 21)
+        of_reading = draws.normal(0.0, 0.15, (64, 1, 1)) * (np.exp(0.5 * signs[:, :1, None]) if uneven else 1.0)
+        of_training, of_run = draws.normal(0.0, 0.25, (64, 2, 1)), draws.normal(0.0, 0.2, (64, 2, 10))
+        values = (signs @ true / 2.0)[:, None, None] + of_reading + of_training + of_run
+        effects = main_effects([""] * 21, signs, values.mean(axis=(1, 2)))
+        n_held += sum(one.low <= wanted <= one.high for one, wanted in zip(effects, true, strict=True))
+        n_all += 21
+    assert 0.94 <= n_held / n_all <= 0.96
+
+
+@pytest.mark.parametrize("n_trainings", [3, 5])
+def test_intervals_of_a_reading_hold_what_is_true_in_95_of_100_studies(n_trainings):
+    draws, n = np.random.default_rng(8), 3000
+    held = 0
+    for _ in range(n):
+        values = 0.1 + draws.normal(0.0, 0.25, (n_trainings, 1)) + draws.normal(0.0, 0.2, (n_trainings, 10))
+        one = over_trainings(values)
+        held += one.low <= 0.1 <= one.high
+    assert 0.938 <= held / n <= 0.962
+
+
+@pytest.mark.parametrize("n_trainings", [1, 2])
+def test_of_two_trainings_no_interval_can_be_told(n_trainings):
+    one = over_trainings(np.full((n_trainings, 10), 0.5))
+    assert one.text() == "+0.50 [cannot be told]"
+    assert not one.can_tell
+    assert not one.above_zero
+    assert not one.below_zero
 
 
 METHOD = Sarsa(n_episodes_max=3, n_episodes_unchanged=2)

@@ -11,13 +11,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from fireworld.evaluation.statistics import Estimate, estimate
 from fireworld.executors import AnyExecutor, Workers, workers_for
 from fireworld.interrupt import Interrupted, gentle_interrupt
 from fireworld.kernels.arrays import Array
 from fireworld.reproduction.readings.choices import OpenChoice, Reading, digest_of
 from fireworld.reproduction.readings.design import designed
-from fireworld.reproduction.readings.effects import Effect, main_effects, permutation_p
+from fireworld.reproduction.readings.effects import Effect, main_effects, over_trainings, permutation_p
 from fireworld.reproduction.readings.runs import Key, Runs
 from fireworld.reproduction.readings.timing import Timing
 from fireworld.reproduction.readings.trial import Setting, Trial, Tried, setting_of
@@ -36,16 +35,22 @@ OnProgress = Callable[[str, int, int], object]
 
 @dataclass(frozen=True)
 class ReadingsSize:
-    """How much is tried."""
+    """How much is tried: trainings of each reading, at least so many fresh ones of the best, seeds of each test."""
 
     design: str
     trainings: int
     seeds: int
     method: Sarsa = PAPER
+    fresh: int = 1
+
+    @property
+    def n_fresh(self) -> int:
+        """Fresh trainings of each of the best readings."""
+        return max(self.trainings, self.fresh)
 
 
-SCREEN: Final = ReadingsSize("screen", 2, 10)
-FULL: Final = ReadingsSize("full", 5, 20)
+SCREEN: Final = ReadingsSize("screen", 2, 10, fresh=5)
+FULL: Final = ReadingsSize("full", 5, 20, fresh=5)
 QUICK: Final = ReadingsSize("quick", 1, 2, Sarsa(n_episodes_max=6, n_episodes_unchanged=3))
 
 
@@ -74,9 +79,9 @@ class ReadingsStudy:
     timing: Timing = field(default_factory=Timing)
 
     @property
-    def estimates(self) -> list[Estimate]:
+    def estimates(self) -> list[Effect]:
         """What cooperation adds in each reading."""
-        return [estimate(values) for values in self.differences]
+        return [over_trainings(values) for values in self.differences]
 
     @property
     def effects(self) -> list[Effect]:
@@ -159,7 +164,7 @@ def measure_readings(
                 "trying", [(n, seed + 1) for n in range(len(readings)) for seed in range(size.trainings)]
             )
             differences = [one[:, :, 0] - one[:, :, 1] for one in tried.values()]
-            again = [(n, FRESH + seed + 1) for n in best_of(differences) for seed in range(size.trainings)]
+            again = [(n, FRESH + seed + 1) for n in best_of(differences) for seed in range(size.n_fresh)]
             confirmed = trials.run("confirming", again)
         except KeyboardInterrupt:
             raise Interrupted(
