@@ -14,19 +14,25 @@ import pytest
 import fireworld as fw
 from fireworld.errors import FireworldError, OutputError, TrainingError
 from fireworld.executors import On
+from fireworld.executors.packing import Packer
+from fireworld.executors.receiving import work
+from fireworld.executors.self_test import self_test
 from fireworld.interrupt import Interrupted
 from fireworld.reproduction import paper
-from fireworld.reproduction.readings.choices import SHIPPED, load_choices, read_as
+from fireworld.reproduction.readings.choices import SHIPPED, digest_of, load_choices, read_as
 from fireworld.reproduction.readings.design import N_BASIC, design, designed, generators
 from fireworld.reproduction.readings.effects import main_effects, over_trainings, permutation_p, student_95
 from fireworld.reproduction.readings.runs import RUNS
 from fireworld.reproduction.readings.study import ReadingsSize
 from fireworld.reproduction.readings.timing import Timing, longest_first
 from fireworld.reproduction.readings.trial import Trial, setting_of
+from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import load_curriculum
 from fireworld.training.methods.sarsa import Sarsa
+from fireworld.version import simulator_version
 from tests.evaluation.test_reproduce import CURRICULUM, SMALL_PAPER
 from tests.executors.test_elsewhere import dask
+from tests.real_data import real_file
 
 try_readings_module = import_module("fireworld.reproduction.readings.try_readings")
 
@@ -243,6 +249,54 @@ def test_times_of_trials():
     assert timing.predicted(64) == 3.0 + 1.0, "the parts wait for one another"
     assert "5 trials took 9 s added up, 4 s for each of 2 workers; all of it took 6 s, 1.22 times" in timing.text
     assert longest_first([], 3) == 0.0
+
+
+KOBE_TOO = "levels: {{dense: {{}}, kobe: {{scenario: {{city.official: {path}}}}},"
+
+
+def with_map(path, folder):
+    """Write a file of readings whose choice `city` has a map as a level; return it."""
+    file = folder / "mine.yaml"
+    file.write_text(SHIPPED.read_text().replace("levels: {dense: {},", KOBE_TOO.format(path=path)))
+    return file
+
+
+@pytest.mark.slow
+def test_a_map_is_a_level_of_the_city(small, tmp_path):
+    """Its folder is relative to the file of readings; it travels with the trials."""
+    fw.export_city("quick", tmp_path / "town")
+    choices = load_choices(with_map("town", tmp_path))
+    (tmp_path / "elsewhere").mkdir()
+    fw.export_city("quick", tmp_path / "elsewhere" / "town")
+    assert digest_of(choices) == digest_of(load_choices(with_map("town", tmp_path / "elsewhere")))
+    assert digest_of(choices) != digest_of(load_choices())
+    setting = setting_of(read_as(choices, {"city": "kobe"}), load_curriculum(small), METHOD)
+    scenarios = [*setting.curriculum.scenarios, *setting.tests]
+    assert all(scenario.city.official == str(tmp_path / "town") for scenario in scenarios)
+    assert len(setting.files) == 1
+    trial, packer = Trial(setting, 1, [1000]), Packer()
+    shares, packed = trial().shares, packer.pack([trial])
+    for file in (tmp_path / "town").iterdir():  # as on another machine
+        file.unlink()
+    order = {"version": simulator_version(), "digest": self_test(), "modules": (), "apart": packer.apart}
+    _, (tried,) = work({**order, "content": packed.content, "needs": packed.needs})
+    assert tried.shares == shares
+
+
+@pytest.mark.slow
+def test_kobe_is_a_level_of_the_city(small, tmp_path):
+    choices = load_choices(with_map(real_file("maps/kobe"), tmp_path))
+    setting = setting_of(read_as(choices, {"city": "kobe"}), load_curriculum(small), METHOD)
+    assert 0.0 <= Trial(setting, 1, [1000])().shares[0][0] <= 1.0
+    whole = setting_of(read_as(choices, {"city": "kobe"}), load_curriculum("paper"), METHOD)
+    cities = CityCache(whole.files)
+    n_buildings = fw.import_city(real_file("maps/kobe")).summary["n_buildings"]
+    assert {cities.build(one).city.n_buildings for one in whole.curriculum.scenarios} == {n_buildings}
+
+
+def test_a_map_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(TrainingError, match=r"choices.city: levels.kobe: .*no-map"):
+        load_choices(with_map("no-map", tmp_path))
 
 
 @pytest.mark.slow
