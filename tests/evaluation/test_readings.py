@@ -104,7 +104,7 @@ def test_the_design_is_balanced_of_resolution_four_and_its_own_foldover(n_choice
 def test_the_shipped_choices_fit_into_the_design():
     for kind, n_basic in N_BASIC.items():
         varied, signs, readings = designed(load_choices(), kind=kind)
-        assert signs.shape == (2**n_basic, len(varied)) == (len(readings), 4 if kind == "quick" else 21)
+        assert signs.shape == (2**n_basic, len(varied)) == (len(readings), 4 if kind == "quick" else 22)
         assert readings[0].study == read_as(load_choices(), {}).study
 
 
