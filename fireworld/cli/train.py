@@ -117,7 +117,8 @@ def command(
     """Train a team in CURRICULUM and write its team file.
 
     CURRICULUM is the name of a curriculum or of a scenario, or a YAML file of either. If none is named, the method
-    `paper` (SARSA in tables) trains in `paper`, and `search` (weights of a ranking, by the cross-entropy method) in
+    `paper` (SARSA in tables) trains in `paper`; `search` (weights of a ranking, by the cross-entropy method) and
+    `targets` (SARSA over the features of targets: a network) train in
     `contested`.
 
     \b

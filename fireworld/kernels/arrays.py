@@ -315,7 +315,7 @@ class WorldState(NamedTuple):
 class NetworkArrays(NamedTuple):
     """A network that values targets, layer after layer; without layers there is none."""
 
-    feature: Int64  # (inputs,), the place of each feature that it reads among the 17 of a ranking
+    feature: Int64  # (inputs,), the place of each thing that it reads among the 30 that a brigade sees
     layer: Int64x2  # (layers, 4): inputs, outputs, activation, where its numbers begin
     number: Float64  # of each layer the biases (outputs,), then the weights (inputs, outputs)
 
@@ -342,6 +342,23 @@ class Trace(NamedTuple):
     reward: Float64x2  # (terms, k), of each step
 
 
+class TargetLearner(NamedTuple):
+    """What a team that learns a network of targets remembers; b brigades, k numbers. No rows: it learns none."""
+
+    trace: Float64x2  # (b, k), eligibility: how far each number had part in the values of what was chosen
+    decay: Float64  # (1,), lambda: what is left of it from choice to choice, beside the discount
+    value: Float64  # (b,), of the last choice
+    state_weight: Float64  # (30,), what a state is worth: a weighted sum of the mean of what is seen of its targets
+    state_trace: Float64x2  # (b, 30), as trace
+    state_seen: Float64  # (30,), scratch: that mean
+    commit: Int64  # (1,), steps that a choice is kept for while its target burns
+    gradient: Float64  # (k,), scratch
+    mean_gradient: Float64  # (k,), scratch: of all targets
+    mean_value: Float64  # (1,), scratch
+    outputs: Float64x2  # (layers + 1, w), scratch
+    back: Float64x2  # (2, w), scratch
+
+
 class Learner(NamedTuple):
     """What a team that learns changes and remembers; b brigades."""
 
@@ -357,6 +374,7 @@ class Learner(NamedTuple):
     reward: Float64  # (b,), discounted reward since
     discount: Float64  # (b,), discount since
     td_error: Float64  # (b,), error of the last update
+    of_targets: TargetLearner
     trace: Trace
 
 

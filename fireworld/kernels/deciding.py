@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from fireworld.kernels.arrays import BY_RANK, BY_TABLE, Array, Seen
 from fireworld.kernels.choice import GIVEN, RANK_ALL, RANK_NAMED, TABLE, choose, explores, keeps_choice, table_state
 from fireworld.kernels.episode_arrays import LAST_STEP, SEED, STEP, Episode
@@ -16,9 +18,10 @@ from fireworld.kernels.learning import (
     note_choice,
 )
 from fireworld.kernels.observation import BY_ACTION, EASIEST, N_ACTIONS, can_choose, find_named, flag_targets, observe
-from fireworld.kernels.ranking import OWN_TARGET
+from fireworld.kernels.ranking import OWN_TARGET, Sight
 from fireworld.kernels.ranks import hear, line_up, line_up_before, rank_targets
 from fireworld.kernels.step import opened_episode, sight_of
+from fireworld.kernels.target_learning import compare_targets, explored_place, go_for_and_learn, keeps_target
 
 
 @kernel
@@ -110,8 +113,7 @@ def decide_by_kind(
         if action == OWN_TARGET:
             target = policy.table_of[brigade]
     elif kind in (RANK_NAMED, RANK_ALL):
-        choice = GREEDY
-        action, target = decide_by_worth(brigade, step, known, episode)
+        action, target, choice = decide_by_worth(brigade, step, known, episode)
     else:
         action, choice = decide_by_state(brigade, step, shown, episode)
     return action, target, choice
@@ -157,10 +159,15 @@ def learn_from_kept(brigade: int, action: int, step: int, shown: Array, episode:
 
 
 @inner
-def decide_by_worth(brigade: int, step: int, known: Array, episode: Episode) -> tuple[int, int]:
-    """Return the action and the target of a brigade that decides by what targets are worth to it."""
-    policy, scratch, seen = episode.policy, episode.scratch, episode.seen
-    noting, ranking = len(seen.state) > 0, policy.table_of[brigade]
+def decide_by_worth(brigade: int, step: int, known: Array, episode: Episode) -> tuple[int, int, int]:
+    """Return the action, the target and how a brigade came to it that decides by what targets are worth to it."""
+    policy, scratch, seen, of_targets = episode.policy, episode.scratch, episode.seen, episode.learner.of_targets
+    sight = sight_of(episode.city, episode.world, episode.constants, scratch)
+    choice, noting, ranking = GREEDY, len(seen.state) > 0, policy.table_of[brigade]
+    learning, before = len(of_targets.trace) > 0, scratch.target_before[brigade]
+    goes_on = learning and step <= episode.clock[LAST_STEP]
+    if goes_on and keeps_target(brigade, before, step, episode.world.brigades.site, sight, of_targets):
+        return OWN_TARGET, before, KEPT
     action, target = rank_targets(
         brigade,
         policy.kind[brigade] == RANK_ALL,
@@ -170,16 +177,43 @@ def decide_by_worth(brigade: int, step: int, known: Array, episode: Episode) -> 
         known,
         policy.rankings[ranking],
         policy.network,
-        sight_of(episode.city, episode.world, episode.constants, scratch),
+        sight,
         scratch.ranks,
         scratch.seen,
         scratch.work,
         scratch.values,
     )
+    if learning and action >= 0:
+        target, choice = explore_and_learn(brigade, target, step, known, sight, episode)
     if noting:
         note_values(brigade, scratch.values, BY_RANK, seen)
         seen.target_value[brigade] = scratch.values[N_ACTIONS]
-    return action, target
+    return action, target, choice
+
+
+@inner
+def explore_and_learn(
+    brigade: int, target: int, step: int, known: Array, sight: Sight, episode: Episode
+) -> tuple[int, int]:
+    """Let a brigade that learns try another target now and then; learn from its choice before by the value of this one.
+
+    All burning buildings of its site have been valued by it. Returns the target, and how it came to that.
+    """
+    policy, scratch, sites, learner = episode.policy, episode.scratch, episode.world.sites, episode.learner
+    site, ranks, epsilon, choice = sites.place[target], scratch.ranks, policy.epsilon[0], GREEDY
+    first, end = np.int64(sites.start[site]), np.int64(sites.start[site + 1])
+    greedy = np.int64(ranks.position[target])
+    chosen = explored_place(brigade, first, end, epsilon, episode.clock[SEED], step)
+    if chosen >= 0:
+        target, choice = sites.member[chosen], EXPLORED
+    else:
+        chosen = greedy
+    of_targets = learner.of_targets
+    compare_targets(
+        brigade, first, end, greedy, chosen, epsilon, known, policy.network, sight, ranks, scratch.seen, of_targets
+    )
+    go_for_and_learn(brigade, scratch.seen, policy.network, learner)
+    return target, choice
 
 
 @inner

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from fireworld.kernels.arrays import BURNING, TOTAL, Array
 from fireworld.kernels.deciding import decide_all
-from fireworld.kernels.episode_arrays import LAST_STEP, SEED, STEP
+from fireworld.kernels.episode_arrays import LAST_STEP, SEED, STEP, Episode
 from fireworld.kernels.fire import is_over
-from fireworld.kernels.jit import kernel
+from fireworld.kernels.jit import inner, kernel
 from fireworld.kernels.learning import forget, note_reward, take_reward, update
 from fireworld.kernels.outcome import score
 from fireworld.kernels.step import begin_step, finish_step, opened_episode
+from fireworld.kernels.target_learning import learn_target
 from fireworld.kernels.warmth import begin
 
+PERCENT = 100.0
 NO_STEP = 0
 """A step in which no fire is lit."""
 
@@ -32,8 +34,10 @@ def run_episode(row: Array) -> None:
     learner, warmth, outcome = episode.learner, episode.scratch.warmth, episode.world.outcome
     learning, last_step = learner.learning[0] != 0, clock[LAST_STEP]
     episode.scratch.described_at[:] = -1
+    by_score = len(learner.of_targets.trace) > 0
     if learning:
         forget(learner)
+        score(world.fire, world.civilians, city.geometry, outcome)
     begin(city.cover, world.fire, warmth)
     for step in range(clock[STEP] + 1, last_step + 2):
         if step > last_step and not learning:
@@ -45,11 +49,30 @@ def run_episode(row: Array) -> None:
         clock[STEP] = step
         finish_step(city, world, constants, warmth, clock[SEED], step)
         if learning:
-            take_reward(outcome.reward[TOTAL], learner)
+            take_reward(outcome.reward[TOTAL] if not by_score else change_of_score(episode), learner)
             note_reward(step - 1, outcome.reward, learner)
         if is_over(outcome.counts[BURNING], city.buildings.later_step, step):
             if learning:
-                for brigade in range(len(learner.state)):
-                    update(brigade, episode.policy.table_of[brigade], 0.0, learner)
+                learn_the_end(episode)
             break
     score(world.fire, world.civilians, city.geometry, outcome)
+
+
+@inner
+def change_of_score(episode: Episode) -> float:
+    """Return how the score has changed in a step, in percent of the maximum, and write it anew."""
+    world, outcome = episode.world, episode.world.outcome
+    before = outcome.score[0]
+    score(world.fire, world.civilians, episode.city.geometry, outcome)
+    return PERCENT * (outcome.score[0] - before) / outcome.score[1]
+
+
+@inner
+def learn_the_end(episode: Episode) -> None:
+    """Let all brigades learn from their last choices, after which nothing comes."""
+    policy, learner = episode.policy, episode.learner
+    for brigade in range(len(learner.state)):
+        if len(learner.of_targets.trace) > 0:
+            learn_target(brigade, 0.0, policy.network, learner)
+        else:
+            update(brigade, policy.table_of[brigade], 0.0, learner)

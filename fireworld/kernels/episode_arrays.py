@@ -39,6 +39,12 @@ class Ranks(NamedTuple):
     value: Float64  # (n,), of the brigade that chooses
     position: Int32  # (n,), by building: where it stands
     weighed: Int32  # (n,), the ranking of `worth`, -1 none
+    summed: Int64  # (1,), the step in which the sides were summed up, -1 none
+    side: UInt8  # (n,), by building: on which side of its site it is
+    side_burning: Float64x2  # (n, 4), buildings that burn on each side of each site
+    side_kindling: Float64x2  # (n, 4), their kindling
+    side_others: Float64x2  # (n, 4), other brigades that go for them
+    site_needed: Float64  # (n,), steps that one brigade would have to spray a site
 
 
 class Warmth(NamedTuple):
@@ -87,7 +93,7 @@ class Scratch(NamedTuple):
     described_at: Int64  # (n,), -1 at first
     ranks: Ranks  # of n buildings, 0 where nobody ranks
     warmth: Warmth
-    seen: Float64  # (17,)
+    seen: Float64  # (30,)
     work: Float64x2  # (2, w), w as `widest` says of the policy's network
 
 

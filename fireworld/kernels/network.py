@@ -25,26 +25,41 @@ def value_by_network(network: NetworkArrays, seen: Array, work: Array) -> float:
     """Return the value of a target by a network with layers; MODEL 8.
 
     Every sum begins with the bias and takes the inputs in their order, so that it has the same bits on every machine.
-    `seen` (17,) float64 are the features of the target; `work` (2, w) float64, w as `widest` says, is written.
+    `seen` (30,) float64 is what the brigade sees of the target; `work` (2, w) float64, w as `widest` says, is written.
     """
-    number, row = network.number, 0
+    row = 0
     for i in range(len(network.feature)):
         work[row, i] = seen[network.feature[i]]
     for k in range(len(network.layer)):
-        n_in, n_out, activation, place = network.layer[k]
-        came, out, row = work[row], work[1 - row, :n_out], 1 - row
-        for j in range(n_out):
-            out[j] = number[place + j]
-        for i in range(n_in):
-            place += n_out
-            add_multiple(came[i], number[place : place + n_out], out)
-        if activation == RELU:
-            for j in range(n_out):
-                out[j] = max(out[j], 0.0)
-        elif activation == TANH:
-            for j in range(n_out):
-                out[j] = tanh(out[j])
+        put_through(network, k, work[row], work[1 - row])
+        row = 1 - row
     return work[row, 0]
+
+
+@inner
+def put_through(network: NetworkArrays, k: int, came: Array, out: Array) -> None:
+    """Write the outputs of layer k, (w,), of its inputs, (w,)."""
+    number, (n_in, n_out, activation, place) = network.number, network.layer[k]
+    result = out[:n_out]
+    for j in range(n_out):
+        result[j] = number[place + j]
+    for i in range(n_in):
+        place += n_out
+        add_multiple(came[i], number[place : place + n_out], result)
+    if activation == RELU:
+        for j in range(n_out):
+            result[j] = max(result[j], 0.0)
+    elif activation == TANH:
+        for j in range(n_out):
+            result[j] = tanh(result[j])
+
+
+@inner
+def slope(activation: int, result: float) -> float:
+    """Return how fast an activation changes with what it is of, by what it has made of it."""
+    if activation == RELU:
+        return 1.0 if result > 0.0 else 0.0
+    return 1.0 - result * result if activation == TANH else 1.0
 
 
 @inner

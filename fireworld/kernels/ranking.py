@@ -16,6 +16,7 @@ from fireworld.kernels.arrays import (
     GeometryArrays,
     LinkArrays,
     SiteState,
+    StreetArrays,
 )
 from fireworld.kernels.jit import inner
 from fireworld.kernels.observation import N_ACTIONS
@@ -38,6 +39,7 @@ class Sight(NamedTuple):
     buildings: BuildingArrays
     links: LinkArrays
     geometry: GeometryArrays
+    streets: StreetArrays
     fire: FireState
     brigades: BrigadeState
     sites: SiteState

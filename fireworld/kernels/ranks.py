@@ -24,6 +24,7 @@ from fireworld.kernels.ranking import (
     know_building,
     nearness,
 )
+from fireworld.kernels.situation import describe_around, place_others, reads_around, sum_up
 
 
 def fresh_ranks(n_brigades: int, n_buildings: int) -> Ranks:
@@ -41,12 +42,19 @@ def fresh_ranks(n_brigades: int, n_buildings: int) -> Ranks:
         value=np.empty(n),
         position=np.empty(n, dtype=np.int32),
         weighed=np.empty(n, dtype=np.int32),
+        summed=np.full(1, -1),
+        side=np.empty(n, dtype=np.uint8),
+        side_burning=np.empty((n, 4)),
+        side_kindling=np.empty((n, 4)),
+        side_others=np.empty((n, 4)),
+        site_needed=np.empty(n),
     )
 
 
 @inner
 def line_up(known: Array, geometry: GeometryArrays, sites: SiteState, ranks: Ranks) -> None:
     """Put the burning buildings in a row, site after site, and note who goes for them; `known` (b,), -1 nothing."""
+    ranks.summed[0] = -1
     for k in range(np.uint64(sites.counts[2])):
         b = sites.member[k]
         ranks.position[b] = k
@@ -142,6 +150,19 @@ def weigh_row(
 
 
 @inner
+def see_place(brigade: int, k: int, around: bool, known: Array, sight: Sight, ranks: Ranks, seen: Array) -> None:
+    """Write what a brigade sees of the k-th building in the row, `seen` (30,), the 13 last only where they are read.
+
+    What the others go for is in `ranks`.
+    """
+    b, here, near = np.int64(sight.sites.member[k]), ranks.n_here[k], ranks.near[k]
+    range_square = sight.brigade_constants.range_square
+    describe_target(brigade, b, here, near, sight.described[b], sight.brigades, sight.geometry, range_square, seen)
+    if around:
+        describe_around(brigade, b, len(known), sight, ranks, seen)
+
+
+@inner
 def value_targets(
     brigade: int,
     action: int,
@@ -170,9 +191,12 @@ def value_targets(
     if len(network.layer) > 0:
         for other in range(N_ACTIONS):
             seen[N_TARGET_FEATURES + other] = 1.0 if other == action else 0.0
+        around = reads_around(network)
+        if around:
+            sum_up(step, sight, ranks)
+            place_others(brigade, known, sight, ranks)
         for k in range(np.uint64(first), np.uint64(end)):
-            b, here, near = np.int64(sites.member[k]), ranks.n_here[k], ranks.near[k]
-            describe_target(brigade, b, here, near, sight.described[b], brigades, sight.geometry, range_square, seen)
+            see_place(brigade, np.int64(k), around, known, sight, ranks, seen)
             ranks.value[k] = value_by_network(network, seen, work)
     else:
         target, mine = brigades.target[brigade], np.uint64(end)
@@ -218,7 +242,7 @@ def rank_targets(
 
     The team has been lined up in this step, and the brigades before this one been heard. `weights` (17,) are the
     ranking's, by its number; a network with layers values targets instead of them. `known` (b,) is what the brigades
-    go for, as far as this one knows, -1 nothing. Scratch is `seen` (17,) float64 and `work` (2, w), w as `widest` says.
+    go for, as far as this one knows, -1 nothing. Scratch is `seen` (30,) float64 and `work` (2, w), w as `widest` says.
     Written: `values` (5,) float64, of the one chosen and of the four targets, without the weights of the actions where
     it may name its own; there only if they are noted.
     """

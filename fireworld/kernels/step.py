@@ -63,6 +63,7 @@ def sight_of(city: CityArrays, world: WorldState, constants: Constants, scratch:
         city.buildings,
         city.links,
         city.geometry,
+        city.streets,
         world.fire,
         world.brigades,
         world.sites,

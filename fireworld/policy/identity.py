@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import dis
 import hashlib
@@ -82,7 +83,10 @@ def modules_brought_in(module: ModuleType) -> list[ModuleType]:
     found, left = {module.__name__: module}, [module]
     while left:
         one = left.pop()
+        imported = _imported_by(one)
         named = [value if isinstance(value, ModuleType) else _module_of(value) for value in [*vars(one).values()]]
+        named = [other for other in named if other is None or not _is_inside(other, one) or other.__name__ in imported]
+        named += [sys.modules.get(name) for name in imported]
         package = sys.modules.get(one.__name__.rpartition(".")[0])
         for other in (*named, package):
             file = str(getattr(other, "__file__", None) or "<")
@@ -91,6 +95,34 @@ def modules_brought_in(module: ModuleType) -> list[ModuleType]:
             found[other.__name__] = other
             left.append(other)
     return [one for name, one in sorted(found.items()) if one is not module]
+
+
+def _is_inside(other: ModuleType, package: ModuleType) -> bool:
+    """Return whether a module is in a package: whoever imports it makes it an attribute of the package."""
+    return other.__name__.startswith(f"{package.__name__}.")
+
+
+def _imported_by(module: ModuleType) -> set[str]:
+    """Return the full names of what a module imports when it is imported; some are names in modules."""
+    try:
+        tree = ast.parse(inspect.getsource(module))
+    except (OSError, TypeError, SyntaxError, ValueError):
+        return set()
+    found = set()
+    package = module.__name__ if hasattr(module, "__path__") else module.__name__.rpartition(".")[0]
+    left: list[ast.AST] = [tree]
+    while left:
+        node = left.pop()
+        left += [
+            one for one in ast.iter_child_nodes(node) if not isinstance(one, ast.FunctionDef | ast.AsyncFunctionDef)
+        ]
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[: -(node.level - 1) or None] if node.level else []
+            base = ".".join([*above, *([node.module] if node.module else [])])
+            found |= {base, *(f"{base}.{alias.name}" for alias in node.names)}
+    return found
 
 
 def _module_of(value: Any) -> ModuleType | None:

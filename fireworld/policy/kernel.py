@@ -25,6 +25,7 @@ from fireworld.kernels.learning import EXPLORED, KEPT, NO_CHOICE
 from fireworld.kernels.network import widest
 from fireworld.kernels.ranking import N_WEIGHTS
 from fireworld.kernels.ranks import fresh_ranks, rank
+from fireworld.kernels.situation import N_SEEN
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
 from fireworld.records import ACTIONS
 
@@ -162,7 +163,7 @@ def _by_rank(observation: Observation, ready: PolicyArrays) -> Decision:
         ready.network,
         observation.sight,
         fresh_ranks(len(ready.kind), len(observation.world.fire.energy)),
-        np.zeros(N_WEIGHTS),
+        np.zeros(N_SEEN),
         np.zeros((2, widest(ready.network))),
         values,
     )

@@ -102,6 +102,7 @@ class Observation:
             self.city.buildings,
             self.city.links,
             self.city.geometry,
+            self.city.streets,
             self.world.fire,
             self.world.brigades,
             self.world.sites,

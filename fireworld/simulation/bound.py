@@ -15,8 +15,9 @@ from fireworld.kernels.choice import RANK_ALL, RANK_NAMED
 from fireworld.kernels.episode_arrays import LAST_STEP, SEED, STEP, Scratch
 from fireworld.kernels.network import widest
 from fireworld.kernels.observation import N_ACTIONS, N_FEATURES
-from fireworld.kernels.ranking import N_OF_BUILDING, N_WEIGHTS
+from fireworld.kernels.ranking import N_OF_BUILDING
 from fireworld.kernels.ranks import fresh_ranks
+from fireworld.kernels.situation import N_SEEN
 from fireworld.kernels.warmth import fresh_warmth
 from fireworld.simulation.state import NO_LEARNER
 
@@ -92,7 +93,7 @@ def fresh_scratch(policy: PolicyArrays, fire: FireState, *, describes: bool) -> 
         described_at=np.full(n_described, -1),
         ranks=fresh_ranks(n_brigades, n_buildings if ranks else 0),
         warmth=fresh_warmth(n_buildings, fire.air.shape),
-        seen=np.zeros(N_WEIGHTS),
+        seen=np.zeros(N_SEEN),
         work=np.zeros((2, widest(policy.network))),
     )
 

@@ -20,9 +20,11 @@ from fireworld.kernels.arrays import (
     CivilianState,
     FireState,
     Learner,
+    NetworkArrays,
     Outcome,
     SiteState,
     StreetArrays,
+    TargetLearner,
     Trace,
     WorldState,
 )
@@ -131,6 +133,41 @@ def fresh_sites(n: int) -> SiteState:
     )
 
 
+def fresh_target_learner(
+    network: NetworkArrays, state_weight: Array, n_brigades: int, *, decay: float, commit: int
+) -> TargetLearner:
+    """Return the memory of a team that learns the numbers of a network and `state_weight`, (30,) float64.
+
+    `decay` is lambda, `commit` the steps that a choice is kept for.
+    """
+    n_layers, n_numbers = len(network.layer), len(network.number)
+    width = max(len(network.feature), 1, *network.layer[:, 1].tolist())
+    return TargetLearner(
+        trace=np.zeros((n_brigades, n_numbers)),
+        decay=np.array([decay]),
+        value=np.zeros(n_brigades),
+        state_weight=state_weight,
+        state_trace=np.zeros((n_brigades, len(state_weight))),
+        state_seen=np.zeros(len(state_weight)),
+        commit=np.array([commit], dtype=np.int64),
+        gradient=np.zeros(n_numbers),
+        mean_gradient=np.zeros(n_numbers),
+        mean_value=np.zeros(1),
+        outputs=np.zeros((n_layers + 1, width)),
+        back=np.zeros((2, width)),
+    )
+
+
+NO_TARGETS: Final = fresh_target_learner(
+    NetworkArrays(np.zeros(0, dtype=np.int64), np.zeros((0, 4), dtype=np.int64), np.zeros(0)),
+    np.zeros(0),
+    0,
+    decay=0.0,
+    commit=1,
+)
+"""Of a team that learns no targets."""
+
+
 def fresh_learner(
     tables: Array, n_brigades: int, *, rule: int = 0, alpha: float = 0.7, alpha_decay: float = 0.0, gamma: float = 0.5
 ) -> Learner:
@@ -148,6 +185,7 @@ def fresh_learner(
         reward=np.zeros(n_brigades),
         discount=np.ones(n_brigades),
         td_error=np.zeros(n_brigades),
+        of_targets=NO_TARGETS,
         trace=fresh_trace(n_brigades, 0),
     )
 

@@ -16,6 +16,7 @@ from fireworld.training.training import train_all
 SHORT = {
     "paper": {"n_episodes_max": 8},
     "search": {"n_generations": 3, "n_candidates": 6, "n_best": 2, "n_fires": 2, "n_steps_max": 30},
+    "targets": {"n_lessons": 3, "n_fights": 4, "n_steps_max": 20, "hidden": 4},
 }
 
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fireworld.kernels.network import value_by_network, widest
-from fireworld.kernels.ranking import N_WEIGHTS
+from fireworld.kernels.situation import N_SEEN
 from fireworld.policy.teams.team import FORMAT, Team, parse_team
 from tests.fuzz.support import FUZZ, altered, changed, only_complaints, target
 from tests.fuzz.test_files import as_json, dtypes, npz
@@ -25,7 +25,7 @@ def use(team: Team) -> None:
     assert len(team.digest) == len(team.policy().digest) == 64
     assert list(team.describe())
     network = team.policy().network
-    value = value_by_network(network, np.full(N_WEIGHTS, 3.0), np.zeros((2, widest(network))))
+    value = value_by_network(network, np.full(N_SEEN, 3.0), np.zeros((2, widest(network))))
     assert math.isfinite(value)
 
 

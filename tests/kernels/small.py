@@ -136,6 +136,7 @@ def sight_of(world: World) -> Sight:
         city.buildings,
         city.links,
         city.geometry,
+        city.streets,
         state.fire,
         state.brigades,
         state.sites,

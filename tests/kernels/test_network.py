@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fireworld.kernels.network import tanh, value_by_network, widest
-from fireworld.kernels.ranking import N_WEIGHTS
+from fireworld.kernels.situation import N_SEEN
 from fireworld.policy.kernel import NO_NETWORK
 from fireworld.policy.teams.network_layers import FEATURES, SEEN, Layer, pack
 from tests.networks import random_layers
@@ -34,7 +34,7 @@ def test_values_are_those_of_numpy(widths, activation):
     random = np.random.default_rng(3)
     for seed in range(20):
         network = ready(*widths, activation=activation, seed=seed)
-        seen = random.normal(size=N_WEIGHTS) * random.choice([0.1, 1.0, 3.0])
+        seen = random.normal(size=N_SEEN) * random.choice([0.1, 1.0, 3.0])
         expected = reference.value(network, seen)
         assert value(network, seen) == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
@@ -42,7 +42,7 @@ def test_values_are_those_of_numpy(widths, activation):
 @pytest.mark.parametrize("features", [("mine",), ("volume", "temperature"), SEEN, SEEN[::-1]])
 def test_it_reads_its_features_in_their_order(features):
     network = ready(len(features), 4, 1, activation="tanh", features=features)
-    seen = np.random.default_rng(4).normal(size=N_WEIGHTS)
+    seen = np.random.default_rng(4).normal(size=N_SEEN)
     by_name = dict(zip(SEEN, seen, strict=True))
     (first, _), (second, _) = random_layers(len(features), 4, 1)
     biases = [layer[1] for layer in random_layers(len(features), 4, 1)]
@@ -57,7 +57,7 @@ def test_sums_begin_with_the_bias_and_take_the_inputs_in_their_order():
         (weights.tolist(), biases.tolist()) for weights, biases in random_layers(13, 40, 1)
     )
     for seed in range(50):
-        seen = np.random.default_rng(seed).normal(size=N_WEIGHTS)
+        seen = np.random.default_rng(seed).normal(size=N_SEEN)
         hidden = list(first_biases)
         for number, row in zip(seen.tolist(), first, strict=False):
             hidden = [total + number * weight for total, weight in zip(hidden, row, strict=True)]

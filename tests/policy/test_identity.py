@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import linecache
 import subprocess
 import sys
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from fireworld.errors import PolicyError
-from fireworld.policy.identity import covering, digest_of
+from fireworld.policy.identity import covering, digest_of, digest_of_module, modules_brought_in
 from fireworld.policy.names import find_policy
 
 
@@ -195,3 +196,19 @@ def test_a_digest_covers_values():
     assert covering("abc", {}) == covering("abc", []) == "abc"
     assert covering("", {"k": 1}) == ""
     assert covering("abc", {"k": 1, "l": 2}) == covering("abc", {"l": 2, "k": 1}) != covering("abc", {"k": 1})
+
+
+def test_what_others_import_of_a_package_is_not_brought_in(tmp_path, monkeypatch):
+    """Whoever imports a module of a package makes it an attribute of the package, which its other modules belong to."""
+    package = tmp_path / "brought_in_by"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "mine.py").write_text("def decide(observation):\n    return 1\n")
+    (package / "other.py").write_text("")
+    (package / "named.py").write_text("import brought_in_by.other\n\n\ndef decide(observation):\n    return 1\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    mine = importlib.import_module("brought_in_by.mine")
+    before = digest_of_module(mine)
+    other = importlib.import_module("brought_in_by.other")
+    assert digest_of_module(mine) == before
+    assert other in modules_brought_in(importlib.import_module("brought_in_by.named"))

@@ -26,7 +26,7 @@ NEAR = SEEN.index("others_near")
 
 def as_network(ranking):
     """The network that has one layer with the weights of a ranking of one row."""
-    reads = FEATURES if ranking.own_targets else SEEN
+    reads = FEATURES if ranking.own_targets else SEEN[:N_WEIGHTS]
     layer = ranking.weights.T[: len(reads)], np.zeros(1)
     return NetworkTeam.from_layers([layer], features=reads, own_targets=ranking.own_targets)
 

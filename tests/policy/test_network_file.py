@@ -60,7 +60,7 @@ def with_number(number):
         ({"features": "temperature"}, "features: expected a list of names, .*, got 'temperature'$"),
         ({"features": []}, r"features: expected a list of names, .*, got \[\]$"),
         ({"features": [*FEATURES[:-1], 3]}, "features: expected a list of names, "),
-        ({"features": [*FEATURES[:-1], "smell"]}, "features: expected temperature, .*, nearest-to-me, got 'smell'$"),
+        ({"features": [*FEATURES[:-1], "smell"]}, "features: expected temperature, .*, site_others, got 'smell'$"),
         ({"features": [*FEATURES[:-1], "Volume"]}, "got 'Volume'; try volume$"),
         ({"features": [*FEATURES[:-1], "volume"]}, "features: expected every one once, got volume twice$"),
         (

@@ -22,6 +22,8 @@ from tests.training.conftest import SHORT, SHORT_WORDS
 
 FEW = {"n_episodes_max": 6, "n_episodes_unchanged": 3}
 SEARCH = {"n_generations": 3, "n_candidates": 4, "n_best": 2, "n_fires": 2, "n_steps_max": 10}
+TARGETS = {"n_lessons": 3, "n_fights": 3, "n_steps_max": 10, "hidden": 3}
+SETTINGS = {"paper": FEW, "search": SEARCH, "targets": TARGETS}
 
 
 @pytest.fixture
@@ -125,10 +127,10 @@ def test_stopped_without_an_output(here, files):
     assert len((here / "a.csv").read_text().splitlines()) == 5
 
 
-@pytest.mark.parametrize("method", ["paper", "search"])
+@pytest.mark.parametrize("method", ["paper", "search", "targets"])
 def test_ctrl_c_leaves_a_checkpoint(here, files, method, monkeypatch):
     monkeypatch.setattr(signal, "getsignal", lambda _: signal.default_int_handler)
-    options = {"method": method, "set": FEW if method == "paper" else SEARCH, "output": "a.npz"}
+    options = {"method": method, "set": SETTINGS[method], "output": "a.npz"}
 
     def interrupt(training, report):
         if training.n_reports == 2:
@@ -168,7 +170,7 @@ def test_a_callback_that_fails_is_the_callers_matter(here, files):
             {"curriculum": 3},
             "^curriculum: expected a curriculum or a scenario: an object, a name or a path, got 'int'$",
         ),
-        ({"method": "magic"}, "^--method: expected one of paper, sarsa, search, got 'magic'$"),
+        ({"method": "magic"}, "^--method: expected one of paper, sarsa, search, targets, got 'magic'$"),
         ({"method": 3}, "^--method: expected a name or a Method, got 'int'$"),
         ({"seed": -1}, "^seed: expected a whole number from 0 to 4294967295, got -1$"),
         ({"seed": 1.0}, "^seed: expected a whole number from 0 to 4294967295, got 1.0$"),

@@ -12,12 +12,12 @@ from fireworld.errors import TrainingError, described, expected, nearest
 from fireworld.kernels.arrays import Array, NetworkArrays
 from fireworld.kernels.network import LINEAR, RELU, TANH
 from fireworld.policy.teams.npz import check_finite
-from fireworld.policy.teams.ranking_words import N_TARGET_WEIGHTS, WEIGHTS
+from fireworld.policy.teams.ranking_words import AROUND, N_TARGET_WEIGHTS, OF_ACTION, WEIGHTS
 
 ACTIVATIONS: Final = {"relu": RELU, "tanh": TANH}
 """What may come between two layers; after the last there is nothing."""
-SEEN: Final = tuple(weight.name for weight in WEIGHTS)
-"""What a network may read of a target: what a ranking weighs, in its order."""
+SEEN: Final = tuple(weight.name for weight in (*WEIGHTS, *AROUND))
+"""What a network may read of a target: what a ranking weighs, in its order, and what is around it."""
 FEATURES: Final = SEEN[:N_TARGET_WEIGHTS]
 """The features of a target: what a network reads if nothing else is said."""
 N_LAYERS_MAX: Final = 8
@@ -42,7 +42,8 @@ def check_reading(features: object, own_targets: object, *, source: str) -> tupl
         raise TrainingError(expected(source, "own_targets", "true or false", own_targets))
     if not isinstance(features, list | tuple) or not features or not all(isinstance(one, str) for one in features):
         raise TrainingError(expected(source, "features", "a list of names, as temperature, volume", features))
-    known = FEATURES if own_targets else SEEN
+    no_actions = tuple(name for name in SEEN if name not in {weight.name for weight in OF_ACTION})
+    known = no_actions if own_targets else SEEN
     for place, name in enumerate(features):
         if name in SEEN and name not in known:
             raise TrainingError(expected(source, "features", "no actions where targets are a brigade's own", name))

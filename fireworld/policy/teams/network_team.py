@@ -25,7 +25,7 @@ from fireworld.policy.teams.network_layers import (
 )
 from fireworld.policy.teams.network_words import NetworkDifference
 from fireworld.policy.teams.npz import check_arrays
-from fireworld.policy.teams.ranking_words import WEIGHTS, targets_in_words
+from fireworld.policy.teams.ranking_words import AROUND, WEIGHTS, targets_in_words
 from fireworld.policy.teams.team import Team, no_states
 from fireworld.shown import SHOWN_MAX, Block, TextTable
 
@@ -205,7 +205,7 @@ class NetworkTeam(Team):
         ]
         yield TextTable(["layer", "inputs", "outputs", "activation", "largest weight"], rows)
         yield ""
-        meanings = {weight.name: weight.meaning for weight in WEIGHTS}
+        meanings = {weight.name: weight.meaning for weight in (*WEIGHTS, *AROUND)}
         yield TextTable(["input", "of what"], [[name, meanings[name]] for name in self.features], n_left=2)
 
     def as_dict(self, *, states: Sequence[str] = (), limit: int = SHOWN_MAX) -> dict[str, Any]:

@@ -36,6 +36,8 @@ def _of(group: str) -> tuple[Weight, ...]:
 OF_BUILDING: Final = _of("building")
 OF_BRIGADE: Final = _of("brigade")
 OF_TEAM: Final = _of("team")
+AROUND: Final = _of("around")
+"""What only networks may read."""
 OF_ACTION: Final = tuple(
     Weight(action, f"1 if the action {action} names it", f"prefers what {action} names", f"avoids what {action} names")
     for action in ACTIONS

@@ -21,7 +21,7 @@ from fireworld.rewards import TERMS
 from fireworld.training.log.learned import LearnedEpisode
 from fireworld.training.log.played import Played
 from fireworld.training.log.reader import Part, TrainingLog
-from fireworld.training.log.records import Episode, Tables, Tried
+from fireworld.training.log.records import Episode, Lesson, Tables, Tried
 from fireworld.training.log.rows_file import SUFFIX, Rows, RowsFile, check_pyarrow
 
 TABLES: Final[Mapping[str, str]] = {
@@ -31,6 +31,8 @@ TABLES: Final[Mapping[str, str]] = {
     "generations": "a generation of a search: how its rankings fared",
     "candidates": "a ranking that was tried in a generation: its weights and its score",
     "fights": "a ranking on a fire of its generation",
+    "lessons": "a lesson in which a network learned: how its fights went",
+    "lesson_fights": "a fight of a lesson",
     "played": "an episode that a learner played: how it went",
     "actions": "a brigade in a step of an episode that a learner played: what it did, as far as it is known",
 }
@@ -38,6 +40,7 @@ TABLES: Final[Mapping[str, str]] = {
 OF_KIND: Final[Mapping[type[Any], tuple[str, ...]]] = {
     Episode: ("episodes", "steps", "tables"),
     Tried: ("generations", "candidates", "fights"),
+    Lesson: ("lessons", "lesson_fights"),
     Played: ("played", "actions"),
 }
 
@@ -73,6 +76,8 @@ def rows_of(log: TrainingLog, names: Collection[str]) -> Iterator[tuple[str, Row
             yield from _played_rows(log, number, part[Played], names)
         elif Tried in part:
             yield from _generation_rows(part[Tried], scenarios, names)
+        elif Lesson in part:
+            yield from _lesson_rows(part[Lesson], scenarios, names)
 
 
 def table_arrays(log: TrainingLog, name: str) -> Rows:
@@ -167,6 +172,17 @@ def _generation_rows(tried: Tried, scenarios: list[str], names: Collection[str])
                 "score": scores.ravel(),
             },
         )
+
+
+def _lesson_rows(lesson: Lesson, scenarios: list[str], names: Collection[str]) -> Iterator[tuple[str, Rows]]:
+    if "lessons" in names:
+        of_lesson = ("lesson", "epsilon", "alpha", "score_mean", "error_mean")
+        yield "lessons", {name: np.array([getattr(lesson, name)]) for name in of_lesson}
+    if "lesson_fights" in names:
+        place = {"lesson": np.full(len(lesson.fire), lesson.lesson)}
+        fires = np.array([scenarios[k] for k in lesson.fire], dtype=object)
+        columns = {name: getattr(lesson, name) for name in ("seed", "score", "n_steps")}
+        yield "lesson_fights", {**place, "scenario": fires, **columns}
 
 
 def _played_rows(log: TrainingLog, number: int, played: Played, names: Collection[str]) -> Iterator[tuple[str, Rows]]:

@@ -15,7 +15,7 @@ from fireworld.records import ACTIONS, CHOICES, Array
 from fireworld.scenario import Scenario
 from fireworld.training.log.learned import LearnedEpisode, learned
 from fireworld.training.log.reader import Part, TrainingLog
-from fireworld.training.log.records import TERM_NAMES, Episode, TrainingHeader, Tried, Updates
+from fireworld.training.log.records import TERM_NAMES, Episode, TrainingHeader, Tried, Updates, part_number
 from fireworld.training.method import Method, Trainer
 from fireworld.training.methods.sarsa import Progress, SarsaTrainer
 
@@ -79,12 +79,14 @@ class FirstDifference:
     entries: tuple[tuple[int, int, str, float, float], ...] = ()
     n_entries: int = 0
     world: int | None = None
+    unit: str = "episode"
+    """What a part is."""
 
     @property
     def where(self) -> str:
         """The place, as in "train-3, episode 41, step 17"."""
         world = "" if self.world is None else f"world {self.world}, "
-        names = [f"{self.scenario}, {world}episode {self.number}" if self.scenario else f"generation {self.number}"]
+        names = [f"{self.scenario}, {world}episode {self.number}" if self.scenario else f"{self.unit} {self.number}"]
         return ", ".join([*names, *([f"step {self.step}"] if self.step is not None else [])])
 
     @property
@@ -131,15 +133,23 @@ def _place(
     return FirstDifference(
         part=number,
         scenario=of.scenarios[record.scenario].name if is_episode else "",
-        number=record.episode if is_episode else getattr(record, "generation", number),
+        number=part_number(record),
         phase=phase,
         what=what,
+        unit=of.header.unit,
         **rest,
     )
 
 
-PHASE_OF: Final = {"fire": "draw", "seed": "draw", "weights": "draw", "scores": "choose"}
-"""Of what a search holds; the rest is known at the end of a generation."""
+PHASE_OF: Final = {
+    "fire": "draw",
+    "seed": "draw",
+    "weights": "draw",
+    "scores": "choose",
+    "score": "choose",
+    "numbers": "learn",
+}
+"""Of what a generation or a lesson holds; the rest is known at its end."""
 
 
 def _in_generation(a: Trained, number: int, record: Any, name: str, x: Any, y: Any) -> FirstDifference:

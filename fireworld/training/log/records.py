@@ -217,6 +217,28 @@ class Tried:
 
 
 @dataclass(frozen=True)
+class Lesson:
+    """A lesson in which a network learned to value targets: its fights, and the network after it."""
+
+    topic: ClassVar[str] = "/lesson"
+    lesson: int = value(1, "sfixed32", "its number, from 0")
+    epsilon: float = value(2, "double", "probability of exploring", unit="probability")
+    alpha: float = value(3, "double", "learning rate")
+    score_mean: float = value(4, "double", "of its fights, exploration included, as a share of the maximum")
+    error_mean: float = value(
+        5, "double", "mean size of the last TD error of each brigade in each fight, in percent of the maximal score"
+    )
+    fire: Array = column(6, "sfixed32", "the scenario of each fight, a position in /plan", per="fire")
+    seed: Array = column(7, "fixed64", "of its random draws", per="fire")
+    score: Array = column(8, "double", "at its end, as a share of the maximum", per="fire")
+    n_steps: Array = column(9, "sfixed32", "steps that it took", per="fire")
+    numbers: Array = column(10, "double", "biases and weights of the network after it, layer by layer", per="weight")
+    state_weights: Array = column(
+        11, "double", "what the mean of each thing seen of the targets says of a state, after it", per="weight"
+    )
+
+
+@dataclass(frozen=True)
 class PartCommit:
     """The end of a part, an episode or a generation: without it the part does not count."""
 
@@ -224,6 +246,13 @@ class PartCommit:
     step: int = value(1, "sfixed32", "number of the part, from 0")
     done: bool = value(2, "bool", "the training is at its end")
     hash: bytes = value(3, "bytes", "32 bytes, chained to the commit before: the digest of the training up to here")
+
+
+def part_number(record: Any) -> int:
+    """Return the number that the first record of a part has: of its episode, generation or lesson; else 0."""
+    return int(
+        next((getattr(record, name) for name in ("episode", "generation", "lesson") if hasattr(record, name)), 0)
+    )
 
 
 def check_places(record: Any, n_brigades: Sequence[int]) -> None:
@@ -236,7 +265,8 @@ def check_places(record: Any, n_brigades: Sequence[int]) -> None:
     Raises:
         LogError: it is not.
     """
-    places = {Episode: ("scenario", "seed"), Played: ("scenario", "seed"), Tried: ("fire", "seed")}
+    fights = ("fire", "seed")
+    places = {Episode: ("scenario", "seed"), Played: ("scenario", "seed"), Tried: fights, Lesson: fights}
     fires = places.get(type(record))
     if fires is None:
         return
@@ -247,6 +277,10 @@ def check_places(record: Any, n_brigades: Sequence[int]) -> None:
         raise LogError(f"{record.topic}: {fires[1]}: {int(seed.max())} is above {RUN_SEED_MAX}, the largest of a run")
     if isinstance(record, Played):
         check_played(record, n_brigades[record.scenario])
+    if isinstance(record, Lesson) and not len(record.fire) == len(record.seed) == len(record.score) == len(
+        record.n_steps
+    ):
+        raise LogError(f"{record.topic}: its columns are not of the same fights")
     if isinstance(record, Tried) and not _fits(record):
         raise LogError(f"{record.topic}: its columns are not of the same rankings, weights and fires")
 
@@ -267,7 +301,7 @@ TRAINING: Final = LogKind(
     header_type=TrainingHeader,
     commit_type=PartCommit,
     first_type=Plan,
-    topics=(Plan, Episode, Tables, Updates, Tried, Played, PartCommit),
+    topics=(Plan, Episode, Tables, Updates, Tried, Lesson, Played, PartCommit),
     unchained=frozenset({Tables.topic, Updates.topic}),
     unit="part",
     rescue="--resume to continue, or --force to begin again",

@@ -11,7 +11,7 @@ import numpy as np
 
 from fireworld.training.log.played import Played
 from fireworld.training.log.reader import Part
-from fireworld.training.log.records import Episode, Tables
+from fireworld.training.log.records import Episode, Tables, part_number
 
 LAST: Final = 20
 """Episodes at the end of a scenario over which return and score are averaged: as many as a policy must settle for."""
@@ -111,7 +111,7 @@ def _line(part: Part) -> tuple[int, int, tuple[float, float, float]]:
         score = record.score / record.score_max if record.score_max else 0.0
         return record.scenario, record.episode, (record.total_reward, score, float(record.n_steps))
     score = float(getattr(record, "score_mean", np.nan))
-    return -1, int(getattr(record, "generation", 0)), (np.nan, score, np.nan)
+    return -1, part_number(record), (np.nan, score, np.nan)
 
 
 def _means(side: Mapping[int, tuple[float, float, float]]) -> tuple[float, ...]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from typing import Any, Final
 
 from fireworld.shown import SHOWN_MAX, Block, TextTable
 from fireworld.training.log.played import Played
 from fireworld.training.log.reader import TrainingLog
-from fireworld.training.log.records import FORMAT, Episode
+from fireworld.training.log.records import FORMAT, Episode, Lesson, Tried
 from fireworld.training.log.spread import LAST
 from fireworld.version import simulator_version
 
@@ -92,6 +92,23 @@ def played_in_scenarios(log: TrainingLog) -> Iterator[dict[str, Any]]:
             }
 
 
+COLUMNS: Final[Mapping[type[Any], Mapping[str, tuple[str, str]]]] = {
+    Tried: {
+        "generation": ("generation", "d"),
+        "score": ("score_mean", ".3f"),
+        "of the best": ("score_best", ".3f"),
+        "spread": ("spread_mean", ".2f"),
+    },
+    Lesson: {
+        "lesson": ("lesson", "d"),
+        "epsilon": ("epsilon", ".3f"),
+        "score": ("score_mean", ".3f"),
+        "TD error": ("error_mean", ".2f"),
+    },
+}
+"""What is shown of parts that are of no one scenario: by heading, the field and how it is written."""
+
+
 def describe_training(log: TrainingLog, *, limit: int = SHOWN_MAX) -> Iterator[Block]:
     """Yield what there is to see of a training: its header, then a table of its scenarios or generations."""
     found = training_summary(log)
@@ -121,12 +138,9 @@ def describe_training(log: TrainingLog, *, limit: int = SHOWN_MAX) -> Iterator[B
             yield from ("", NOTE_PLAYED)
     elif len(log):
         yield ""
-        table = [
-            [str(line.generation), f"{line.score_mean:.3f}", f"{line.score_best:.3f}", f"{line.spread_mean:.2f}"]
-            for line in log.lines[-limit:]
-            if hasattr(line, "generation")
-        ]
-        yield TextTable(["generation", "score", "of the best", "spread"], table)
+        columns = COLUMNS.get(type(log.lines[0]), {})
+        table = [[format(getattr(line, name), how) for name, how in columns.values()] for line in log.lines[-limit:]]
+        yield TextTable([*columns], table)
 
 
 def played_cells(row: dict[str, Any]) -> list[str]:

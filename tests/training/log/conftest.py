@@ -12,6 +12,7 @@ from fireworld.training.train import train
 from tests.training.conftest import TINY
 
 SHORT = {"n_episodes_max": 6, "n_episodes_unchanged": 3}
+SHORT_TARGETS = {"n_lessons": 3, "n_fights": 5, "n_steps_max": 10, "hidden": 4}
 SHORT_SEARCH = {"n_generations": 3, "n_candidates": 4, "n_best": 2, "n_fires": 2, "n_steps_max": 10}
 
 
@@ -33,7 +34,7 @@ def make_log(curriculum, tmp_path_factory):
     folder, made = tmp_path_factory.mktemp("trainings"), {}
 
     def make(method="paper", seed=1, **settings):
-        short = SHORT if method == "paper" else SHORT_SEARCH
+        short = {"paper": SHORT, "search": SHORT_SEARCH, "targets": SHORT_TARGETS}[method]
         key = repr((method, seed, sorted(settings.items())))
         if key not in made:
             path = folder / f"{len(made)}.mcap"

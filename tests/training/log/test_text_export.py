@@ -13,7 +13,7 @@ from fireworld.training.log.export import table_arrays, tables_of
 from fireworld.training.log.reader import open_training
 
 
-@pytest.mark.parametrize("method", ["paper", "search"])
+@pytest.mark.parametrize("method", ["paper", "search", "targets"])
 def test_rows_are_those_of_the_log(here, fireworld, make_log, method):
     path = make_log(method)
     log = open_training(path)
@@ -31,10 +31,12 @@ def test_rows_are_those_of_the_log(here, fireworld, make_log, method):
         assert len(rows) == n_lines == json.loads(done.out)["n_rows"][name] > 0
     documented = (here / "tables" / "columns.csv").read_text()
     assert method != "paper" or "episodes,scenario,,name of its scenario" in documented
-    wanted = (
-        "episodes,epsilon,probability,probability of exploring" if method == "paper" else "generations,score_mean,,"
-    )
-    assert wanted in documented
+    wanted = {
+        "paper": "episodes,epsilon,probability,probability of exploring",
+        "search": "generations,score_mean,,",
+        "targets": "lessons,epsilon,probability,probability of exploring",
+    }
+    assert wanted[method] in documented
 
 
 @pytest.mark.parametrize("words", [("--csv", "out"), ("--jsonl", "out")])
@@ -51,7 +53,7 @@ def test_mistakes_of_the_command_line(here, fireworld, make_log, words):
 
 
 @pytest.mark.parametrize("library", ["pandas", "polars"])
-@pytest.mark.parametrize("method", ["paper", "search"])
+@pytest.mark.parametrize("method", ["paper", "search", "targets"])
 def test_data_frames(make_log, library, method):
     pytest.importorskip(library)
     log = open_training(make_log(method))
