@@ -242,12 +242,16 @@ def test_arguments_are_checked_first(words, name, tmp_path):
 def test_times_of_trials():
     timing = Timing(2)
     assert timing.text == ""
-    timing.add([3.0, 2.0, 2.0, 1.0], 4.4)
-    timing.add([1.0], 1.1)
-    assert timing.predicted(1) == timing.total == 9.0
+    timing.add([6.0, 4.0, 4.0, 2.0], [3.0, 2.0, 2.0, 1.0], 8.8)
+    timing.add([2.0], [1.0], 2.2)
+    assert timing.total == 18.0
+    assert timing.predicted(1) == 9.0
     assert timing.predicted(2) == 4.0 + 1.0
     assert timing.predicted(64) == 3.0 + 1.0, "the parts wait for one another"
-    assert "5 trials took 9 s added up, 4 s for each of 2 workers; all of it took 6 s, 1.22 times" in timing.text
+    assert (
+        "5 trials took 18 s added up (9 s of computing), 9 s for each of 2 workers; all of it took 11 s, 1.22 times"
+        in timing.text
+    )
     assert longest_first([], 3) == 0.0
 
 

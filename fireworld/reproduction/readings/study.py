@@ -204,19 +204,20 @@ class Trials:
             Interrupted: all were asked to stop.
             OutputError, ExecutorError: as for `try_readings`.
         """
-        runs, workers, begun, seconds = self._runs, self._workers, time.perf_counter(), list[float]()
+        runs, workers, begun, made = self._runs, self._workers, time.perf_counter(), list[Tried]()
         left = [key for key in keys if key not in runs.found]
         trials = [Trial(self._settings[n], training, self._seeds, workers.stop) for n, training in left]
         self._on_progress(what, len(keys) - len(left), len(keys))
 
         def on_result(place: int, tried: Tried) -> None:
             runs.add(left[place], self._seeds, tried.shares)
-            seconds.append(tried.seconds)
+            made.append(tried)
             self._on_progress(what, sum(key in runs.found for key in keys), len(keys))
 
         if workers.run(trials, on_result) is None:
             raise Interrupted("interrupted")
-        self.timing.add(seconds, time.perf_counter() - begun)
+        elapsed = time.perf_counter() - begun
+        self.timing.add([one.seconds for one in made], [one.computing for one in made], elapsed)
         found: dict[int, list[Any]] = {}
         for n, training in keys:
             found.setdefault(n, []).append(runs.found[n, training])

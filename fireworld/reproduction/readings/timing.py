@@ -19,16 +19,19 @@ class Timing:
     Attributes:
         n_workers: trials at a time.
         parts: seconds of each trial, in the parts of the study, which wait for one another.
+        computing: likewise, the seconds in which it had a core.
         elapsed: seconds that all parts took.
     """
 
     n_workers: int = 1
     parts: list[list[float]] = field(default_factory=list)
+    computing: list[list[float]] = field(default_factory=list)
     elapsed: float = 0.0
 
-    def add(self, seconds: Iterable[float], elapsed: float) -> None:
+    def add(self, seconds: Iterable[float], computing: Iterable[float], elapsed: float) -> None:
         """Note a part of the study."""
         self.parts.append([*seconds])
+        self.computing.append([*computing])
         self.elapsed += elapsed
 
     @property
@@ -37,8 +40,8 @@ class Timing:
         return math.fsum(one for part in self.parts for one in part)
 
     def predicted(self, n_workers: int) -> float:
-        """Return the seconds on so many workers: in each part the longest trial first, to whoever is free first."""
-        return math.fsum(longest_first(part, n_workers) for part in self.parts)
+        """Return the seconds on so many workers that have a core each: in each part the longest trial first."""
+        return math.fsum(longest_first(part, n_workers) for part in self.computing)
 
     @property
     def text(self) -> str:
@@ -46,10 +49,12 @@ class Timing:
         if not self.total:
             return ""
         share, n = self.total / self.n_workers, sum(map(len, self.parts))
+        computing = math.fsum(one for part in self.computing for one in part)
         return (
-            f"{n} trials took {self.total:.0f} s added up, {share:.0f} s for each of {self.n_workers} workers; "
-            f"all of it took {self.elapsed:.0f} s, {self.elapsed / share:.2f} times as long. On {MANY} workers as fast "
-            f"it would take {self.predicted(MANY):.0f} s: predicted from these times, the longest trial first."
+            f"{n} trials took {self.total:.0f} s added up ({computing:.0f} s of computing), {share:.0f} s for each of "
+            f"{self.n_workers} workers; all of it took {self.elapsed:.0f} s, {self.elapsed / share:.2f} times as long. "
+            f"On {MANY} workers with a core each it would take {self.predicted(MANY):.0f} s: predicted from the "
+            "computing of each trial, the longest first."
         )
 
 

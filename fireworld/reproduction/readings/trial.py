@@ -35,10 +35,12 @@ class Tried:
     Attributes:
         shares: for every seed, the share of the greatest score, mean over the tests, with and without cooperation.
         seconds: how long it took.
+        computing: seconds of that in which it had a core; the rest it waited for others.
     """
 
     shares: list[tuple[float, float]]
     seconds: float
+    computing: float
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,7 @@ class Trial:
 
     def __call__(self) -> Tried:
         """Train and test both teams."""
-        begun = time.perf_counter()
+        begun, computed = time.perf_counter(), time.thread_time()
         cities, method = CityCache(self.setting.files), self.setting.method
         together, alone = self._train(method, cities)
         shares = np.zeros((len(self.seeds), 2))
@@ -121,7 +123,8 @@ class Trial:
             for place, seed in enumerate(self.seeds):
                 shares[place] += self._share(built, together, method, seed), self._share(built, alone, method, seed)
         shares /= len(self.setting.tests)
-        return Tried([(float(one), float(other)) for one, other in shares], time.perf_counter() - begun)
+        pairs = [(float(one), float(other)) for one, other in shares]
+        return Tried(pairs, time.perf_counter() - begun, time.thread_time() - computed)
 
     def _train(self, method: Sarsa, cities: CityCache) -> tuple[Any, Any]:
         """Return the tables of the cooperative team, and of the one without cooperation."""
