@@ -157,7 +157,7 @@ def test_intervals_of_a_reading_hold_what_is_true_in_95_of_100_studies(n_trainin
 @pytest.mark.parametrize("n_trainings", [1, 2])
 def test_of_two_trainings_no_interval_can_be_told(n_trainings):
     one = over_trainings(np.full((n_trainings, 10), 0.5))
-    assert one.text() == "+0.50 [cannot be told]"
+    assert one.text() == "+0.50 [no interval]"
     assert not one.can_tell
     assert not one.above_zero
     assert not one.below_zero

@@ -11,7 +11,7 @@ from fireworld.draws import below
 from fireworld.kernels.arrays import Array
 
 TRAININGS_LEAST: Final = 3
-"""Trainings of a reading from which its interval can be told."""
+"""Trainings of a reading from which it has an interval."""
 N_PERMUTATIONS: Final = 2000
 _PERMUTE: Final = 1001
 """Purpose of the draws of this module."""
@@ -31,7 +31,7 @@ class Effect:
 
     @property
     def can_tell(self) -> bool:
-        """Whether there is enough to tell an interval."""
+        """Whether there is enough for an interval."""
         return math.isfinite(self.high)
 
     @property
@@ -47,7 +47,7 @@ class Effect:
     def text(self) -> str:
         """Return it for people: "+0.14 [-0.04, +0.31]"."""
         if not self.can_tell:
-            return f"{self.mean:+.2f} [cannot be told]"
+            return f"{self.mean:+.2f} [no interval]"
         return f"{self.mean:+.2f} [{self.low:+.2f}, {self.high:+.2f}]"
 
 

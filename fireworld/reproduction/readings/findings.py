@@ -43,7 +43,7 @@ def _intervals_text(study: ReadingsStudy) -> str:
     found = study.estimates
     if not all(one.can_tell for one in found):
         return (
-            f"Of single readings it cannot be told with {study.size.trainings} trainings of each whether it adds "
+            f"With {study.size.trainings} trainings of each nobody can say of a single reading whether it adds "
             f"anything: that takes {TRAININGS_LEAST} at least."
         )
     above, below = (
