@@ -30,7 +30,7 @@ install: .venv/.installed  ## Make .venv with everything in it, and nothing else
 
 .venv/.installed: .venv/.demo
 	@echo "Installing what develops and tests fireworld, once: another 150 MB are downloaded, .6 GB of disk are taken."
-	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --editable '.[view,figures,gym,minari,dev]'
+	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --editable '.[view,figures,gym,minari,dask,dev]'
 	@touch $@
 
 # No file is a target here: a recording is made anew each time, and half a one never counts as made.
@@ -81,7 +81,7 @@ oldest: .venv-oldest/.installed  ## Run the tests of everything but docs and pac
 
 .venv-oldest/.installed: pyproject.toml constraints-oldest.txt
 	$(PYTHON) -m venv .venv-oldest
-	PIP_CONSTRAINT=constraints-oldest.txt .venv-oldest/bin/python -m pip install --quiet --editable '.[view,film,osm,onnx,archive,gym,minari]' \
+	PIP_CONSTRAINT=constraints-oldest.txt .venv-oldest/bin/python -m pip install --quiet --editable '.[view,film,osm,onnx,archive,gym,minari,dask]' \
 		hypothesis import-linter protobuf pytest pytest-xdist scipy
 	touch $@
 
@@ -94,6 +94,7 @@ docs: install  ## Renew what is made from the code in docs/, and what the comman
 	$(BIN)/python -m tests.docs.foxglove_schema
 	$(BIN)/python -m tests.docs.scenario_reference
 	$(BIN)/python -m tests.docs.contested_table
+	$(BIN)/python -m tests.docs.suites_table
 	$(BIN)/python -m tests.docs.cli_reference
 	$(BIN)/python -m tests.docs.blocks --renew
 

@@ -23,13 +23,18 @@ if TYPE_CHECKING:
     from fireworld.envs.datasets.minari_form import export_minari as export_minari
     from fireworld.envs.datasets.rlds import export_rlds as export_rlds
     from fireworld.errors import FireworldError as FireworldError
+    from fireworld.evaluation.board import Leaderboard as Leaderboard
     from fireworld.evaluation.check_scenarios import check_scenarios as check_scenarios
     from fireworld.evaluation.compare import compare as compare
     from fireworld.evaluation.comparison import Comparison as Comparison
     from fireworld.evaluation.found_fires import NewScenarios as NewScenarios
+    from fireworld.evaluation.leaderboard import leaderboard as leaderboard
     from fireworld.evaluation.new_scenarios import new_scenarios as new_scenarios
     from fireworld.evaluation.scenario_check import ScenarioCheck as ScenarioCheck
     from fireworld.evaluation.scenario_check import ScenarioChecks as ScenarioChecks
+    from fireworld.evaluation.suites import Suite as Suite
+    from fireworld.evaluation.suites import suite as suite
+    from fireworld.evaluation.suites import suites as suites
     from fireworld.maps.exporting import export_city as export_city
     from fireworld.maps.importing import ImportedCity as ImportedCity
     from fireworld.maps.importing import import_city as import_city
@@ -85,6 +90,7 @@ _ROOMS = {
     "Imported": "recording.official_log.imported",
     "ImportedCity": "maps.importing",
     "ImportedOsm": "maps.osm",
+    "Leaderboard": "evaluation.board",
     "NetworkTeam": "policy.teams.network_team",
     "NewScenarios": "evaluation.found_fires",
     "Observation": "policy.protocol",
@@ -96,6 +102,7 @@ _ROOMS = {
     "ScenarioCheck": "evaluation.scenario_check",
     "ScenarioChecks": "evaluation.scenario_check",
     "Session": "simulation.session",
+    "Suite": "evaluation.suites",
     "TableTeam": "policy.teams.table_team",
     "Team": "policy.teams.team",
     "TrainingLog": "training.log.reader",
@@ -113,6 +120,7 @@ _ROOMS = {
     "import_city": "maps.importing",
     "import_log": "recording.official_log.importer",
     "import_osm": "maps.osm",
+    "leaderboard": "evaluation.leaderboard",
     "load_dataset": "envs.datasets.loading",
     "load_team": "policy.teams.team",
     "new_scenarios": "evaluation.new_scenarios",
@@ -126,6 +134,8 @@ _ROOMS = {
     "reproduce": "reproduction.reproduce",
     "run": "recording.record",
     "scenarios": "scenario",
+    "suite": "evaluation.suites",
+    "suites": "evaluation.suites",
     "train": "training.train",
     "try_readings": "reproduction.readings.try_readings",
     "verify": "recording.verify",

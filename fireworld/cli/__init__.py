@@ -21,6 +21,7 @@ COMMANDS: Final = {
     "city": "Import, export and draw cities of real maps.",
     "info": "Show what a recording holds and how far it is good.",
     "compare": "Compare two policies run by run, with a verdict.",
+    "leaderboard": "Rank policies in suites of scenarios that nobody learned in.",
     "diff": "Compare two recordings step by step.",
     "fork": "Branch off from a recorded step.",
     "explain": "Find the decisions that made one run better than another.",

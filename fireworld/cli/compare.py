@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Final
 
@@ -13,7 +12,7 @@ import click
 from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.installed import check_matplotlib
 from fireworld.cli.options import SEED_MAX, executor_of, on_option
-from fireworld.cli.progress import BAR, COUNT, DESCRIPTION, LEFT, bars
+from fireworld.cli.progress import runs_bar
 from fireworld.cli.reporting import check_reporting, print_annotations, reporting_options
 from fireworld.outcome import METRICS
 
@@ -25,7 +24,11 @@ EXIT_CODES: Final = {"not worse": 0, "worse": 1, "cannot tell": 3}
 @click.argument("policy_a", metavar="POLICY_A")
 @click.argument("policy_b", metavar="POLICY_B")
 @click.option(
-    "--scenarios", metavar="NAMES", default=TESTS, show_default=True, help="Shipped names or YAML files, with commas."
+    "--scenarios",
+    metavar="NAMES",
+    default=TESTS,
+    show_default=True,
+    help="Scenarios, suites or YAML files, with commas.",
 )
 @click.option(
     "--seeds", "n_seeds", metavar="N", default=100, show_default=True, type=click.IntRange(1, 10_000),
@@ -84,6 +87,7 @@ def command(
     fireworld compare old.npz new.npz --results runs.parquet   what is known is not run again
     fireworld compare chief my:Policy --gate --margin 0.01     for CI: exit code 1 if worse
     fireworld compare chief random --scenarios quick,own.yaml --seeds 30 --plot difference.png
+    fireworld compare chief my:Policy --scenarios contested,larger --seeds 20   suites: a row each
     fireworld compare chief my:Policy --on dask://head:8786    on a cluster
 
     Policies are named as for `fireworld run --policy`. Both run every scenario with the same seeds, so they see the
@@ -111,7 +115,7 @@ def command(
         check_output(plot, force=force, endings=(".png", ".svg", ".pdf"))
         check_matplotlib("--plot")
     announce_compilation()
-    with _progress(results) as on_run:
+    with runs_bar(results) as on_run:
         comparison = compare(
             [policy_a, policy_b],
             scenarios=[name.strip() for name in scenarios.split(",")],
@@ -140,21 +144,3 @@ def command(
     if annotate:
         print_annotations(comparison.findings(), cannot="warning")
     context.exit(EXIT_CODES[comparison.judgement] if gate else 0)
-
-
-@contextmanager
-def _progress(results: Path | None) -> Iterator[Callable[[int, int], None]]:
-    """Show a bar of the runs that are made, where people watch; say how many are known."""
-    with bars(DESCRIPTION, BAR, COUNT, LEFT) as progress:
-        bar = progress.add_task("runs", total=None)
-        n_known = -1
-
-        def on_run(n_done: int, n_all: int) -> None:
-            nonlocal n_known
-            if n_known < 0:
-                n_known = n_done
-                if n_known:
-                    click.echo(f"{n_known} of {n_all} runs are known from {results}", err=True)
-            progress.update(bar, completed=n_done - n_known, total=n_all - n_known)
-
-        yield on_run

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rich.progress import Progress, ProgressColumn
 
 BAR: Final = "<bar>"
@@ -57,6 +59,30 @@ def bar(what: str, total: int | None, *columns: str, quiet: bool = False) -> Ite
     with bars(*columns, quiet=quiet) as progress:
         task = progress.add_task(what, total=total)
         yield lambda: progress.advance(task)
+
+
+@contextmanager
+def runs_bar(results: Path | None) -> Iterator[Callable[[int, int], None]]:
+    """Show a bar of the runs that are made, and say how many are known.
+
+    Args:
+        results: the file that they are known from, if there is one.
+    """
+    import click
+
+    with bars(DESCRIPTION, BAR, COUNT, LEFT) as progress:
+        bar = progress.add_task("runs", total=None)
+        n_known = -1
+
+        def on_run(n_done: int, n_all: int) -> None:
+            nonlocal n_known
+            if n_known < 0:
+                n_known = n_done
+                if n_known:
+                    click.echo(f"{n_known} of {n_all} runs are known from {results}", err=True)
+            progress.update(bar, completed=n_done - n_known, total=n_all - n_known)
+
+        yield on_run
 
 
 def _column(name: str) -> ProgressColumn:

@@ -1,4 +1,4 @@
-"""`fireworld scenarios`: list the scenarios that come with fireworld, draw, check and find some."""
+"""`fireworld scenarios`: list the scenarios and suites that come with fireworld, draw, check and find some."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from fireworld.cli.scenarios_check import check
 from fireworld.cli.scenarios_new import new
 
 if TYPE_CHECKING:
+    from fireworld.evaluation.suites import Suite
     from fireworld.scenario import Scenario
 
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 @click.option("--json", "as_json", is_flag=True, help="Write JSON instead of a table.")
 @click.pass_context
 def command(context: click.Context, *, as_json: bool) -> None:
-    """List the scenarios that come with fireworld.
+    """List the scenarios that come with fireworld, and the suites of them to measure policies in.
 
     `fireworld scenarios show NAME` draws one, `check` says whether its fire is contested, and `new` finds contested
     fires in a city.
@@ -29,13 +30,14 @@ def command(context: click.Context, *, as_json: bool) -> None:
         if as_json:
             raise click.UsageError("--json goes with the list of scenarios, not with a command below it.")
         return
+    from fireworld.evaluation.suites import suites
     from fireworld.scenario import load_scenario, scenario_names
 
     scenarios = [load_scenario(name) for name in scenario_names()]
     if as_json:
-        click.echo(json.dumps([_summary(scenario) for scenario in scenarios], indent=2))
+        click.echo(json.dumps([*map(_summary, scenarios), *map(_suite_summary, suites())], indent=2))
     else:
-        _print_table(scenarios)
+        _print_table(scenarios, suites())
 
 
 command.add_command(check)
@@ -97,20 +99,41 @@ def _summary(scenario: Scenario) -> dict[str, Any]:
     }
 
 
-def _print_table(scenarios: Sequence[Scenario]) -> None:
-    """Write the list as a table."""
+def _suite_summary(suite: Suite) -> dict[str, Any]:
+    """Return what the list says of a suite."""
+    return {
+        "name": suite.name,
+        "description": suite.description,
+        "n_scenarios": len(suite.scenarios),
+        "digest": suite.digest,
+    }
+
+
+def _print_table(scenarios: Sequence[Scenario], suites: Sequence[Suite]) -> None:
+    """Write the lists as two tables."""
+    rows = []
+    for scenario in scenarios:
+        row = _summary(scenario)
+        city = str(row["city"]).removesuffix(" lots")
+        rows.append((row["name"], city, row["n_brigades"], row["n_civilians"], row["description"]))
+    _print_columns(("name", "city", "brigades", "civilians", "description"), rows)
+    click.echo()
+    of_suites = [(suite.name, len(suite.scenarios), suite.description) for suite in suites]
+    _print_columns(("suite", "scenarios", "description"), of_suites)
+
+
+def _print_columns(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
+    """Write a table: the first column and the last are text, those between them to the right."""
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
     table = Table(box=None, header_style="bold", pad_edge=False)
-    table.add_column("name", no_wrap=True)
-    for heading in ("city", "brigades", "civilians"):
+    first, *middle, last = heads
+    table.add_column(first, no_wrap=True)
+    for heading in middle:
         table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column("description")
-    for scenario in scenarios:
-        row = _summary(scenario)
-        city = str(row["city"]).removesuffix(" lots")
-        cells = (row["name"], city, row["n_brigades"], row["n_civilians"], row["description"])
-        table.add_row(*(Text(str(cell)) for cell in cells))
+    table.add_column(last)
+    for row in rows:
+        table.add_row(*(Text(str(cell)) for cell in row))
     Console(highlight=False).print(table)

@@ -11,14 +11,13 @@ from typing import Any, Final
 from fireworld.arguments import ArgumentError, path_of, settings_of
 from fireworld.errors import expected
 from fireworld.evaluation.comparison import ComparedPolicy, Comparison, find_metric
-from fireworld.evaluation.comparison_runs import ComparisonRuns, RunnablePolicy, runnable
-from fireworld.evaluation.inputs import scenarios_of, seeds_of
+from fireworld.evaluation.comparison_runs import ComparisonRuns, RunnablePolicy, runnable_policies
+from fireworld.evaluation.inputs import AnyScenarios, rows_of, seeds_of
 from fireworld.evaluation.paired import compare_outcomes
 from fireworld.evaluation.results import open_results
-from fireworld.executors import AnyExecutor, in_this_process, workers_for
+from fireworld.executors import AnyExecutor
 from fireworld.interrupt import gentle_interrupt
 from fireworld.policy.names import note_on_team
-from fireworld.scenario import Scenario
 from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.version import simulator_version
 
@@ -29,7 +28,7 @@ N_SEEDS: Final = 100
 def compare(
     policies: Sequence[Any],
     *,
-    scenarios: Sequence[str | Path | Scenario] | str | Path | Scenario = TESTS,
+    scenarios: AnyScenarios = TESTS,
     seeds: int | Sequence[int] = N_SEEDS,
     first_seed: int = 1,
     set: Mapping[str, Any] | None = None,
@@ -48,7 +47,7 @@ def compare(
     Args:
         policies: two or more: the reference (A), and those compared with it (each of them B). Names, files, classes,
             objects, or functions of an observation.
-        scenarios: names, files or Scenario objects.
+        scenarios: names of scenarios or suites, files or Scenario objects; a suite is compared as one.
         seeds: how many seeds, or which.
         first_seed: the first, where only their number is given.
         set: values of scenario keys, as in {"brigades.n": 7}; of all scenarios.
@@ -74,19 +73,13 @@ def compare(
     chosen = find_metric(metric)
     if not isinstance(margin, int | float) or not (math.isfinite(margin) and margin >= 0):
         raise ArgumentError(expected("margin", "", "a number from 0 on", margin))
-    workers_for(executor)
     run_seeds = seeds_of(seeds, first_seed)
     known = open_results(None if results is None else path_of("results", results))
     if not isinstance(policies, Sequence) or isinstance(policies, str) or len(policies) < 2:
         raise ArgumentError(expected("policies", "", 'two or more, as in ["chief", "best"]', policies))
-    found = [runnable(given, place) for place, given in enumerate(policies)]
-    for policy in found:
-        if known.path is not None:
-            policy.named.require_identity("results")
-        if not in_this_process(executor):
-            policy.named.require_found_again("executor")
-    cities = CityCache()
-    built = {name: cities.build(one) for name, one in scenarios_of(scenarios, settings_of(set)).items()}
+    found = runnable_policies(policies, executor, kept=known.path is not None)
+    cities, rows = CityCache(), rows_of(scenarios, settings_of(set))
+    built = {name: cities.build(one) for name, one in rows.scenarios.items()}
     runs = ComparisonRuns(found, built, run_seeds, known)
     with gentle_interrupt(stop) as interrupted:
         runs.make(executor, interrupted, on_run)
@@ -94,20 +87,22 @@ def compare(
     of_reference = runs.outcomes(reference)
     compared = [ComparedPolicy(reference.name, reference.named.identity)]
     for policy in others:
-        pairings = compare_outcomes(of_reference, runs.outcomes(policy), same_policy=policy.key == reference.key)
+        same = policy.key == reference.key
+        pairings = compare_outcomes(of_reference, runs.outcomes(policy), rows=rows.within, same_policy=same)
         compared.append(ComparedPolicy(policy.name, policy.named.identity, tuple(pairings)))
     return Comparison(
         policies=tuple(compared),
-        scenarios=tuple((name, each.scenario.digest) for name, each in built.items()),
+        scenarios=tuple(rows.digests.items()),
+        suites={name: rows.n_scenarios(name) for name in rows.suites},
         seeds=run_seeds,
         version=simulator_version(),
         metric=chosen.name,
         margin=float(margin),
-        warnings=tuple(_warnings(found, built.values())),
+        warnings=tuple(warnings_of(found, built.values())),
     )
 
 
-def _warnings(policies: Iterable[RunnablePolicy], built: Iterable[BuiltScenario]) -> list[str]:
+def warnings_of(policies: Iterable[RunnablePolicy], built: Iterable[BuiltScenario]) -> list[str]:
     """Return how teams are used differently from their training, a line each."""
     found = (
         note_on_team(policy.named, each.scenario.brigades.n, choices=each.scenario.choices)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from html import escape
 from importlib import import_module
 from pathlib import Path
@@ -57,7 +57,7 @@ class Comparison:
     policies: tuple[ComparedPolicy, ...]
     """The reference (A), and one or more others (each of them B)."""
     scenarios: tuple[tuple[str, str], ...]
-    """Name and digest of each."""
+    """Name and digest of each, or of each suite."""
     seeds: Sequence[int]
     version: str
     """Of the simulator."""
@@ -67,6 +67,13 @@ class Comparison:
     """Loss that does not matter, in the metric's unit."""
     warnings: tuple[str, ...] = ()
     """How teams are used differently from their training."""
+    suites: Mapping[str, int] = field(default_factory=dict)
+    """Those of `scenarios` that are suites, and how many scenarios each has."""
+
+    @property
+    def n_scenarios(self) -> int:
+        """Scenarios that were run, those of suites too."""
+        return sum(self.suites.get(name, 1) for name, _ in self.scenarios)
 
     @property
     def each(self) -> list[Comparison]:
@@ -165,7 +172,10 @@ class Comparison:
             "a": a,
             "b": b,
             "same_policy": self.same_policy,
-            "scenarios": [{"name": name, "digest": digest} for name, digest in self.scenarios],
+            "scenarios": [
+                {"name": name, "digest": digest, **({"n_scenarios": self.suites[name]} if name in self.suites else {})}
+                for name, digest in self.scenarios
+            ],
             "first_seed": self.seeds[0],
             "n_seeds": len(self.seeds),
             **({} if in_a_row(self.seeds) else {"seeds": list(self.seeds)}),
@@ -347,7 +357,7 @@ def _sentence(one: Comparison) -> str:
 def _notes(one: Comparison) -> list[str]:
     notes = []
     time = over_all(one.pairings, "time")
-    n_runs = len(one.seeds) * len(one.scenarios)
+    n_runs = len(one.seeds) * one.n_scenarios
     if time.a.n_truncated or time.b.n_truncated:
         notes.append(
             f"the fire was not out at the last step in {time.a.n_truncated} of {n_runs} runs of A and "

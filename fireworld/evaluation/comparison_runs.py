@@ -13,7 +13,7 @@ from typing import Any, Final
 from fireworld.errors import PolicyError
 from fireworld.evaluation.results import Result, Results, RunKey
 from fireworld.evaluation.runs import Outcomes, Row, row_of, run_compiled, run_step_by_step
-from fireworld.executors import AnyExecutor, Workers, n_cores, processes, threads, workers_for
+from fireworld.executors import AnyExecutor, Workers, in_this_process, n_cores, processes, threads, workers_for
 from fireworld.interrupt import Interrupted
 from fireworld.policy.asking import describe
 from fireworld.policy.importing import make_policy
@@ -52,6 +52,23 @@ def runnable(given: Any, place: int) -> RunnablePolicy:
         name=name,
         key=named.identity or f"policy {place}",
     )
+
+
+def runnable_policies(policies: Sequence[Any], executor: AnyExecutor, *, kept: bool) -> list[RunnablePolicy]:
+    """Find policies, and check that they can be run by an executor and, if they are `kept`, named in a results file.
+
+    Raises:
+        PolicyError, TrainingError: a policy that cannot be found, made, named in results or sent to processes.
+        ExecutorError: an executor that is none.
+    """
+    workers_for(executor)
+    found = [runnable(given, place) for place, given in enumerate(policies)]
+    for policy in found:
+        if kept:
+            policy.named.require_identity("results")
+        if not in_this_process(executor):
+            policy.named.require_found_again("executor")
+    return found
 
 
 @dataclass(frozen=True)

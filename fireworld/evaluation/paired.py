@@ -1,8 +1,8 @@
 """Two policies on the same scenarios and seeds, compared run by run: differences, verdicts, and the gate made of them.
 
 B is the new policy, A the reference; every difference is B - A. Both see the same random draws (common random numbers),
-so the pairs of runs are what is resampled. Over all scenarios, a seed is drawn with its runs in all of them: every
-scenario keeps its share of each resample, and what the runs of one seed have in common stays together.
+so the pairs of runs are what is resampled. Over all scenarios, or those of a suite, a seed is drawn with its runs in
+all of them: every scenario keeps its share of each resample, and what the runs of one seed share stays together.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ class Side:
 
 @dataclass(frozen=True, eq=False)
 class Pairing:
-    """One metric in one scenario, or over all."""
+    """One metric in one scenario or suite, or over all."""
 
-    scenario: str | None  # None: over all
+    scenario: str | None  # or suite; None: over all
     metric: Metric
     a: Side
     b: Side
-    differences: Array  # (n_seeds,) B - A; over all: mean over the scenarios
+    differences: Array  # (n_seeds,) B - A; of a suite or over all: mean over the scenarios
     difference: Estimate
     improvement: Estimate
     """Probability that a run of B is better than its pair; a tie counts as half."""
@@ -158,13 +158,30 @@ class Pairing:
 
 
 def compare_outcomes(
-    of_a: Mapping[str, Outcomes], of_b: Mapping[str, Outcomes], *, same_policy: bool = False
+    of_a: Mapping[str, Outcomes],
+    of_b: Mapping[str, Outcomes],
+    *,
+    rows: Mapping[str, Sequence[str]] | None = None,
+    same_policy: bool = False,
 ) -> list[Pairing]:
-    """Compare the runs of two policies, by scenario and of the same seeds: in each scenario, then over all."""
-    everything: list[tuple[str | None, list[str]]] = [*((name, [name]) for name in of_a), (None, list(of_a))]
+    """Compare the runs of two policies, of the same seeds: in each row, then over all, where every row counts the same.
+
+    Args:
+        of_a: the runs of A, by scenario.
+        of_b: the runs of B.
+        rows: the scenarios of each row; None: one in each.
+        same_policy: A and B are one.
+    """
+    each = {name: [name] for name in of_a} if rows is None else rows
+    everything = [*((name, [within]) for name, within in each.items()), (None, [*each.values()])]
     return [
-        _pair(scenario, metric, *([of[name] for name in within] for of in (of_a, of_b)), same_policy=same_policy)
-        for scenario, within in everything
+        _pair(
+            row,
+            metric,
+            *([[of[name] for name in within] for within in groups] for of in (of_a, of_b)),
+            same_policy=same_policy,
+        )
+        for row, groups in everything
         for metric in METRICS
     ]
 
@@ -188,27 +205,39 @@ def judge(pairing: Pairing, *, margin: float = 0.0) -> Judgement:
 
 
 def _pair(
-    scenario: str | None, metric: Metric, of_a: Sequence[Outcomes], of_b: Sequence[Outcomes], *, same_policy: bool
+    row: str | None,
+    metric: Metric,
+    of_a: Sequence[Sequence[Outcomes]],
+    of_b: Sequence[Sequence[Outcomes]],
+    *,
+    same_policy: bool,
 ) -> Pairing:
+    """Compare one metric over groups of scenarios, each of which counts the same."""
     values_a, values_b = (
-        [getattr(outcomes, metric.attribute).astype(np.float64) for outcomes in side] for side in (of_a, of_b)
+        [[getattr(outcomes, metric.attribute).astype(np.float64) for outcomes in group] for group in side]
+        for side in (of_a, of_b)
     )
-    mean_a, mean_b = _over_scenarios(values_a), _over_scenarios(values_b)
+    mean_a, mean_b = _over_groups(values_a), _over_groups(values_b)
     chances = [
-        np.where(gain > 0.0, 1.0, np.where(gain == 0.0, 0.5, 0.0))
-        for gain in (metric.gain(b - a) for a, b in zip(values_a, values_b, strict=True))
+        [_chance(metric.gain(b - a)) for a, b in zip(group_a, group_b, strict=True)]
+        for group_a, group_b in zip(values_a, values_b, strict=True)
     ]
     return Pairing(
-        scenario=scenario,
+        scenario=row,
         metric=metric,
         a=_side(of_a, values_a),
         b=_side(of_b, values_b),
         differences=(mean_b - mean_a)[0],
         difference=paired_difference(mean_b, mean_a),
-        improvement=estimate(_over_scenarios(chances)),
+        improvement=estimate(_over_groups(chances)),
         same_policy=same_policy,
         pairing_worth=_pairing_worth(mean_a[0], mean_b[0]),
     )
+
+
+def _chance(gain: Array) -> Array:
+    """Return for each pair whether B is better: 1, or 0; a half where it is equal."""
+    return np.where(gain > 0.0, 1.0, np.where(gain == 0.0, 0.5, 0.0))
 
 
 def _pairing_worth(a: Array, b: Array) -> float | None:
@@ -223,13 +252,20 @@ def _squares(values: Array) -> float:
     return math.fsum(((values - middle) ** 2).tolist())
 
 
-def _side(outcomes: Sequence[Outcomes], values: Sequence[Array]) -> Side:
-    pooled = np.concatenate(values)
-    n_truncated = sum(int(np.count_nonzero(~each.completed)) for each in outcomes)
-    return Side(mean=mean(pooled), interquartile_mean=interquartile_mean(pooled), n_truncated=n_truncated)
+def _side(groups: Sequence[Sequence[Outcomes]], values: Sequence[Sequence[Array]]) -> Side:
+    pooled = np.concatenate([each for group in values for each in group])
+    n_truncated = sum(int(np.count_nonzero(~each.completed)) for group in groups for each in group)
+    alike = len({len(group) for group in groups}) == 1
+    middle = mean(pooled) if alike else mean(_over_groups(values))
+    return Side(mean=middle, interquartile_mean=interquartile_mean(pooled), n_truncated=n_truncated)
 
 
-def _over_scenarios(values: Sequence[Array]) -> Array:
-    """Return the mean over scenarios, seed by seed: (1, n_seeds)."""
+def _over_groups(groups: Sequence[Sequence[Array]]) -> Array:
+    """Return the mean over groups of the means over their scenarios, seed by seed: (1, n_seeds)."""
+    return _middle([_middle(group) for group in groups])[np.newaxis]
+
+
+def _middle(values: Sequence[Array]) -> Array:
+    """Return the mean of arrays of one shape."""
     total: Array = reduce(add, values) / len(values)
-    return total[np.newaxis]
+    return total

@@ -7,8 +7,10 @@ resample of the bootstrap, repetitions and seeds apart from each other, because 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, reduce
+from operator import add
 from typing import Final
 
 import numpy as np
@@ -60,22 +62,36 @@ def estimate(values: Array) -> Estimate:
 
     Values are (repetitions, seeds), a column for the runs of one seed; (1, seeds) for what does not learn.
     """
-    table = np.asarray(values, dtype=np.float64)
+    return estimate_over([values])
+
+
+def estimate_over(tables: Sequence[Array]) -> Estimate:
+    """Estimate the mean of the means of tables, each of which counts the same, as `estimate` does of one.
+
+    Tables of one shape are resampled alike: what is in one row, or under one seed, stays together.
+    """
+    found = [np.asarray(values, dtype=np.float64) for values in tables]
+    means = np.sort(reduce(add, map(_resampled_means, found)) / len(found))
+    middle = math.fsum(map(mean, found)) / len(found)
+    return Estimate(
+        mean=middle,
+        low=min(float(means[_TAIL]), middle),  # equal values have an interval of no width: rounding must not shift it
+        high=max(float(means[-1 - _TAIL]), middle),
+        interquartile_mean=interquartile_mean(np.concatenate([table.ravel() for table in found])),
+        n_repetitions=max(table.shape[0] for table in found),
+        n_seeds=min(table.shape[1] for table in found),
+    )
+
+
+def _resampled_means(table: Array) -> Array:
+    """Return the mean of every resample of (repetitions, seeds): (N_RESAMPLES,)."""
     n_repetitions, n_seeds = table.shape
     rows, columns = _resampled(n_repetitions, _REPETITIONS), _resampled(n_seeds, _SEEDS)
     total = np.zeros(N_RESAMPLES)
     for row in rows:  # one after another, so that every machine adds in the same order
         for column in columns:
             total += table[row, column]
-    means, middle = np.sort(total / table.size), mean(table)
-    return Estimate(
-        mean=middle,
-        low=min(float(means[_TAIL]), middle),  # equal values have an interval of no width: rounding must not shift it
-        high=max(float(means[-1 - _TAIL]), middle),
-        interquartile_mean=interquartile_mean(table),
-        n_repetitions=n_repetitions,
-        n_seeds=n_seeds,
-    )
+    return total / table.size
 
 
 def mean(values: Array) -> float:

@@ -200,11 +200,16 @@ def _build(document: Any, *, source: str, path: Path) -> Curriculum:
         if stages and stages[-1].cooperation and not text.cooperation:
             wanted = "true, as in the stage before: what was learned with cooperation has no place without"
             raise TrainingError(expected(where, "cooperation", wanted, "false"))
-        stages.append(_build_stage(text, where=where, folder=path.parent))
+        stages.append(build_stage(text, where=where, folder=path.parent))
     return Curriculum(name=text_of(path.stem), stages=tuple(stages))
 
 
-def _build_stage(stage: StageText, *, where: str, folder: Path) -> CurriculumStage:
+def build_stage(stage: StageText, *, where: str, folder: Path) -> CurriculumStage:
+    """Load the scenarios of a stage, or make the variations; paths are relative to the folder.
+
+    Raises:
+        TrainingError: a stage that makes no sense, or a scenario that cannot be had, at this place.
+    """
     if bool(stage.scenarios) == (stage.base is not None):
         got = "both" if stage.scenarios else "neither"
         raise TrainingError(expected(where, "", "either `scenarios` or `base`", got))

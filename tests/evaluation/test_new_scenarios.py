@@ -338,7 +338,7 @@ def test_a_city_where_nothing_burns(tmp_path):
 def test_the_shipped_curricula_begin_as_they_are_made_today():
     """All of them are made again by `python -m benchmarks.contested --check`."""
     text = (shipped.FOLDER / "contested.yaml").read_text()
-    first = next(shipped.contested_fires(5000))
+    first = next(shipped.fires_of_city(5000))
     entries = [line.removeprefix("      - ") for line in text.splitlines() if line.startswith("      - ")]
     assert shipped.settings(first) == entries[0]
     assert shipped.settings(first, times=shipped.LARGER) == entries[80]

@@ -17,6 +17,7 @@ from fireworld.city.city import City, StreetMap
 from fireworld.city.generator import generate_plan
 from fireworld.city.streets import streets_of
 from fireworld.kernels.observation import observe
+from fireworld.kernels.ranking import N_WEIGHTS
 from fireworld.parameters import PAPER
 from fireworld.policy.kernel import always, at_random, each_another, from_rankings, from_tables
 from fireworld.policy.teams.network_layers import SEEN
@@ -45,7 +46,7 @@ POLICIES = {
     "kept choices": from_tables(RANDOM.random((2, 4320, 4)), epsilon=0.5, commit=3),
     "ranking of named": from_rankings(RANDOM.normal(size=(2, 17)), own_targets=False),
     "ranking of all": from_rankings(RANDOM.normal(size=(2, 17)), own_targets=True),
-    "network of named": make_network(17, 9, 6, 1, features=SEEN).policy(),
+    "network of named": make_network(17, 9, 6, 1, features=SEEN[:N_WEIGHTS]).policy(),
     "network of all": make_network(activation="relu", own_targets=True).policy(),
 }
 

@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 from fireworld.cli.scenarios import command
 from fireworld.errors import FireworldError, OutputError, ScenarioError
+from fireworld.evaluation.suites import suite, suite_names
 from fireworld.scenario import load_scenario, parse_scenario, scenario_names
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -23,7 +24,7 @@ def call(*words):
 def test_the_list_names_every_scenario():
     code, text = call()
     assert code == 0
-    for name in scenario_names():
+    for name in (*scenario_names(), *suite_names()):
         assert f"\n{name} " in text
     assert "24 x 26 " in text
 
@@ -32,7 +33,13 @@ def test_the_list_as_json():
     code, text = call("--json")
     rows = {row["name"]: row for row in json.loads(text)}
     assert code == 0
-    assert list(rows) == scenario_names()
+    assert list(rows) == [*scenario_names(), *suite_names()]
+    assert rows["larger"] == {
+        "name": "larger",
+        "description": suite("larger").description,
+        "n_scenarios": 20,
+        "digest": suite("larger").digest,
+    }
     assert rows["test-2-brigades-8"] == {
         "name": "test-2-brigades-8",
         "description": "City centre, hard fire, civilians all around, eight brigades.",

@@ -336,6 +336,11 @@ TABLE_1 = {
     "test-3-brigades-8": (11, 9, 8),
 }
 """Burning buildings, civilians, brigades."""
+LIKE_THE_PAPERS = {
+    name.replace("train-", "paper-train-").replace("test-", "paper-"): (2 * n_burning, n_civilians, n_brigades)
+    for name, (n_burning, n_civilians, n_brigades) in TABLE_1.items()
+}
+"""The same in a world like the paper's."""
 
 
 @pytest.mark.parametrize("name", TABLE_1)
@@ -349,8 +354,18 @@ def test_the_papers_scenarios(name):
     assert (generated.columns, generated.rows, generated.lot_m, generated.block) == (24, 26, 14.0, (3, 2))
 
 
+@pytest.mark.parametrize("name", LIKE_THE_PAPERS)
+def test_scenarios_in_a_world_like_the_papers(name):
+    scenario = load_scenario(name)
+    found = scenario.fires[0].n_buildings, scenario.civilians.n, scenario.brigades.n
+    assert found == LIKE_THE_PAPERS[name]
+    generated = scenario.city.generated
+    assert (generated.street_m, generated.fill, generated.seed) == (16.0, (0.6, 0.85), 167)
+    assert (scenario.civilians.from_m, scenario.civilians.to_m) == (90, 220)
+
+
 def test_the_shipped_scenarios_are_complete_and_described():
-    assert set(scenario_names()) == {*TABLE_1, "default", "quick"}
+    assert set(scenario_names()) == {*TABLE_1, *LIKE_THE_PAPERS, "default", "quick"}
     for name in scenario_names():
         description = load_scenario(name).description
         assert 10 < len(description) < 90
