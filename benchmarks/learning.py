@@ -22,8 +22,10 @@ if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))  # to be called by its path
 
 from benchmarks.learning_fires import Fires, fires_by_group, shares  # noqa: E402
-from benchmarks.learning_teams import FULL, QUICK, Contestant, contestants  # noqa: E402
+from benchmarks.learning_teams import FULL, QUICK, Contestant, Trained, contestants  # noqa: E402
+from fireworld.cli.options import executor_of, on_option  # noqa: E402
 from fireworld.evaluation.statistics import Estimate, estimate, paired_difference  # noqa: E402
+from fireworld.executors import AnyExecutor  # noqa: E402
 from fireworld.kernels.arrays import Array  # noqa: E402
 from fireworld.simulation.built import CityCache  # noqa: E402
 
@@ -58,15 +60,19 @@ class Scores:
         return self.shares.mean(axis=2) if per_fire else self.shares.mean(axis=1)
 
 
-def measure(contestant: Contestant, fires: Fires, seeds: range, folder: Path) -> dict[str, Scores]:
+def measure(
+    contestant: Contestant, fires: Fires, seeds: range, folder: Path, executor: AnyExecutor = None
+) -> dict[str, Scores]:
     """Train and test a contestant, or fetch what was measured before."""
     found = {}
+    if isinstance(contestant.make, Trained):
+        contestant.make.prepare(range(1, contestant.n + 1))
     for group, stages in fires.items():
         path = folder / f"{contestant.name}-{group}.npy"
         if not path.exists():
             n_seeds = None if group == "tests" else contestant.n_seeds
             teams = [contestant.make(number, group) for number in range(1, contestant.n + 1)]
-            np.save(path, np.array([shares(stages, team, seeds[:n_seeds]) for team in teams]))
+            np.save(path, np.array([shares(stages, team, seeds[:n_seeds], executor) for team in teams]))
         found[group] = Scores(np.load(path))
     return found
 
@@ -137,7 +143,11 @@ def page_with(text: str, made: str) -> str:
 )
 @click.option("--write", is_flag=True, help="Renew docs/science.md.")
 @click.option("--only", metavar="NAME", multiple=True, help="Train and test these alone; no tables.")
-def main(*, quick: bool, keep: Path | None, write: bool, only: tuple[str, ...]) -> None:
+@click.option("--jobs", metavar="N", type=click.IntRange(1, 1000), help="Trainings or runs at a time.  [default: 2]")
+@on_option
+def main(
+    *, quick: bool, keep: Path | None, write: bool, only: tuple[str, ...], jobs: int | None, on: str | None
+) -> None:
     """Run the experiments."""
     if write and quick:
         raise click.UsageError("--write: a quick run has nothing to say.")
@@ -145,15 +155,15 @@ def main(*, quick: bool, keep: Path | None, write: bool, only: tuple[str, ...]) 
         folder = keep or Path(passing)
         (folder / "teams").mkdir(parents=True, exist_ok=True)
         (folder / "scores").mkdir(exist_ok=True)
-        cities = CityCache()
+        cities, executor = CityCache(), executor_of(on, jobs)
         fires = fires_by_group(cities, n_fires=4 if quick else None)
         seeds = range(FIRST_SEED, FIRST_SEED + (2 if quick else 20))
-        teams = contestants(QUICK if quick else FULL, fires, folder / "teams", cities)
+        teams = contestants(QUICK if quick else FULL, fires, folder / "teams", cities, executor)
         measured = {}
         for team in teams:
             if only and team.name not in only:
                 continue
-            measured[team.name] = measure(team, fires, seeds, folder / "scores")
+            measured[team.name] = measure(team, fires, seeds, folder / "scores", executor)
             means = ", ".join(f"{group} {scores.shares.mean():.3f}" for group, scores in measured[team.name].items())
             click.echo(f"{team.name}: {means}", err=True)
     if only:

@@ -8,7 +8,8 @@ from functools import partial
 import numpy as np
 
 from fireworld.evaluation.runs import run_compiled, run_step_by_step
-from fireworld.executors import threads
+from fireworld.executors import AnyExecutor, in_this_process, workers_for
+from fireworld.interrupt import Interrupted
 from fireworld.kernels.arrays import Array
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.protocol import Policy
@@ -39,10 +40,15 @@ def _some(items: list[Scenario], n: int | None) -> list[Scenario]:
     return items if n is None or n >= len(items) else items[:: len(items) // n][:n]
 
 
-def shares(stages: Sequence[BuiltScenario], policy: KernelPolicy | Policy, seeds: Sequence[int]) -> Array:
-    """Return the score of every run as a share of its maximum, (fires, seeds)."""
+def shares(
+    stages: Sequence[BuiltScenario], policy: KernelPolicy | Policy, seeds: Sequence[int], executor: AnyExecutor = None
+) -> Array:
+    """Return the score of every run as a share of its maximum, (fires, seeds); `executor`: who runs them."""
     run = run_compiled if isinstance(policy, KernelPolicy) else run_step_by_step
-    n_threads = N_THREADS if isinstance(policy, KernelPolicy) else 1  # the planner has a memory
+    if in_this_process(executor):
+        executor = (executor or N_THREADS) if isinstance(policy, KernelPolicy) else 1  # the planner has a memory
     tasks = [partial(run, built, policy, seed=seed) for built in stages for seed in seeds]  # type: ignore[arg-type]
-    found = threads(n_threads).run(tasks) or []
+    found = workers_for(executor).run(tasks)
+    if found is None:
+        raise Interrupted("interrupted")
     return np.array([outcome.score_share for outcome in found]).reshape(len(stages), len(seeds))

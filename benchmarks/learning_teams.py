@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from benchmarks.learning_fires import N_THREADS, TESTS, Fires, shares
-from fireworld.executors import threads
+from fireworld.executors import AnyExecutor, in_this_process, threads, workers_for
 from fireworld.kernels.arrays import Array
 from fireworld.kernels.choice import FIXED
 from fireworld.planning.planner import Planner
@@ -20,11 +20,11 @@ from fireworld.policy.asking import begin
 from fireworld.policy.kernel import NO_TABLES, KernelPolicy, from_tables
 from fireworld.policy.names import BUILT_IN
 from fireworld.policy.protocol import Policy
-from fireworld.policy.teams.team import load_team
 from fireworld.policy.words import N_FLAG_VALUES, N_OWN, N_STATES, RADIX, features_of
 from fireworld.records import ACTIONS
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import Curriculum, CurriculumStage, load_curriculum
+from fireworld.training.method import Method
 from fireworld.training.methods.sarsa import PAPER, Sarsa
 from fireworld.training.methods.search import Search, SearchTrainer
 from fireworld.training.training import Training, train_all
@@ -84,7 +84,9 @@ class Contestant:
     """Seeds on each generated fire, None for all: fewer of what takes long."""
 
 
-def contestants(size: Size, fires: Fires, folder: Path, cities: CityCache) -> list[Contestant]:
+def contestants(
+    size: Size, fires: Fires, folder: Path, cities: CityCache, executor: AnyExecutor = None
+) -> list[Contestant]:
     """List all, rules first.
 
     Args:
@@ -92,8 +94,9 @@ def contestants(size: Size, fires: Fires, folder: Path, cities: CityCache) -> li
         fires: by group.
         folder: where teams are kept.
         cities: cities built before.
+        executor: who trains.
     """
-    workshop = Workshop(size, folder, cities)
+    workshop = Workshop(size, folder, cities, executor)
     n, some, few = size.n_trainings, size.n_rivals, size.n_trials
     rules = [
         Contestant(rule, "rule", 1, lambda _, __, rule=rule: BUILT_IN[rule]())  # type: ignore[misc]  # of a lambda
@@ -147,6 +150,35 @@ SIGHT_WORDS: Final = {"alone": ", nobody sees the others", "cooperative": ""}
 LINEAR_WORDS: Final = "search with half the fights for a weighted sum of the paper's features: a table of {} states"
 
 
+@dataclass(frozen=True)
+class Trained:
+    """Trains teams, several at once, and returns the policy of one; those that are trained already are read."""
+
+    training: Callable[[int], Training]
+    """From the number of the training."""
+    executor: AnyExecutor
+    """Who trains."""
+
+    def __call__(self, number: int, group: str) -> KernelPolicy:
+        """Return the policy of the team of a training."""
+        del group
+        (training,) = self.prepare([number])
+        assert training.team is not None
+        return training.team.policy()
+
+    def prepare(self, numbers: Sequence[int]) -> list[Training]:
+        """Train some teams, all at once, those that are not trained yet."""
+        trainings = [self.training(number) for number in numbers]
+        for training in trainings:
+            training.resume()
+        left = [training for training in trainings if training.team is None]
+        if left and in_this_process(self.executor):
+            train_all(left, jobs=workers_for(self.executor or N_THREADS).n)
+        elif left:
+            train_all(left, executor=self.executor)
+        return trainings
+
+
 @dataclass
 class Workshop:
     """Where teams are made, or fetched if they were made before."""
@@ -154,6 +186,7 @@ class Workshop:
     size: Size
     folder: Path
     cities: CityCache
+    executor: AnyExecutor = None
 
     def curriculum(self, *, cooperation: bool = True) -> Curriculum:
         """Return the contested fires, both stages; without cooperation their tables have 270 states."""
@@ -168,7 +201,7 @@ class Workshop:
         )
         return replace(whole, stages=stages)
 
-    def ranking(self, targets: str, sight: str, *, half: bool = False) -> Callable[[int, str], KernelPolicy]:
+    def ranking(self, targets: str, sight: str, *, half: bool = False) -> Trained:
         """Search as `fireworld train --method search` does."""
         name = f"{targets}-half-{sight}" if half else f"{targets}-{sight}"
         search = replace(
@@ -177,25 +210,17 @@ class Workshop:
             cooperation=sight == "cooperative",
         )
 
-        def make(number: int, group: str) -> KernelPolicy:
-            del group
-            path = self.folder / f"{name}-{number}.npz"
-            training = Training(search.trainer(self.curriculum(), seed=number, cities=self.cities), path)
-            training.resume()
-            train_all([training], jobs=N_THREADS)
-            assert training.team is not None
-            return training.team.policy()
+        curriculum = self.curriculum()
+        return self._trained(name, curriculum, search)
 
-        return make
-
-    def paper(self, *stages: str) -> Callable[[int, str], KernelPolicy]:
+    def paper(self, *stages: str) -> Trained:
         """Train as the paper does."""
         curriculum = load_curriculum("paper")
         curriculum = curriculum.only(stages) if stages else curriculum
         method = PAPER if self.size.n_scenarios is None else replace(PAPER, n_episodes_max=self.size.n_episodes_max)
         return self._trained("-".join(("paper", *stages)), curriculum, method)
 
-    def sarsa(self, *, cooperation: bool) -> Callable[[int, str], KernelPolicy]:
+    def sarsa(self, *, cooperation: bool) -> Trained:
         """Let SARSA learn in the contested fires, with what helped most elsewhere."""
         method = Sarsa(
             reward="change", shared_table=True, alpha=0.1, gamma=0.95, commit=4, n_episodes_max=self.size.n_episodes_max
@@ -204,18 +229,12 @@ class Workshop:
             f"sarsa-{cooperation}", self.curriculum(cooperation=cooperation).only(["contested"]), method
         )
 
-    def _trained(self, name: str, curriculum: Curriculum, method: Sarsa) -> Callable[[int, str], KernelPolicy]:
-        def make(number: int, group: str) -> KernelPolicy:
-            del group
-            path = self.folder / f"{name}-{number}.npz"
-            if not path.exists():
-                trainer = method.trainer(curriculum, seed=number, cities=self.cities)
-                for _ in trainer:
-                    pass
-                trainer.team().save(path)
-            return load_team(path).policy()
+    def _trained(self, name: str, curriculum: Curriculum, method: Method) -> Trained:
+        def training(number: int) -> Training:
+            trainer = method.trainer(curriculum, seed=number, cities=self.cities)
+            return Training(trainer, self.folder / f"{name}-{number}.npz")
 
-        return make
+        return Trained(training, self.executor)
 
     def linear(self, *, cooperation: bool) -> Callable[[int, str], KernelPolicy]:
         """Search among the tables whose values are weighted sums of the paper's features."""

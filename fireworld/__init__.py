@@ -66,6 +66,8 @@ if TYPE_CHECKING:
     from fireworld.recording.run import open_log as open_log
     from fireworld.recording.verify import Verification as Verification
     from fireworld.recording.verify import verify as verify
+    from fireworld.reproduction.readings.try_readings import TriedReadings as TriedReadings
+    from fireworld.reproduction.readings.try_readings import try_readings as try_readings
     from fireworld.reproduction.reproduce import Reproduction as Reproduction
     from fireworld.reproduction.reproduce import reproduce as reproduce
     from fireworld.scenario import Scenario as Scenario
@@ -104,6 +106,7 @@ _ROOMS = {
     "TableTeam": "policy.teams.table_team",
     "Team": "policy.teams.team",
     "TrainingLog": "training.log.reader",
+    "TriedReadings": "reproduction.readings.try_readings",
     "Verification": "recording.verify",
     "check_scenarios": "evaluation.check_scenarios",
     "compare": "evaluation.compare",
@@ -134,6 +137,7 @@ _ROOMS = {
     "suite": "evaluation.suites",
     "suites": "evaluation.suites",
     "train": "training.train",
+    "try_readings": "reproduction.readings.try_readings",
     "verify": "recording.verify",
     "world": "simulation.session",
 }

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.options import executor_of, on_option
 from fireworld.cli.progress import BAR, COUNT, DESCRIPTION, ELAPSED, bars
+
+if TYPE_CHECKING:
+    from fireworld.executors import AnyExecutor
 
 
 @click.command()
@@ -74,7 +77,8 @@ def command(
         raise click.UsageError("--force and --resume exclude each other.")
     announce_compilation()
     if readings is not None:
-        _try_readings(readings, out, design, repetitions, seeds, jobs, quick=quick, resume=resume, force=force)
+        executor = executor_of(on, jobs)
+        _try_readings(readings, out, design, repetitions, seeds, executor, quick=quick, resume=resume, force=force)
         return
     from fireworld.reproduction.reproduce import reproduce
 
@@ -101,31 +105,29 @@ def _try_readings(
     design: str,
     repetitions: int | None,
     seeds: int | None,
-    jobs: int | None,
+    executor: AnyExecutor,
     *,
     quick: bool,
     resume: bool,
     force: bool,
 ) -> None:
     """Try the readings of a file, "" for fireworld's own."""
-    from fireworld.reproduction.readings.choices import SHIPPED
-    from fireworld.reproduction.readings.report import write_readings
-    from fireworld.reproduction.readings.study import FULL, QUICK, SCREEN, findings_text, try_readings
+    from fireworld.reproduction.readings.try_readings import try_readings
 
-    size = QUICK if quick else FULL if design == "full" else SCREEN
-    size = replace(size, trainings=repetitions or size.trainings, seeds=seeds or size.seeds)
     with bars(DESCRIPTION, BAR, COUNT, ELAPSED) as progress:
         tasks = {what: progress.add_task(what, total=None) for what in ("trying", "confirming")}
-        study = try_readings(
+        found = try_readings(
             out,
-            file=file or SHIPPED,
-            size=size,
+            file=file or None,
+            design="full" if design == "full" else "screen",
+            repetitions=repetitions,
+            seeds=seeds,
+            quick=quick,
             resume=resume,
             force=force,
-            executor=jobs,
+            executor=executor,
             on_progress=lambda what, n_done, n_all: progress.update(tasks[what], completed=n_done, total=n_all),
         )
-    page = write_readings(study, out)
-    for sentence in findings_text(study):
-        click.echo(sentence)
-    click.echo(f"open {page}")
+    click.echo(found)
+    click.echo(found.study.timing.text, err=True)
+    click.echo(f"open {found.report}")

@@ -193,6 +193,8 @@ class ObservationConstants(NamedTuple):
     volume_growth: float  # of the thresholds of the volume, one after another
     own_flags: bool  # the flags tell of the brigade itself, too
     flags: int  # what they tell: 0 the action, 1 the target, 2 the target that is sprayed
+    heated: bool  # the easiest is looked for among heated buildings, too
+    jump: float  # mm, how far beyond a side what frees it may lie
     edge_by_city: bool  # a side is free where the city continues beyond it
     west: float  # mm, of the centroids of all that can burn
     south: float

@@ -30,7 +30,7 @@ from fireworld.kernels.deciding import state_of
 from fireworld.kernels.episode_arrays import HOLDS_AFTER, LAST_STEP, SEED, STEP, Episode
 from fireworld.kernels.fire import is_over
 from fireworld.kernels.jit import inner, kernel
-from fireworld.kernels.observation import N_ACTIONS, can_choose, find_target, site_place
+from fireworld.kernels.observation import N_ACTIONS, can_choose, find_named, find_target, site_place
 from fireworld.kernels.outcome import score
 from fireworld.kernels.ranking import N_TARGET_FEATURES, OWN_TARGET, describe_building, see_target
 from fireworld.kernels.step import begin_step, finish_step, opened_episode, sight_of
@@ -117,7 +117,7 @@ def work_on_worlds(rows: Array, batch_row: Array, indices: Array, what: int) -> 
             score(world.fire, world.civilians, city.geometry, world.outcome)
         if what >= BEGIN:
             note_decisions(i, brigades, batch.result)
-            begin_step(city, world, warmth, clock[STEP] + 1)
+            begin_step(city, world, episode.constants, warmth, clock[STEP] + 1)
             warmth.number[HOLDS_AFTER] = clock[STEP] + 1
         show(i, episode, batch)
 
@@ -155,7 +155,8 @@ def follow(brigade: int, action: int, i: int, episode: Episode, batch: Batch) ->
     elif action >= N_ACTIONS:
         target, action = batch.shown.own[i, brigade, action - N_ACTIONS], OWN_TARGET
     else:
-        target = find_target(brigade, action, brigades, city.buildings, world.fire, city.geometry, sites)
+        where = city.buildings, city.links, world.fire, city.geometry, sites
+        target = find_named(brigade, action, brigades, *where, episode.constants.observation)
     brigades.action[brigade], brigades.target[brigade] = action, target
 
 

@@ -17,7 +17,7 @@ from fireworld.kernels.learning import (
     go_on_and_learn,
     note_choice,
 )
-from fireworld.kernels.observation import BY_ACTION, N_ACTIONS, can_choose, find_target, flag_targets, observe
+from fireworld.kernels.observation import BY_ACTION, EASIEST, N_ACTIONS, can_choose, find_named, flag_targets, observe
 from fireworld.kernels.ranking import OWN_TARGET, Sight
 from fireworld.kernels.ranks import hear, line_up, line_up_before, rank_targets
 from fireworld.kernels.step import opened_episode, sight_of
@@ -88,8 +88,10 @@ def decide(brigade: int, step: int, before: Array, shown: Array, known: Array, e
         note_choice(brigade, step - 1, -1, 0, NO_CHOICE, learner)
     if can_choose(brigade, brigades.hp, brigades.refilling, sites.counts):
         action, target, choice = decide_by_kind(brigade, step, before, shown, known, episode)
-        if target < 0:
-            target = find_target(brigade, action, brigades, city.buildings, world.fire, city.geometry, sites)
+        observation = episode.constants.observation
+        if target < 0 or (action == EASIEST and observation.heated):
+            where = city.buildings, city.links, world.fire, city.geometry, sites
+            target = find_named(brigade, action, brigades, *where, observation)
     brigades.action[brigade], brigades.target[brigade] = action, target
     if len(seen.state) > 0:
         seen.choice[brigade], seen.explored[brigade] = choice, choice == EXPLORED
@@ -126,7 +128,8 @@ def state_of(brigade: int, shown: Array, episode: Episode, features: Array) -> i
     if constants.flags == BY_ACTION:
         return state
     known = brigades.target if constants.in_turn else episode.scratch.target_before
-    return flag_targets(brigade, known, brigades, city.buildings, world.fire, city.geometry, sites, constants, features)
+    where = city.buildings, city.links, world.fire, city.geometry, sites
+    return flag_targets(brigade, known, brigades, *where, constants, features)
 
 
 @inner

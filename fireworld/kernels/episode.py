@@ -42,7 +42,7 @@ def run_episode(row: Array) -> None:
     for step in range(clock[STEP] + 1, last_step + 2):
         if step > last_step and not learning:
             break
-        begin_step(city, world, warmth, step if step <= last_step else NO_STEP)
+        begin_step(city, world, constants, warmth, step if step <= last_step else NO_STEP)
         decide_all(step, episode)
         if step > last_step:
             break

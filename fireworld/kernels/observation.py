@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from fireworld.kernels.arrays import (
     Array,
     BrigadeState,
     BuildingArrays,
     FireState,
     GeometryArrays,
+    LinkArrays,
     ObservationConstants,
     SiteState,
 )
+from fireworld.kernels.codes import can_catch
 from fireworld.kernels.jit import inner, kernel
 
 N_ACTIONS = 4
@@ -142,11 +146,45 @@ def find_target(
 
 
 @kernel
+def find_named(
+    brigade: int,
+    action: int,
+    brigades: BrigadeState,
+    buildings: BuildingArrays,
+    links: LinkArrays,
+    fire: FireState,
+    geometry: GeometryArrays,
+    sites: SiteState,
+    constants: ObservationConstants,
+) -> int:
+    """Return what `find_target` does; or, where the easiest may be a building that is only heated, the coolest of all.
+
+    Heated is what has never burned and can, has at least half the energy at which it would burn, and has a radiation
+    link from a burning building of the site.
+    """
+    best = find_target(brigade, action, brigades, buildings, fire, geometry, sites)
+    if best < 0 or action != EASIEST or not constants.heated:
+        return best
+    site, lowest = site_place(brigade, brigades.site, sites), fire.energy[best] / buildings.capacity[best]
+    for k in range(sites.start[site], sites.start[site + 1]):
+        for link in range(links.ptr[sites.member[k]], links.ptr[sites.member[k] + 1]):
+            b = np.int64(links.building[link])
+            if not can_catch(fire.fieryness[b]) or buildings.inflammable[b] == 0:
+                continue
+            measure = fire.energy[b] / buildings.capacity[b]
+            cooler = measure < lowest or (measure == lowest and buildings.building_id[b] < buildings.building_id[best])
+            if cooler and 2.0 * fire.energy[b] >= buildings.ignition_energy[b]:
+                best, lowest = b, measure
+    return best
+
+
+@kernel
 def flag_targets(
     brigade: int,
     known: Array,
     brigades: BrigadeState,
     buildings: BuildingArrays,
+    links: LinkArrays,
     fire: FireState,
     geometry: GeometryArrays,
     sites: SiteState,
@@ -161,7 +199,8 @@ def flag_targets(
     if site_place(brigade, brigades.site, sites) < 0:
         return -1
     for action in range(N_ACTIONS):
-        target, flag = find_target(brigade, action, brigades, buildings, fire, geometry, sites), 0
+        target = find_named(brigade, action, brigades, buildings, links, fire, geometry, sites, constants)
+        flag = 0
         for other in range(len(known)):
             counts = (other != brigade or constants.own_flags) and known[other] == target
             if counts and (constants.flags == BY_TARGET or brigades.sprayed[other] > 0):

@@ -224,10 +224,30 @@ def sides_beyond(x: float, y: float, west: float, south: float, east: float, nor
 
 
 @inner
+def sides_near(sides: int, b: int, geometry: GeometryArrays, site: int, sites: SiteState, jump: float) -> int:
+    """Return those of some sides, beyond which a building lies, from which its box is less than `jump`, mm."""
+    near = NORTH if geometry.south[b] - sites.north[site] < jump else 0
+    if geometry.west[b] - sites.east[site] < jump:
+        near |= EAST
+    if sites.south[site] - geometry.north[b] < jump:
+        near |= SOUTH
+    if sites.west[site] - geometry.east[b] < jump:
+        near |= WEST
+    return sides & near
+
+
+@inner
 def find_free_sides(
-    buildings: BuildingArrays, links: LinkArrays, geometry: GeometryArrays, fire: FireState, sites: SiteState
+    buildings: BuildingArrays,
+    links: LinkArrays,
+    geometry: GeometryArrays,
+    fire: FireState,
+    sites: SiteState,
+    jump: float,
 ) -> None:
     """Find the sides over which a site can spread: the centroid of an unburnt linked building is beyond; MODEL 5.1.
+
+    Nearer than `jump`, mm, inf for any distance, its box has to begin beyond the side.
 
     Most buildings of a large site have no links that lead beyond a side that is not known to be free.
     """
@@ -243,7 +263,8 @@ def find_free_sides(
             for link in range(links.ptr[b], links.ptr[b + 1]):
                 there = links.building[link]
                 if can_catch(fire.fieryness[there]) and buildings.inflammable[there] != 0:
-                    sides |= sides_beyond(geometry.x[there], geometry.y[there], west, south, east, north)
+                    found = sides_beyond(geometry.x[there], geometry.y[there], west, south, east, north)
+                    sides |= found if jump == np.inf else sides_near(found, there, geometry, site, sites, jump)
         sites.free_sides[site] = sides
 
 
@@ -258,8 +279,12 @@ def find_sites(
     brigades: BrigadeState,
     sites: SiteState,
     warmth: Warmth,
+    jump: float,
 ) -> None:
-    """Find and measure the fire sites of the moment and settle which brigade belongs to which."""
+    """Find and measure the fire sites of the moment and settle which brigade belongs to which.
+
+    `jump` is that of `find_free_sides`.
+    """
     put_out(fire, sites, warmth)
     gather(fire, near, sites, warmth)
     number_sites(sites)
@@ -267,5 +292,5 @@ def find_sites(
     relabel(sites)
     civilian_squares(civilians, fire, geometry, sites, warmth)
     measure_sites(geometry, sites)
-    find_free_sides(buildings, links, geometry, fire, sites)
+    find_free_sides(buildings, links, geometry, fire, sites, jump)
     warmth.number[SITES_CHANGED] = 0

@@ -43,7 +43,7 @@ def look(row: Array) -> None:
     episode = opened_episode(row)
     city, world, warmth = episode.city, episode.world, episode.scratch.warmth
     begin(city.cover, world.fire, warmth)
-    begin_step(city, world, warmth, episode.clock[STEP] + 1)
+    begin_step(city, world, episode.constants, warmth, episode.clock[STEP] + 1)
 
 
 @kernel
@@ -75,7 +75,7 @@ def sight_of(city: CityArrays, world: WorldState, constants: Constants, scratch:
 
 
 @inner
-def begin_step(city: CityArrays, world: WorldState, warmth: Warmth, step: int) -> None:
+def begin_step(city: CityArrays, world: WorldState, constants: Constants, warmth: Warmth, step: int) -> None:
     """Light what is lit in a step, and find the fire sites if they can be others than before.
 
     Before the first step of a call, the lists of what is warm `begin`; after the last one it has its `score`.
@@ -93,6 +93,7 @@ def begin_step(city: CityArrays, world: WorldState, warmth: Warmth, step: int) -
             world.brigades,
             world.sites,
             warmth,
+            constants.observation.jump,
         )
 
 

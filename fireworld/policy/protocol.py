@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fireworld.kernels.arrays import CityArrays, Constants, WorldState
-from fireworld.kernels.observation import find_target, site_place
+from fireworld.kernels.observation import find_named, site_place
 from fireworld.kernels.ranking import N_OF_BUILDING, N_TARGET_FEATURES, OWN_TARGET, Sight
 from fireworld.kernels.targets import describe_targets
 
@@ -44,9 +44,10 @@ class Decision:
     epsilon: float = 0.0
 
 
-def named_target(brigade: int, action: int, city: CityArrays, world: WorldState) -> int:
+def named_target(brigade: int, action: int, city: CityArrays, world: WorldState, constants: Constants) -> int:
     """Return the building that one of the four actions names for a brigade, -1 without a site."""
-    return int(find_target(brigade, action, world.brigades, city.buildings, world.fire, city.geometry, world.sites))
+    where = world.brigades, city.buildings, city.links, world.fire, city.geometry, world.sites
+    return int(find_named(brigade, action, *where, constants.observation))
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,9 @@ class Observation:
     @cached_property
     def targets(self) -> tuple[int, int, int, int]:
         """The building that each of the four actions names."""
-        one, two, three, four = (named_target(self.brigade, action, self.city, self.world) for action in range(4))
+        one, two, three, four = (
+            named_target(self.brigade, action, self.city, self.world, self.constants) for action in range(4)
+        )
         return one, two, three, four
 
     @cached_property

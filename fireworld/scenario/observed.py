@@ -28,10 +28,18 @@ class Observed(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         ),
     ] = None
     free_edges: Annotated[
-        Literal["linked", "city"] | None,
+        Literal["linked", "city", "streets"] | None,
         Meta(
             description="Which sides of a site are free: `linked`, a building that radiation reaches and that never "
-            "burned lies beyond; `city`, any building that can burn."
+            "burned lies beyond; `city`, any building that can burn; `streets`, one as for `linked` whose box is less "
+            "than 10 m from the site's, since fire does not jump a wider street."
+        ),
+    ] = None
+    easiest: Annotated[
+        Literal["burning", "heated"] | None,
+        Meta(
+            description="Among which buildings `easiest` chooses the coolest: the site's that are `burning`; or those "
+            "`heated` too, which radiation of the site reaches and that are at least half as hot as they catch fire."
         ),
     ] = None
     center_shares: Annotated[

@@ -28,6 +28,8 @@ from fireworld.scenario.observed import FLAGS, Observed
 
 CIVILIAN_LOW_M = 30.0
 CIVILIAN_MEDIUM_M = 80.0
+JUMP_MM = 10_000.0
+"""The widest street that fire jumps, where streets keep it: those of generated cities have 8 m."""
 LANES = 4
 """Air cells that the exchange handles at once; rows of cells are padded to a multiple of it."""
 BORDER = 1
@@ -284,6 +286,8 @@ def observation_constants(
         volume_growth=2.0 if seen.volume_growth is None else float(seen.volume_growth),
         own_flags=seen.flags_of == "all",
         flags=FLAGS.index(seen.flags or "action"),
+        heated=seen.easiest == "heated",
+        jump=JUMP_MM if seen.free_edges == "streets" else math.inf,
         edge_by_city=seen.free_edges == "city",
         west=float(places[:, 0].min()),
         south=float(places[:, 1].min()),

@@ -288,7 +288,7 @@ class World:
         constants, city = self.constants.observation, self.city_arrays
         state = observe(brigade, shown, brigades.site, sites, constants, features)
         if constants.flags != BY_ACTION:
-            where = brigades, city.buildings, fire, city.geometry, sites
+            where = brigades, city.buildings, city.links, fire, city.geometry, sites
             state = flag_targets(brigade, known, *where, constants, features)
         return int(state)
 
@@ -302,7 +302,7 @@ class World:
     def _target(self, brigade: int, decision: Decision) -> int:
         if decision.action == Action.OWN_TARGET and decision.target is not None:
             return decision.target
-        return named_target(brigade, decision.action, self.city_arrays, self.state)
+        return named_target(brigade, decision.action, self.city_arrays, self.state, self.constants)
 
     def _observation(self, brigade: int, features: Array, state: int, known: Array) -> Observation:
         seen = [int(feature) for feature in features]

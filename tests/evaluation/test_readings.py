@@ -4,23 +4,37 @@ from __future__ import annotations
 
 import csv
 import itertools
+from importlib import import_module
 from pathlib import Path
 from threading import Event
 
 import numpy as np
 import pytest
 
-from fireworld.errors import OutputError, TrainingError
+import fireworld as fw
+from fireworld.errors import FireworldError, OutputError, TrainingError
+from fireworld.executors import On
+from fireworld.executors.packing import Packer
+from fireworld.executors.receiving import work
+from fireworld.executors.self_test import self_test
+from fireworld.interrupt import Interrupted
 from fireworld.reproduction import paper
-from fireworld.reproduction.readings.choices import SHIPPED, load_choices, read_as
+from fireworld.reproduction.readings.choices import SHIPPED, digest_of, load_choices, read_as
 from fireworld.reproduction.readings.design import N_BASIC, design, designed, generators
-from fireworld.reproduction.readings.effects import main_effects, permutation_p, student_95
-from fireworld.reproduction.readings.report import write_readings
-from fireworld.reproduction.readings.study import RUNS, ReadingsSize, findings_text, try_readings
-from fireworld.reproduction.readings.trial import Trial
+from fireworld.reproduction.readings.effects import main_effects, over_trainings, permutation_p, student_95
+from fireworld.reproduction.readings.runs import RUNS
+from fireworld.reproduction.readings.study import ReadingsSize
+from fireworld.reproduction.readings.timing import Timing, longest_first
+from fireworld.reproduction.readings.trial import Trial, setting_of
+from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import load_curriculum
 from fireworld.training.methods.sarsa import Sarsa
+from fireworld.version import simulator_version
 from tests.evaluation.test_reproduce import CURRICULUM, SMALL_PAPER
+from tests.executors.test_elsewhere import dask
+from tests.real_data import real_file
+
+try_readings_module = import_module("fireworld.reproduction.readings.try_readings")
 
 
 def test_the_file_has_the_22_choices_and_a_level_that_changes_nothing_is_ours():
@@ -90,7 +104,7 @@ def test_the_design_is_balanced_of_resolution_four_and_its_own_foldover(n_choice
 def test_the_shipped_choices_fit_into_the_design():
     for kind, n_basic in N_BASIC.items():
         varied, signs, readings = designed(load_choices(), kind=kind)
-        assert signs.shape == (2**n_basic, len(varied)) == (len(readings), 4 if kind == "quick" else 21)
+        assert signs.shape == (2**n_basic, len(varied)) == (len(readings), 4 if kind == "quick" else 22)
         assert readings[0].study == read_as(load_choices(), {}).study
 
 
@@ -106,43 +120,187 @@ def test_effects_of_made_up_readings():
     assert permutation_p(signs, noise) > 0.01
 
 
-@pytest.mark.parametrize(("freedom", "quantile"), [(3, 3.182), (10, 2.228), (42, 2.018), (1000, 1.962)])
+@pytest.mark.parametrize(
+    ("freedom", "quantile"), [(1, 12.706), (2, 4.303), (3, 3.182), (6, 2.447), (10, 2.228), (42, 2.018), (1000, 1.962)]
+)
 def test_quantiles_of_students_t(freedom, quantile):
-    assert student_95(freedom) == pytest.approx(quantile, rel=0.02)
+    assert student_95(freedom) == pytest.approx(quantile, rel=0.002)
 
 
-SIZE = ReadingsSize("quick", 1, 2, Sarsa(n_episodes_max=3, n_episodes_unchanged=2))
+@pytest.mark.parametrize("uneven", [False, True])
+def test_intervals_of_main_effects_hold_what_is_true_in_95_of_100_studies(uneven):
+    """Trainings and seeds of a reading have much in common; with `uneven`, readings scatter more at some levels."""
+    draws, n_held, n_all = np.random.default_rng(7), 0, 0
+    signs = design(21, 6)
+    for _ in range(400):
+        true = draws.normal(0.0, 0.1, 21)
+        of_reading = draws.normal(0.0, 0.15, (64, 1, 1)) * (np.exp(0.5 * signs[:, :1, None]) if uneven else 1.0)
+        of_training, of_run = draws.normal(0.0, 0.25, (64, 2, 1)), draws.normal(0.0, 0.2, (64, 2, 10))
+        values = (signs @ true / 2.0)[:, None, None] + of_reading + of_training + of_run
+        effects = main_effects([""] * 21, signs, values.mean(axis=(1, 2)))
+        n_held += sum(one.low <= wanted <= one.high for one, wanted in zip(effects, true, strict=True))
+        n_all += 21
+    assert 0.94 <= n_held / n_all <= 0.96
+
+
+@pytest.mark.parametrize("n_trainings", [3, 5])
+def test_intervals_of_a_reading_hold_what_is_true_in_95_of_100_studies(n_trainings):
+    draws, n = np.random.default_rng(8), 3000
+    held = 0
+    for _ in range(n):
+        values = 0.1 + draws.normal(0.0, 0.25, (n_trainings, 1)) + draws.normal(0.0, 0.2, (n_trainings, 10))
+        one = over_trainings(values)
+        held += one.low <= 0.1 <= one.high
+    assert 0.938 <= held / n <= 0.962
+
+
+@pytest.mark.parametrize("n_trainings", [1, 2])
+def test_of_two_trainings_no_interval_can_be_told(n_trainings):
+    one = over_trainings(np.full((n_trainings, 10), 0.5))
+    assert one.text() == "+0.50 [no interval]"
+    assert not one.can_tell
+    assert not one.above_zero
+    assert not one.below_zero
+
+
+METHOD = Sarsa(n_episodes_max=3, n_episodes_unchanged=2)
 
 
 @pytest.fixture
 def small(tmp_path, monkeypatch):
     for name, rows in SMALL_PAPER.items():
         monkeypatch.setattr(paper, name, rows)
+    monkeypatch.setattr(try_readings_module, "QUICK", ReadingsSize("quick", 1, 2, METHOD))
     path = tmp_path / "small.yaml"
     path.write_text(CURRICULUM)
     return path
 
 
+def tables(folder):
+    """The bytes of all that a study leaves."""
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
 @pytest.mark.slow
 def test_a_study_is_resumed_and_comes_out_the_same(small, tmp_path):
-    whole = try_readings(tmp_path / "a", size=SIZE, curriculum=small)
-    page = write_readings(whole, tmp_path / "a")
+    whole = fw.try_readings(tmp_path / "a", quick=True, curriculum=small)
     rows = [*csv.DictReader((tmp_path / "a" / RUNS).read_text().splitlines())]
     assert len(rows) == (8 + 3) * 2
-    assert len(whole.confirmed) == 3
-    assert "in 8 readings" not in page.read_text()
-    for sentence in findings_text(whole):
-        assert sentence.endswith(".")
+    assert len(whole.study.confirmed) == 3
+    assert "Main effects" in whole.report.read_text()
+    assert all(sentence.endswith(".") for sentence in whole.findings)
     with pytest.raises(OutputError, match="--resume continues it"):
-        try_readings(tmp_path / "a", size=SIZE, curriculum=small)
-    try_readings(tmp_path / "b", size=SIZE, curriculum=small)
+        fw.try_readings(tmp_path / "a", quick=True, curriculum=small)
+    fw.try_readings(tmp_path / "b", quick=True, curriculum=small)
     runs = tmp_path / "b" / RUNS
     runs.write_bytes(runs.read_bytes()[: runs.stat().st_size // 2])  # as after a kill
-    again = try_readings(tmp_path / "b", size=SIZE, curriculum=small, resume=True)
-    assert runs.read_bytes() == (tmp_path / "a" / RUNS).read_bytes()
-    assert findings_text(again) == findings_text(whole)
+    again = fw.try_readings(tmp_path / "b", quick=True, curriculum=small, resume=True)
+    assert tables(tmp_path / "b") == tables(tmp_path / "a")
+    assert again.findings == whole.findings
+    assert 0 < len(again.study.timing.parts[0]) < 8, "the times of those that were made now"
     with pytest.raises(TrainingError, match="trainings"):
-        try_readings(tmp_path / "b", size=ReadingsSize("quick", 2, 2, SIZE.method), curriculum=small, resume=True)
+        fw.try_readings(tmp_path / "b", quick=True, repetitions=2, curriculum=small, resume=True)
+    other = tmp_path / "other.yaml"
+    other.write_text(SHIPPED.read_text().replace("epsilon_schedule: compounding", "epsilon_schedule: training"))
+    with pytest.raises(TrainingError, match="choices"):
+        fw.try_readings(tmp_path / "b", file=other, quick=True, curriculum=small, resume=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("word", ["processes", dask, "tests.executors.far:make_executor"])
+def test_a_study_has_the_same_bytes_whoever_makes_it(word, small, tmp_path):
+    fw.try_readings(tmp_path / "here", quick=True, curriculum=small, executor=1)
+    found = fw.try_readings(tmp_path / "there", quick=True, curriculum=small, executor=On(word, 2))
+    assert tables(tmp_path / "there") == tables(tmp_path / "here")
+    assert [len(part) for part in found.study.timing.parts] == [8, 3]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("word", ["threads", "processes"])
+def test_a_study_that_is_stopped_keeps_its_trials(word, small, tmp_path):
+    stop = Event()
+
+    def after_two(what, n_done, n_all):
+        if n_done >= 2:
+            stop.set()
+
+    words = {"quick": True, "curriculum": small, "executor": On(word, 1)}
+    with pytest.raises(Interrupted, match=r"[2-7] trials are kept in .*: --resume continues"):
+        fw.try_readings(tmp_path / "a", on_progress=after_two, stop=stop, **words)
+    fw.try_readings(tmp_path / "a", resume=True, **words)
+    fw.try_readings(tmp_path / "b", **words)
+    assert tables(tmp_path / "a") == tables(tmp_path / "b")
+
+
+@pytest.mark.parametrize(("words", "name"), [({"design": "all"}, "design"), ({"seeds": 0}, "seeds")])
+def test_arguments_are_checked_first(words, name, tmp_path):
+    with pytest.raises(FireworldError, match=f"{name}: expected"):
+        fw.try_readings(tmp_path / "a", **words)
+    assert not (tmp_path / "a").exists()
+
+
+def test_times_of_trials():
+    timing = Timing(2)
+    assert timing.text == ""
+    timing.add([6.0, 4.0, 4.0, 2.0], [3.0, 2.0, 2.0, 1.0], 8.8)
+    timing.add([2.0], [1.0], 2.2)
+    assert timing.total == 18.0
+    assert timing.predicted(1) == 9.0
+    assert timing.predicted(2) == 4.0 + 1.0
+    assert timing.predicted(64) == 3.0 + 1.0, "the parts wait for one another"
+    assert (
+        "5 trials took 18 s added up (9 s of computing), 9 s for each of 2 workers; all of it took 11 s, 1.22 times"
+        in timing.text
+    )
+    assert longest_first([], 3) == 0.0
+
+
+KOBE_TOO = "levels: {{dense: {{}}, kobe: {{scenario: {{city.official: {path}}}}},"
+
+
+def with_map(path, folder):
+    """Write a file of readings whose choice `city` has a map as a level; return it."""
+    file = folder / "mine.yaml"
+    file.write_text(SHIPPED.read_text().replace("levels: {dense: {},", KOBE_TOO.format(path=path)))
+    return file
+
+
+@pytest.mark.slow
+def test_a_map_is_a_level_of_the_city(small, tmp_path):
+    """Its folder is relative to the file of readings; it travels with the trials."""
+    fw.export_city("quick", tmp_path / "town")
+    choices = load_choices(with_map("town", tmp_path))
+    (tmp_path / "elsewhere").mkdir()
+    fw.export_city("quick", tmp_path / "elsewhere" / "town")
+    assert digest_of(choices) == digest_of(load_choices(with_map("town", tmp_path / "elsewhere")))
+    assert digest_of(choices) != digest_of(load_choices())
+    setting = setting_of(read_as(choices, {"city": "kobe"}), load_curriculum(small), METHOD)
+    scenarios = [*setting.curriculum.scenarios, *setting.tests]
+    assert all(scenario.city.official == str(tmp_path / "town") for scenario in scenarios)
+    assert len(setting.files) == 1
+    trial, packer = Trial(setting, 1, [1000]), Packer()
+    shares, packed = trial().shares, packer.pack([trial])
+    for file in (tmp_path / "town").iterdir():  # as on another machine
+        file.unlink()
+    order = {"version": simulator_version(), "digest": self_test(), "modules": (), "apart": packer.apart}
+    _, (tried,) = work({**order, "content": packed.content, "needs": packed.needs})
+    assert tried.shares == shares
+
+
+@pytest.mark.slow
+def test_kobe_is_a_level_of_the_city(small, tmp_path):
+    choices = load_choices(with_map(real_file("maps/kobe"), tmp_path))
+    setting = setting_of(read_as(choices, {"city": "kobe"}), load_curriculum(small), METHOD)
+    assert 0.0 <= Trial(setting, 1, [1000])().shares[0][0] <= 1.0
+    whole = setting_of(read_as(choices, {"city": "kobe"}), load_curriculum("paper"), METHOD)
+    cities = CityCache(whole.files)
+    n_buildings = fw.import_city(real_file("maps/kobe")).summary["n_buildings"]
+    assert {cities.build(one).city.n_buildings for one in whole.curriculum.scenarios} == {n_buildings}
+
+
+def test_a_map_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(TrainingError, match=r"choices.city: levels.kobe: .*no-map"):
+        load_choices(with_map("no-map", tmp_path))
 
 
 @pytest.mark.slow
@@ -153,6 +311,6 @@ def test_a_study_is_resumed_and_comes_out_the_same(small, tmp_path):
 )
 def test_every_level_can_be_tried(level, small):
     reading = read_as(load_choices(), dict([level]))
-    shares = Trial(0, reading, 1, load_curriculum(small), SIZE.method, [1000], Event())()
+    shares = Trial(setting_of(reading, load_curriculum(small), METHOD), 1, [1000])().shares
     assert len(shares) == 1
     assert all(0.0 <= share <= 1.0 for share in shares[0])

@@ -14,6 +14,7 @@ from fireworld.kernels.outcome import assess as assess_kernel
 from fireworld.kernels.ranking import N_OF_BUILDING, Sight
 from fireworld.parameters import PAPER, Parameters
 from fireworld.rewards import Reward
+from fireworld.scenario.observed import Observed
 from fireworld.simulation.placement import Placement
 from fireworld.simulation.world import World, prepare_start
 from tests.city.plans import footprints, rectangle, street_map
@@ -69,6 +70,7 @@ def make_world(
     parameters: Parameters = PAPER,
     reward: Reward | None = None,
     unit_volume_m3: float | None = None,
+    observed: Observed | None = None,
     seed: int = 1,
     n_steps_max: int = 100,
 ) -> World:
@@ -79,7 +81,8 @@ def make_world(
         civilian_mm=np.array([(x * METRE, y * METRE) for _, x, y in civilians]).reshape(-1, 2),
         brigade_refuge=np.array(brigades, dtype=np.int32),
     )
-    start = prepare_start(city, parameters, placement, reward=reward, unit_volume_m3=unit_volume_m3)
+    more = {"reward": reward, "unit_volume_m3": unit_volume_m3, "observed": observed}
+    start = prepare_start(city, parameters, placement, **more)
     return World(start, seed=seed, n_steps_max=n_steps_max)
 
 

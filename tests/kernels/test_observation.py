@@ -7,9 +7,10 @@ import itertools
 import numpy as np
 import pytest
 
-from fireworld.kernels.observation import can_choose, find_target, level, observe, state_index, volume_class
+from fireworld.kernels.observation import can_choose, find_named, find_target, level, observe, state_index, volume_class
 from fireworld.policy.protocol import Decision
 from fireworld.policy.words import RADIX
+from fireworld.scenario.observed import Observed
 from fireworld.simulation.city_arrays import observation_constants
 from tests.kernels.small import METRE, burn, make_city, make_world, square
 
@@ -38,6 +39,34 @@ def chooses(world, brigade=0):
 def target(world, action, brigade=0):
     arrays, tables = world.state, world.city_arrays
     return find_target(brigade, action, arrays.brigades, tables.buildings, arrays.fire, tables.geometry, arrays.sites)
+
+
+def named(world, action):
+    arrays, tables = world.state, world.city_arrays
+    where = tables.buildings, tables.links, arrays.fire, tables.geometry, arrays.sites
+    return find_named(0, action, arrays.brigades, *where, world.constants.observation)
+
+
+def test_the_easiest_may_be_one_that_is_only_heated():
+    city = make_city(*LINE, links={0: [1, 2, 3, 4], 5: [6]}, refuges=[4])
+    plain, world = (
+        make_world(city, brigades=[0], observed=None if key is None else Observed(easiest=key))
+        for key in (None, "heated")
+    )
+    for one in (plain, world):
+        energy, half = one.state.fire.energy, one.city_arrays.buildings.ignition_energy / 2
+        energy[0] = 4 * half[0]
+        energy[1:] = 0.99 * half[1:]
+        energy[[2, 3, 4, 6]] = half[[2, 3, 4, 6]]  # 4 cannot burn, and to 6 nothing that burns is linked
+        energy[3] *= 1.1
+        one.state.fire.fieryness[3] = 4
+        burn(one, 0)
+    assert [named(plain, action) for action in range(4)] == [0, 0, 0, 0]
+    assert [named(world, action) for action in range(4)] == [2, 0, 0, 0]
+    world.state.fire.fieryness[2] = 8
+    assert named(world, 0) == 3, "what has burned is not heated; what is wet may be"
+    world.state.fire.energy[0] = world.city_arrays.buildings.ignition_energy[0] * 0.4
+    assert named(world, 0) == 0, "one that burns may be the coolest"
 
 
 def test_the_state_index_is_a_mixed_radix():

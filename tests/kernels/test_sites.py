@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fireworld.kernels.sites import EAST, NORTH, SOUTH, WEST, nearest_burning
+from fireworld.scenario.observed import Observed
 from tests.kernels.small import METRE, burn, make_city, make_world, site_numbers, square
 
 SPACED = [square(50.0 * k, 0.0) for k in range(7)]  # outlines 40 m apart: neighbours only where linked
@@ -140,6 +141,26 @@ def test_a_side_is_free_where_fire_can_spread(x_m, y_m, sides):
         fieryness[1] = code
         burn(world, 0)
         assert free[0] == expected, code
+
+
+@pytest.mark.parametrize(
+    ("x_m", "y_m", "sides"),
+    [
+        (19.9, 0, EAST),
+        (20, 0, 0),
+        (0, 19.9, NORTH),
+        (0, -19.9, SOUTH),
+        (-19.9, 0, WEST),
+        (19.9, 19.9, NORTH | EAST),
+        (19.9, 30, EAST),
+    ],
+)
+def test_fire_does_not_jump_a_street_of_10_m(x_m, y_m, sides):
+    """Of outlines 10 m wide; without the switch every one of these sides is free."""
+    city = make_city(square(0, 0), square(x_m, y_m), links={0: [1]})
+    world = make_world(city, observed=Observed(free_edges="streets"))
+    burn(world, 0)
+    assert world.state.sites.free_sides[0] == sides
 
 
 def test_what_leaves_a_side_closed():

@@ -8,6 +8,7 @@ import pytest
 import fireworld as fw
 from fireworld.errors import ScenarioError
 from fireworld.kernels.learning import UNTRIED
+from fireworld.policy.kernel import each_another, from_rankings
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import build_scenario
 from fireworld.training.curriculum import load_curriculum
@@ -39,10 +40,15 @@ OF_THE_SCENARIO = (
     {"flags": "spraying"},
     {"flags_of": "all"},
     {"free_edges": "city"},
+    {"free_edges": "streets"},
+    {"easiest": "heated"},
     {"center_shares": [0.1, 0.3]},
     {"civilian_m": [50, 120]},
     {"volume_growth": 3},
 )
+
+RANKING = from_rankings(np.eye(1, 17, 13), own_targets=False)
+"""Of the targets that the four actions name, values that of `easiest` most."""
 
 
 @pytest.fixture
@@ -86,9 +92,13 @@ def test_runs_of_scenarios_with_a_switch_are_replayed(change, tmp_path):
     plain = fw.run("test-1", policy="paper-cooperative")
     assert run.digest != plain.digest
     assert fw.verify(path).same
+    assert_asked_alike(scenario, fw.load_team("paper-cooperative").policy())
+
+
+def assert_asked_alike(scenario, policy):
+    """Asked one by one, the brigades see the same and go for the same as in the compiled episode."""
     built = build_scenario(scenario)
     whole, steps = built.world(seed=1), built.world(seed=1)
-    policy = fw.load_team("paper-cooperative").policy()
     whole.run(policy.for_brigades(4))
 
     class Asked(fw.Policy):
@@ -102,7 +112,18 @@ def test_runs_of_scenarios_with_a_switch_are_replayed(change, tmp_path):
     asked.begin(None, 4, 1)
     while not (steps.terminated or steps.truncated):
         steps.step(asked)
-    assert steps.outcome == whole.outcome, "asked one by one, the brigades see the same"
+    assert steps.outcome == whole.outcome
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("policy", [each_another(), RANKING], ids=["rules", "ranking"])
+def test_policies_of_every_kind_go_for_heated_buildings_alike(policy, tmp_path):
+    path = tmp_path / "a.mcap"
+    scenario = load_scenario("test-1").with_values({"observation.easiest": "heated", "steps": 60})
+    run = fw.run(scenario, policy=policy, record=path)
+    assert run.digest != fw.run("test-1", policy=policy, steps=60).digest
+    assert fw.verify(path).same
+    assert_asked_alike(scenario, policy)
 
 
 def test_the_schedules_of_epsilon():

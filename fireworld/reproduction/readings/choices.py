@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import hashlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -20,6 +21,8 @@ SHIPPED: Final = Path(__file__).with_name("readings.yaml")
 SIZE_MAX_BYTES: Final = 1_000_000
 A_SCENARIO: Final = "test-1"
 """On which keys of scenarios are tried."""
+CITY_PATHS: Final = ("city.file", "city.official")
+"""Keys whose values are paths, relative to the folder of the file of readings."""
 
 
 class StudySettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -96,12 +99,20 @@ def load_choices(path: Path | str = SHIPPED) -> tuple[OpenChoice, ...]:
         raise TrainingError(f"{source}: {key}: {fault[:1].lower() + fault[1:]}") from None
     names: set[str] = set()
     for choice in found.choices:
-        _check(choice, names, source=source)
+        _check_names(choice, names, source=source)
         names |= {choice.name, str(choice.number)}
-    return found.choices
+    return tuple(_with_cities(choice, source=source, folder=Path(path).parent) for choice in found.choices)
 
 
-def read_as(choices: tuple[OpenChoice, ...], levels: Mapping[str, str]) -> Reading:
+def digest_of(choices: Sequence[OpenChoice]) -> str:
+    """Return the SHA-256 of all that choices say; of cities from files what is in these, not where they are."""
+    plain = msgspec.to_builtins([*choices])
+    for level in (level for choice in plain for level in choice["levels"].values()):
+        level["scenario"] = {key: value for key, value in level["scenario"].items() if key not in CITY_PATHS}
+    return hashlib.sha256(msgspec.json.encode(plain, order="sorted")).hexdigest()
+
+
+def read_as(choices: Sequence[OpenChoice], levels: Mapping[str, str]) -> Reading:
     """Return the reading with these levels, by the names of their choices."""
     parts: dict[str, dict[str, Any]] = {part: {} for part in Level.__struct_fields__}
     for choice in choices:
@@ -111,8 +122,8 @@ def read_as(choices: tuple[OpenChoice, ...], levels: Mapping[str, str]) -> Readi
     return Reading(dict(levels), Level(**parts), msgspec.convert(parts["study"], StudySettings))
 
 
-def _check(choice: OpenChoice, names: set[str], *, source: str) -> None:
-    """Check a choice; TrainingError if it makes no sense."""
+def _check_names(choice: OpenChoice, names: set[str], *, source: str) -> None:
+    """Check the names of a choice, its levels and its screen; TrainingError if they make no sense."""
     where = f"{source}: choices.{choice.name}"
     if {choice.name, str(choice.number)} & names:
         raise TrainingError(expected(where, "name", "another name and number for every choice", choice.name))
@@ -123,11 +134,31 @@ def _check(choice: OpenChoice, names: set[str], *, source: str) -> None:
                 raise TrainingError(expected(where, key, f"one of the levels {levels}", name))
     if choice.screen and (len(set(choice.screen)) != 2 or choice.screen[0] != choice.ours):
         raise TrainingError(expected(where, "screen", f"{choice.ours} and another level", list(choice.screen)))
+
+
+def _with_cities(choice: OpenChoice, *, source: str, folder: Path) -> OpenChoice:
+    """Check what the levels of a choice say, and return them with cities from files in place of the generated ones.
+
+    Raises:
+        TrainingError: a level that makes no sense.
+    """
+    levels = {}
     for name, level in choice.levels.items():
         try:
             PAPER.with_settings(level.method)
-            for values in (level.scenario, level.training):
-                load_scenario(A_SCENARIO).with_values(values)
+            load_scenario(A_SCENARIO).with_values(level.training)
             msgspec.convert(level.study, StudySettings)
+            levels[name] = msgspec.structs.replace(level, scenario=_with_city(level.scenario, folder))
         except (FireworldError, msgspec.ValidationError) as error:
-            raise TrainingError(f"{where}: levels.{name}: {error}") from None
+            raise TrainingError(f"{source}: choices.{choice.name}: levels.{name}: {error}") from None
+    return msgspec.structs.replace(choice, levels=levels)
+
+
+def _with_city(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Check keys of scenarios; return them with the digest of the city file that they name, so that it is read once."""
+    found = dict(values)
+    for key in CITY_PATHS:
+        if isinstance(found.get(key), str):
+            found = {"city.generated": None, **found, key: str((folder / found[key]).absolute())}
+    scenario = load_scenario(A_SCENARIO).with_values(found)
+    return found if scenario.city_sha256 is None else {**found, "city.sha256": scenario.city_sha256}

@@ -8,6 +8,7 @@ reading, with all levels exchanged, is in it too.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 from typing import Final
 
@@ -34,7 +35,7 @@ def design(n_choices: int, n_basic: int) -> Array:
     return np.array(signs, dtype=np.int64).T
 
 
-def designed(choices: tuple[OpenChoice, ...], *, kind: str) -> tuple[list[OpenChoice], Array, list[Reading]]:
+def designed(choices: Sequence[OpenChoice], *, kind: str) -> tuple[list[OpenChoice], Array, list[Reading]]:
     """Return the choices that a design varies, its levels (readings, choices), and the readings.
 
     Args:

@@ -10,23 +10,44 @@ from typing import Final
 from fireworld.draws import below
 from fireworld.kernels.arrays import Array
 
+TRAININGS_LEAST: Final = 3
+"""Trainings of a reading from which it has an interval."""
 N_PERMUTATIONS: Final = 2000
 _PERMUTE: Final = 1001
 """Purpose of the draws of this module."""
+_STUDENT_95: Final = (12.7062, 4.30265, 3.18245, 2.77645, 2.57058)
+"""Of 1, 2, 3 ... degrees of freedom."""
 _NORMAL_95: Final = 1.959963984540054
 
 
 @dataclass(frozen=True)
 class Effect:
-    """What the other level of a choice changes in a mean."""
+    """A mean, or what the other level of a choice changes in one, and how sure that is."""
 
     choice: str
     mean: float
     low: float  # of the 95 % interval
     high: float
 
+    @property
+    def can_tell(self) -> bool:
+        """Whether there is enough for an interval."""
+        return math.isfinite(self.high)
+
+    @property
+    def above_zero(self) -> bool:
+        """Whether the whole interval lies above zero."""
+        return self.low > 0.0
+
+    @property
+    def below_zero(self) -> bool:
+        """Whether the whole interval lies below zero."""
+        return self.high < 0.0
+
     def text(self) -> str:
         """Return it for people: "+0.14 [-0.04, +0.31]"."""
+        if not self.can_tell:
+            return f"{self.mean:+.2f} [no interval]"
         return f"{self.mean:+.2f} [{self.low:+.2f}, {self.high:+.2f}]"
 
 
@@ -51,6 +72,23 @@ def main_effects(names: Sequence[str], signs: Array, means: Array) -> list[Effec
     ]
 
 
+def over_trainings(values: Array) -> Effect:
+    """Estimate a mean over the trainings of one reading, whose runs go together: a training's mean is one value.
+
+    Two trainings say too little of how trainings differ (their t is 12.7): the ends are then infinite.
+
+    Args:
+        values: (trainings, seeds).
+    """
+    means = [math.fsum(row) / len(row) for row in values.tolist()]
+    n = len(means)
+    mean, half = math.fsum(means) / n, math.inf
+    if n >= TRAININGS_LEAST:
+        variance = math.fsum((one - mean) ** 2 for one in means) / (n - 1)
+        half = student_95(n - 1) * math.sqrt(variance / n)
+    return Effect("", mean, mean - half, mean + half)
+
+
 def permutation_p(signs: Array, means: Array) -> float:
     """Return how often shuffled readings have main effects as large, squared and added up: "no reading matters"."""
     found, n = float((_contrasts(signs, means) ** 2).sum()), len(means)
@@ -65,7 +103,9 @@ def permutation_p(signs: Array, means: Array) -> float:
 
 
 def student_95(freedom: int) -> float:
-    """Return the two-sided 95 % quantile of Student's t, by its expansion about the normal; to 1 % from 3 on."""
+    """Return the two-sided 95 % quantile of Student's t: the first ones as they are, then by an expansion, to 0.1 %."""
+    if freedom <= len(_STUDENT_95):
+        return _STUDENT_95[freedom - 1]
     z, n = _NORMAL_95, float(freedom)
     return (
         z

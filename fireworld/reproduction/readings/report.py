@@ -11,7 +11,8 @@ from fireworld_viewer.pictures.specification import draw_specification
 
 from fireworld.files import write_file
 from fireworld.html_page import html_figure, html_page, html_table, text_cell
-from fireworld.reproduction.readings.study import ReadingsStudy, findings_text
+from fireworld.reproduction.readings.findings import findings_text
+from fireworld.reproduction.readings.study import ReadingsStudy
 
 PAGE: Final = "readings.html"
 EFFECTS: Final = "readings-effects.csv"
@@ -23,7 +24,7 @@ def write_readings(study: ReadingsStudy, folder: Path) -> Path:
     """Write everything; return the page. Errors as for `write_file`."""
     write_file(folder / EFFECTS, _effects(study))
     write_file(folder / CURVE, _curve(study))
-    estimates = [(one.mean, one.low, one.high) for one in study.estimates]
+    estimates = [(one.mean, *((one.low, one.high) if one.can_tell else (one.mean,) * 2)) for one in study.estimates]
     names, others = [choice.name for choice in study.choices], [[*map(bool, row > 0)] for row in study.signs]
     label = "cooperative - non-cooperative"
     image = png_bytes(draw_specification(estimates, names, others, label=label))
@@ -46,7 +47,8 @@ def _curve(study: ReadingsStudy) -> str:
     for number in sorted(range(len(found)), key=lambda n: (found[n].mean, n)):
         levels = (choice.screen[int(sign > 0)] for choice, sign in zip(study.choices, study.signs[number], strict=True))
         one = found[number]
-        lines.append(f"{number},{one.mean!r},{one.low!r},{one.high!r}," + ",".join(levels))
+        ends = f"{one.low!r},{one.high!r}" if one.can_tell else ","
+        lines.append(f"{number},{one.mean!r},{ends}," + ",".join(levels))
     return "\n".join(lines) + "\n"
 
 
@@ -68,6 +70,9 @@ def _page(study: ReadingsStudy, image: bytes) -> str:
         html_table(heads, rows, n_text=4),
         "<p>Of the other level against ours, with all other choices balanced; 95&nbsp;% intervals over readings.</p>",
         "<h2>All readings</h2>",
-        html_figure(image, "What cooperation adds in each reading, with its 95 % interval."),
+        html_figure(
+            image,
+            "What cooperation adds in each reading, with its 95 % interval over trainings, if there are three or more.",
+        ),
     ]
     return html_page("fireworld: readings", body)

@@ -1,31 +1,27 @@
-"""`reproduce_readings`: try the readings of a design, keep what comes of each at once, and say what was found."""
+"""What is tried of the readings, and what comes of it: the trials of a design, then the best readings once more."""
 
 from __future__ import annotations
 
-import csv
-import json
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from statistics import fmean
 from threading import Event
 from typing import Any, Final
 
 import numpy as np
 
-from fireworld.errors import OutputError, TrainingError, expected
-from fireworld.evaluation.statistics import Estimate, estimate
-from fireworld.executors import AnyExecutor, workers_for
-from fireworld.files import write_file
+from fireworld.executors import AnyExecutor, Workers, workers_for
 from fireworld.interrupt import Interrupted, gentle_interrupt
 from fireworld.kernels.arrays import Array
-from fireworld.reproduction.readings.choices import SHIPPED, OpenChoice, Reading, load_choices
+from fireworld.reproduction.readings.choices import OpenChoice, Reading, digest_of
 from fireworld.reproduction.readings.design import designed
-from fireworld.reproduction.readings.effects import Effect, main_effects, permutation_p
-from fireworld.reproduction.readings.trial import Trial
+from fireworld.reproduction.readings.effects import Effect, main_effects, over_trainings, permutation_p
+from fireworld.reproduction.readings.runs import Key, Runs
+from fireworld.reproduction.readings.timing import Timing
+from fireworld.reproduction.readings.trial import Setting, Trial, Tried, setting_of
 from fireworld.training.curriculum import load_curriculum
 from fireworld.training.methods.sarsa import PAPER, Sarsa
-from fireworld.training.training import check_same
 from fireworld.version import __version__
 
 FIRST_SEED: Final = 1000  # of the tests
@@ -33,24 +29,28 @@ FRESH: Final = 10_000
 """What is added to the seeds of trainings that confirm."""
 N_BEST: Final = 3
 """Readings that are confirmed."""
-RUNS: Final = "readings-runs.csv"
-SETTINGS: Final = "readings-settings.json"
-HEADS: Final = ("reading", "training", "seed", "cooperative", "non_cooperative")
-Key = tuple[int, int]  # a reading and the seed of its training
+OnProgress = Callable[[str, int, int], object]
+"""Called with what is being done, how many parts of it are done, and how many there are."""
 
 
 @dataclass(frozen=True)
 class ReadingsSize:
-    """How much is tried."""
+    """How much is tried: trainings of each reading, at least so many fresh ones of the best, seeds of each test."""
 
     design: str
     trainings: int
     seeds: int
     method: Sarsa = PAPER
+    fresh: int = 1
+
+    @property
+    def n_fresh(self) -> int:
+        """Fresh trainings of each of the best readings."""
+        return max(self.trainings, self.fresh)
 
 
-SCREEN: Final = ReadingsSize("screen", 2, 10)
-FULL: Final = ReadingsSize("full", 5, 20)
+SCREEN: Final = ReadingsSize("screen", 2, 10, fresh=5)
+FULL: Final = ReadingsSize("full", 5, 20, fresh=5)
 QUICK: Final = ReadingsSize("quick", 1, 2, Sarsa(n_episodes_max=6, n_episodes_unchanged=3))
 
 
@@ -66,6 +66,7 @@ class ReadingsStudy:
         differences: of each reading, cooperative - non-cooperative, share of the greatest score: (trainings, seeds).
         levels: of each reading, the cooperative team's share.
         confirmed: the same differences of the best readings in fresh trainings, by the number of the reading.
+        timing: how long it took.
     """
 
     size: ReadingsSize
@@ -75,11 +76,12 @@ class ReadingsStudy:
     differences: Sequence[Array]
     levels: Sequence[Array]
     confirmed: dict[int, Array] = field(default_factory=dict)
+    timing: Timing = field(default_factory=Timing)
 
     @property
-    def estimates(self) -> list[Estimate]:
+    def estimates(self) -> list[Effect]:
         """What cooperation adds in each reading."""
-        return [estimate(values) for values in self.differences]
+        return [over_trainings(values) for values in self.differences]
 
     @property
     def effects(self) -> list[Effect]:
@@ -111,181 +113,112 @@ def best_of(differences: Sequence[Array]) -> list[int]:
     return sorted(range(len(differences)), key=lambda n: (-float(differences[n].mean()), n))[:N_BEST]
 
 
-def try_readings(
+def measure_readings(
     folder: Path,
+    choices: Sequence[OpenChoice],
     *,
-    file: Path | str = SHIPPED,
     size: ReadingsSize = SCREEN,
     curriculum: str | Path = "paper",
     resume: bool = False,
     force: bool = False,
     executor: AnyExecutor = None,
-    on_progress: Callable[[str, int, int], object] = lambda *_: None,
+    on_progress: OnProgress = lambda *_: None,
     stop: Event | None = None,
 ) -> ReadingsStudy:
     """Try all readings of a design, then the best ones again in fresh trainings.
 
     Args:
         folder: where results are appended as they come.
-        file: the choices, as readings.yaml has them.
+        choices: what is open, and how it can be read.
         size: how much is tried.
         curriculum: name or file.
         resume: continue what an interrupted call left in the folder.
         force: replace that.
-        executor: who does the work; threads.
-        on_progress: called with what is being done, how many parts are done, and how many there are.
+        executor: who does the work, as for `try_readings`.
+        on_progress: likewise.
         stop: set it, and the work ends soon.
 
-    Raises:
-        TrainingError: a file that makes no sense, or other settings than those the folder was begun with.
-        OutputError: something is in the folder already, or it cannot be written.
-        Interrupted: Ctrl-C, or `stop` was set.
+    Raises: as `try_readings`.
     """
-    choices = load_choices(file)
     varied, signs, readings = designed(choices, kind=size.design)
     trained_in = load_curriculum(curriculum)
     seeds = range(FIRST_SEED, FIRST_SEED + size.seeds)
     with gentle_interrupt(stop) as asked:
+        workers = workers_for(executor, stop=asked)
         identity: dict[str, Any] = {
             "design": size.design,
             "trainings": size.trainings,
             "seeds": [*seeds],
             "method": size.method.as_dict(),
             "curriculum": {"digest": trained_in.digest},
+            "choices": {"digest": digest_of(choices)},
             "readings": [dict(reading.levels) for reading in readings],
             "fireworld": __version__,
         }
+        settings = [setting_of(reading, trained_in, size.method) for reading in readings]
         runs = Runs(folder, identity)
         runs.open(resume=resume, force=force)
-
-        def measure(what: str, keys: Sequence[Key]) -> dict[int, tuple[Array, Array]]:
-            left = [key for key in keys if key not in runs.found]
-            trials = [Trial(n, readings[n], seed, trained_in, size.method, seeds, asked) for n, seed in left]
-            on_progress(what, len(keys) - len(left), len(keys))
-
-            def on_result(place: int, shares: list[tuple[float, float]]) -> None:
-                runs.add(left[place], seeds, shares)
-                on_progress(what, sum(key in runs.found for key in keys), len(keys))
-
-            if workers_for(executor, stop=asked).run(trials, on_result) is None:
-                raise Interrupted("interrupted")
-            found: dict[int, list[Array]] = {}
-            for n, seed in keys:
-                found.setdefault(n, []).append(np.array(runs.found[n, seed]))
-            return {n: (np.array([one[:, 0] - one[:, 1] for one in of]), np.array([one[:, 0] for one in of]))
-                    for n, of in found.items()}  # fmt: skip
-
+        trials = Trials(settings, seeds, runs, workers, on_progress)
         try:
-            tried = measure("trying", [(n, seed + 1) for n in range(len(readings)) for seed in range(size.trainings)])
-            differences, levels = ([tried[n][part] for n in range(len(readings))] for part in (0, 1))
-            again = [(n, FRESH + seed + 1) for n in best_of(differences) for seed in range(size.trainings)]
-            confirmed = {n: values for n, (values, _) in measure("confirming", again).items()}
+            tried = trials.run(
+                "trying", [(n, seed + 1) for n in range(len(readings)) for seed in range(size.trainings)]
+            )
+            differences = [one[:, :, 0] - one[:, :, 1] for one in tried.values()]
+            again = [(n, FRESH + seed + 1) for n in best_of(differences) for seed in range(size.n_fresh)]
+            confirmed = trials.run("confirming", again)
         except KeyboardInterrupt:
             raise Interrupted(
                 f"interrupted; {len(runs.found)} trials are kept in {folder}: --resume continues"
             ) from None
     runs.sort()
-    return ReadingsStudy(size, varied, signs, readings, differences, levels, confirmed)
+    return ReadingsStudy(
+        size=size,
+        choices=varied,
+        signs=signs,
+        readings=readings,
+        differences=differences,
+        levels=[one[:, :, 0] for one in tried.values()],
+        confirmed={n: one[:, :, 0] - one[:, :, 1] for n, one in confirmed.items()},
+        timing=trials.timing,
+    )
 
 
-class Runs:
-    """The runs of a study: a CSV file that a trial's lines are appended to once it is done.
+class Trials:
+    """The trials of a study, whoever makes them.
 
     Attributes:
-        found: by reading and training, the shares with and without cooperation of every seed.
+        timing: how long those took that were made now.
     """
 
-    def __init__(self, folder: Path, identity: dict[str, Any]) -> None:
-        self._folder, self._identity = folder, identity
-        self._seeds = [int(seed) for seed in identity["seeds"]]
-        self.found: dict[Key, list[tuple[float, float]]] = {}
+    def __init__(
+        self, settings: Sequence[Setting], seeds: Sequence[int], runs: Runs, workers: Workers, on_progress: OnProgress
+    ) -> None:
+        self._settings, self._seeds, self._runs, self._workers = settings, seeds, runs, workers
+        self._on_progress = on_progress
+        self.timing = Timing(workers.n)
 
-    def open(self, *, resume: bool, force: bool) -> None:
-        """Begin the file, or read what is in it; errors as for `try_readings`."""
-        settings, runs = self._folder / SETTINGS, self._folder / RUNS
-        try:
-            if resume:
-                check_same(json.loads(settings.read_bytes()), self._identity, settings)
-                self._read(runs)
-                self.sort()  # without what a kill has left of a trial
-                return
-            if not force and self._folder.exists() and any(self._folder.iterdir()):
-                hint = "--resume continues it, --force replaces what is there"
-                raise OutputError(
-                    expected(str(self._folder), "", "a free name or an empty folder", "what is there", hint)
-                )
-            self._folder.mkdir(exist_ok=True)
-        except (OSError, ValueError) as error:
-            hint = "leave out --resume" if resume else ""
-            raise OutputError(expected(str(self._folder), "", "a folder of readings", error, hint)) from None
-        write_file(settings, json.dumps(self._identity) + "\n")
-        self.sort()
+    def run(self, what: str, keys: Sequence[Key]) -> dict[int, Array]:
+        """Make the trials that have not been made before; return the shares, (trainings, seeds, 2), of each reading.
 
-    def add(self, key: Key, seeds: Sequence[int], shares: list[tuple[float, float]]) -> None:
-        """Append a trial's lines."""
-        self.found[key] = shares
-        lines = [
-            f"{key[0]},{key[1]},{seed},{one!r},{other!r}\n" for seed, (one, other) in zip(seeds, shares, strict=True)
-        ]
-        try:
-            with (self._folder / RUNS).open("a", encoding="utf-8") as file:
-                file.write("".join(lines))
-        except OSError as error:
-            raise OutputError(f"{self._folder / RUNS}: cannot be written: {error.strerror}") from None
+        Raises:
+            Interrupted: all were asked to stop.
+            OutputError, ExecutorError: as for `try_readings`.
+        """
+        runs, workers, begun, made = self._runs, self._workers, time.perf_counter(), list[Tried]()
+        left = [key for key in keys if key not in runs.found]
+        trials = [Trial(self._settings[n], training, self._seeds, workers.stop) for n, training in left]
+        self._on_progress(what, len(keys) - len(left), len(keys))
 
-    def sort(self) -> None:
-        """Write all trials in their order: equal studies give equal bytes."""
-        lines = [",".join(HEADS)]
-        for (n, training), shares in sorted(self.found.items()):
-            lines += [f"{n},{training},{seed},{a!r},{b!r}" for seed, (a, b) in zip(self._seeds, shares, strict=True)]
-        write_file(self._folder / RUNS, "\n".join(lines) + "\n")
+        def on_result(place: int, tried: Tried) -> None:
+            runs.add(left[place], self._seeds, tried.shares)
+            made.append(tried)
+            self._on_progress(what, sum(key in runs.found for key in keys), len(keys))
 
-    def _read(self, path: Path) -> None:
-        rows: dict[Key, dict[int, tuple[float, float]]] = {}
-        text = path.read_text(encoding="utf-8")
-        whole = text[: text.rfind("\n") + 1]  # a kill may leave a part of the last line
-        for number, row in enumerate(csv.reader(whole.splitlines()), 1):
-            if number == 1 and tuple(row) == HEADS:
-                continue
-            try:
-                n, training, seed, one, other = int(row[0]), int(row[1]), int(row[2]), float(row[3]), float(row[4])
-            except (ValueError, IndexError):
-                wanted = ",".join(HEADS)
-                raise TrainingError(expected(str(path), f"line {number}", wanted, ",".join(row))) from None
-            rows.setdefault((n, training), {})[seed] = one, other
-        wanted_seeds = self._seeds
-        self.found = {key: [of[seed] for seed in wanted_seeds] for key, of in rows.items() if [*of] == wanted_seeds}
-
-
-def findings_text(study: ReadingsStudy) -> list[str]:
-    """Return what was found, a sentence each, written from the numbers."""
-    found = study.estimates
-    n_above, n_below = sum(one.above_zero for one in found), sum(one.below_zero for one in found)
-    mean = fmean(one.mean for one in found)
-    said = [
-        (
-            f"Over {len(found)} readings cooperation adds {mean:+.2f} of the greatest score on the mean; in "
-            f"{100 * n_above / len(found):.0f} % of them the interval lies above 0, in "
-            f"{100 * n_below / len(found):.0f} % below. In the paper it adds +0.60."
-        ),
-        f"That no reading matters has p = {study.p:.3f} (main effects together, {len(study.choices)} choices).",
-    ]
-    sure = [one for one in study.effects if one.low > 0 or one.high < 0]
-    said.append(
-        "Choices that change what cooperation adds: " + "; ".join(f"{one.choice} {one.text()}" for one in sure) + "."
-        if sure
-        else "No choice by itself changes what cooperation adds by an amount that is off 0."
-    )
-    sure = [one for one in study.level_effects if one.low > 0 or one.high < 0]
-    if sure:
-        said.append("On the cooperative team's level: " + "; ".join(f"{one.choice} {one.text()}" for one in sure) + ".")
-    for number, values in study.confirmed.items():
-        again, first = estimate(values), found[number]
-        word = "holds" if again.above_zero else "does not hold"
-        said.append(
-            f"Reading {number} ({study.named(number)}): {first.text(sign=True)} first, {again.text(sign=True)} in "
-            f"fresh trainings; the claim {word} there."
-        )
-    if study.size.design == "quick" or study.size.trainings < 2:
-        said.append("This was too little to claim anything: it shows how it looks.")
-    return said
+        if workers.run(trials, on_result) is None:
+            raise Interrupted("interrupted")
+        elapsed = time.perf_counter() - begun
+        self.timing.add([one.seconds for one in made], [one.computing for one in made], elapsed)
+        found: dict[int, list[Any]] = {}
+        for n, training in keys:
+            found.setdefault(n, []).append(runs.found[n, training])
+        return {n: np.array(shares) for n, shares in found.items()}

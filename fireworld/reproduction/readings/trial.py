@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from threading import Event
 from typing import Any
 
@@ -14,8 +15,9 @@ from fireworld.interrupt import Interrupted
 from fireworld.policy.kernel import from_tables
 from fireworld.policy.words import N_FLAG_VALUES
 from fireworld.reproduction import paper
-from fireworld.reproduction.readings.choices import Reading
+from fireworld.reproduction.readings.choices import Reading, StudySettings
 from fireworld.scenario import Scenario, load_scenario
+from fireworld.scenario.scenario import read_city_file
 from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.simulation.state import NO_LEARNER, fresh_learner
 from fireworld.training.curriculum import Curriculum
@@ -27,43 +29,106 @@ OTHER_TRAININGS = 100_000
 
 
 @dataclass(frozen=True)
-class Trial:
-    """A reading and a training of it.
+class Tried:
+    """What came of a trial.
 
     Attributes:
-        number: of the reading.
-        reading: what is read how.
-        training: seed of the training.
-        curriculum: as the paper's; the reading changes it.
-        method: likewise.
-        seeds: of the runs of each test.
-        stop: set it, and Interrupted is raised soon.
+        shares: for every seed, the share of the greatest score, mean over the tests, with and without cooperation.
+        seconds: how long it took.
+        computing: seconds of that in which it had a core; the rest it waited for others.
     """
 
-    number: int
-    reading: Reading
-    training: int
-    curriculum: Curriculum
-    method: Sarsa
-    seeds: Sequence[int]
-    stop: Event
+    shares: list[tuple[float, float]]
+    seconds: float
+    computing: float
 
-    def __call__(self) -> list[tuple[float, float]]:
-        """Return for every seed the share of the greatest score, mean over the tests, with and without cooperation."""
-        cities = CityCache()
-        method = self.method.with_settings(self.reading.level.method)
+
+@dataclass(frozen=True)
+class Setting:
+    """All that the trials of a reading have in common.
+
+    Attributes:
+        curriculum: as the reading has it.
+        tests: likewise.
+        method: likewise.
+        study: how teams are trained and tested.
+        files: contents of city files by their SHA-256.
+    """
+
+    curriculum: Curriculum
+    tests: Sequence[Scenario]
+    method: Sarsa
+    study: StudySettings
+    files: Mapping[str, bytes]
+
+
+def setting_of(reading: Reading, curriculum: Curriculum, method: Sarsa) -> Setting:
+    """Return the setting of a reading that changes the paper's curriculum, method and tests.
+
+    Raises:
+        ScenarioError: a city file that cannot be read.
+        CityError: an official map that makes no city.
+    """
+    training, varied = reading.level.training, method.with_settings(reading.level.method)
+    stages = [
+        replace(stage, scenarios=tuple(_varied(one, reading).with_values(training) for one in stage.scenarios))
+        for stage in curriculum.stages
+    ]
+    in_tests = {"choices": varied.choices}
+    tests = [_varied(load_scenario(row.scenario), reading, in_tests) for row in paper.TABLE_2]
+    files = dict[str, bytes]()
+    for scenario in (*(one for stage in stages for one in stage.scenarios), *tests):
+        if scenario.city_sha256 is not None and scenario.city_sha256 not in files:
+            files[scenario.city_sha256] = read_city_file(scenario)
+    return Setting(replace(curriculum, stages=tuple(stages)), tests, varied, reading.study, files)
+
+
+def _varied(scenario: Scenario, reading: Reading, more: Mapping[str, Any] | None = None) -> Scenario:
+    """Return a scenario as a reading has it, with some values more."""
+    values = {**reading.level.scenario, **(more or {})}
+    for place, fire in enumerate(scenario.fires):
+        if reading.study.fires != 1.0 and fire.n_buildings is not None:
+            values[f"fires.{place}.n_buildings"] = max(1, round(fire.n_buildings * reading.study.fires))
+    return msgspec.structs.replace(scenario.with_values(values), name=scenario.name)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A training of a reading, and its tests; it can be sent to other processes.
+
+    Attributes:
+        setting: of the reading.
+        training: seed of the training.
+        seeds: of the runs of each test.
+        stop: set it, and Interrupted is raised soon; it stays in this process.
+    """
+
+    setting: Setting
+    training: int
+    seeds: Sequence[int]
+    stop: Event = field(default_factory=Event)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Send all but what asks to stop."""
+        return Trial, (self.setting, self.training, self.seeds)
+
+    def __call__(self) -> Tried:
+        """Train and test both teams."""
+        begun, computed = time.perf_counter(), time.thread_time()
+        cities, method = CityCache(self.setting.files), self.setting.method
         together, alone = self._train(method, cities)
         shares = np.zeros((len(self.seeds), 2))
-        for row in paper.TABLE_2:
-            built = cities.build(self._varied(load_scenario(row.scenario), choices=method.choices))
+        for test in self.setting.tests:
+            built = cities.build(test)
             for place, seed in enumerate(self.seeds):
                 shares[place] += self._share(built, together, method, seed), self._share(built, alone, method, seed)
-        shares /= len(paper.TABLE_2)
-        return [(float(one), float(other)) for one, other in shares]
+        shares /= len(self.setting.tests)
+        pairs = [(float(one), float(other)) for one, other in shares]
+        return Tried(pairs, time.perf_counter() - begun, time.thread_time() - computed)
 
     def _train(self, method: Sarsa, cities: CityCache) -> tuple[Any, Any]:
         """Return the tables of the cooperative team, and of the one without cooperation."""
-        curriculum = self._curriculum()
+        curriculum = self.setting.curriculum
         flagless = [stage for stage in curriculum.stages if not stage.cooperation]
         n_alone = sum(len(stage.scenarios) for stage in flagless)
         trainer, alone = SarsaTrainer(curriculum, method, seed=self.training, cities=cities), None
@@ -72,7 +137,7 @@ class Trial:
                 raise Interrupted("interrupted")
             if alone is None and trainer.progress.scenario_number == n_alone:
                 alone = trainer.progress.tables[:1, ::N_FLAG_VALUES].copy()
-        study = self.reading.study
+        study = self.setting.study
         if study.alone_through_both or study.different_alone:
             n = N_DIFFERENT if study.different_alone else 1
             seeds = [self.training + OTHER_TRAININGS * k for k in range(n)]
@@ -89,7 +154,7 @@ class Trial:
                 scenarios=tuple(scenario.with_values(single) for scenario in stage.scenarios),
             )
             for stage in curriculum.stages
-            if not stage.cooperation or self.reading.study.alone_through_both
+            if not stage.cooperation or self.setting.study.alone_through_both
         ]
         trainer = SarsaTrainer(replace(curriculum, stages=tuple(stages)), method, seed=seed, cities=cities)
         for _ in trainer:
@@ -97,28 +162,9 @@ class Trial:
                 raise Interrupted("interrupted")
         return trainer.team().tables
 
-    def _curriculum(self) -> Curriculum:
-        """Return the curriculum as the reading has it."""
-        training = self.reading.level.training
-        stages = [
-            replace(stage, scenarios=tuple(self._varied(one).with_values(training) for one in stage.scenarios))
-            for stage in self.curriculum.stages
-        ]
-        return replace(self.curriculum, stages=tuple(stages))
-
-    def _varied(self, scenario: Scenario, *, choices: str | None = None) -> Scenario:
-        """Return a scenario as the reading has it."""
-        values = dict(self.reading.level.scenario)
-        if choices is not None:
-            values["choices"] = choices
-        for place, fire in enumerate(scenario.fires):
-            if self.reading.study.fires != 1.0 and fire.n_buildings is not None:
-                values[f"fires.{place}.n_buildings"] = max(1, round(fire.n_buildings * self.reading.study.fires))
-        return msgspec.structs.replace(scenario.with_values(values), name=scenario.name)
-
     def _share(self, built: BuiltScenario, tables: Any, method: Sarsa, seed: int) -> float:
         """Return the share of the greatest score that a team reaches in a test."""
-        world, study, learner = built.world(seed=seed), self.reading.study, NO_LEARNER
+        world, study, learner = built.world(seed=seed), self.setting.study, NO_LEARNER
         policy = from_tables(tables.copy(), commit=method.commit).for_brigades(built.n_brigades)
         if study.learn_in_tests:
             rates = {name: getattr(method, name) for name in ("alpha", "alpha_decay", "gamma")}
