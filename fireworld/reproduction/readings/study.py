@@ -49,7 +49,7 @@ class ReadingsSize:
         return max(self.trainings, self.fresh)
 
 
-SCREEN: Final = ReadingsSize("screen", 2, 10, fresh=5)
+SCREEN: Final = ReadingsSize("screen", 8, 10, fresh=20)
 FULL: Final = ReadingsSize("full", 5, 20, fresh=5)
 QUICK: Final = ReadingsSize("quick", 1, 2, Sarsa(n_episodes_max=6, n_episodes_unchanged=3))
 
