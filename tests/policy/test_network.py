@@ -15,6 +15,7 @@ from fireworld.policy.teams.network_layers import FEATURES, SEEN
 from fireworld.policy.teams.network_team import NetworkTeam
 from fireworld.policy.teams.ranking_team import RankingTeam
 from fireworld.policy.teams.team import load_team
+from fireworld.records import ACTIONS
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import build_scenario
 from tests.networks import make_network, random_layers
@@ -71,10 +72,15 @@ def test_the_best_team_as_a_network():
         assert ends[0] == ends[1]
 
 
+AROUND_TOO = [name for name in SEEN if name not in ACTIONS]
+
+
 @pytest.mark.parametrize("own_targets", [False, True])
 @pytest.mark.parametrize("seed", range(3))
-def test_step_by_step_and_at_once_are_the_same(own_targets, seed):
-    policy = make_network(seed=seed, own_targets=own_targets).policy()
+@pytest.mark.parametrize("features", [FEATURES, AROUND_TOO])
+def test_step_by_step_and_at_once_are_the_same(own_targets, seed, features):
+    widths = len(features), 9, 6, 1
+    policy = make_network(*widths, seed=seed, own_targets=own_targets, features=features).policy()
     stepped, run = (town_world(seed=seed, n_fires=6) for _ in range(2))
     assert play(stepped, policy) == run.run(policy.for_brigades(3))
     for name in ("energy", "water"):

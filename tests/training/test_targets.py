@@ -51,6 +51,10 @@ def test_the_same_seed_gives_the_same_team(fires):
     assert (numbers(one) == one.progress.numbers).all()
 
 
+def test_it_is_the_same_on_every_machine(fires):
+    assert trained(fires).team().digest[:16] == "124f9f56a575e2f4"
+
+
 def test_a_training_goes_on_where_it_stood(fires):
     whole = trained(fires)
     first = Targets(**SHORT).trainer(fires, seed=1)
