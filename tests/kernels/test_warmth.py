@@ -33,7 +33,7 @@ def run_in_one_call(row, n_steps):
     begin(city.cover, world.fire, warmth)
     for _ in range(n_steps):
         clock[STEP] += 1
-        begin_step(city, world, warmth, clock[STEP])
+        begin_step(city, world, episode.constants, warmth, clock[STEP])
         finish_step(city, world, episode.constants, warmth, clock[SEED], clock[STEP])
     score(world.fire, world.civilians, city.geometry, world.outcome)
 
