@@ -88,7 +88,7 @@ class Fit:
         return fmean(abs(math.log(max(ours, 1.0) / theirs)) for ours, theirs in pairs)
 
 
-ROWS: Final = (*paper.TABLE_2, *paper.TABLE_3)
+ROWS: Final = paper.TESTS.tests
 
 
 def grid() -> Iterator[World]:
@@ -112,11 +112,6 @@ def best_of(fits: Mapping[World, Fit]) -> World:
 def tests_in(world: World | None) -> list[Scenario]:
     """Return the tests of all rows in a world; None: today's."""
     return [load_scenario(row.scenario) if world is None else world.scenario(row.scenario) for row in ROWS]
-
-
-def shipped_name(name: str) -> str:
-    """Return how one of today's scenarios is called in the paper's world."""
-    return name.replace("train-", "paper-train-").replace("test-", "paper-")
 
 
 def text_of(world: World, name: str) -> str:
@@ -167,8 +162,8 @@ def main(context: click.Context, *, jobs: int | None, write: bool) -> None:
     click.echo("\n".join(table(fits, N_SHOWN)))
     click.echo(_row("today's tests", fit_of(tests_in(None), cities, workers)))
     best, differing = best_of(fits), []
-    for name in (*(row.scenario for row in ROWS), *(row.scenario for row in paper.TABLE_1)):
-        path, text = shipped_folder() / f"{shipped_name(name)}.yaml", text_of(best, name)
+    for name in (*(row.scenario for row in ROWS), *(row.scenario for row in paper.TESTS.table_1)):
+        path, text = shipped_folder() / f"{paper.like_the_papers(name)}.yaml", text_of(best, name)
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             differing.append(path.stem)
             if write:

@@ -29,6 +29,13 @@ if TYPE_CHECKING:
     help="Folder to make.",
 )
 @click.option("--quick", is_flag=True, help="Few repetitions and seeds: to see how it looks, not to claim anything.")
+@click.option(
+    "--world",
+    type=click.Choice(["paper", "tests"]),
+    default="paper",
+    show_default=True,
+    help="A world like the paper's, or the denser city of `test-1`, `test-2`, `test-3`.",
+)
 @click.option("--record-trainings", is_flag=True, help="Keep a training log of every training in DIR/trainings.")
 @click.option("--resume", is_flag=True, help="Continue what an interrupted call left in DIR.")
 @click.option("--force", is_flag=True, help="Replace an earlier reproduction in DIR.")
@@ -51,6 +58,7 @@ def command(
     on: str | None,
     out: Path,
     quick: bool,
+    world: str,
     record_trainings: bool,
     resume: bool,
     force: bool,
@@ -89,6 +97,7 @@ def command(
             repetitions=repetitions,
             seeds=seeds,
             quick=quick,
+            world=world,
             record_trainings=record_trainings,
             resume=resume,
             force=force,

@@ -8,7 +8,6 @@ from statistics import fmean
 from typing import Final, Literal
 
 from fireworld.evaluation.statistics import Estimate, mean
-from fireworld.reproduction import paper
 from fireworld.reproduction.paper_tables import (
     APART,
     NEAR,
@@ -98,7 +97,7 @@ def report_text(study: Study, tables: PaperTables) -> str:
 
 def _cooperation(tables: PaperTables) -> Finding:
     main = tables.comparisons[0]
-    theirs = fmean((row.score[1] - row.score[0]) / row.score_max for row in paper.TABLE_2)
+    theirs = fmean((row.score[1] - row.score[0]) / row.score_max for row in tables.world.table_2)
     unsure = main.difference.low <= theirs <= main.difference.high
     return Finding(
         "Is the cooperative team better than the non-cooperative one (Table 2)?",
@@ -127,7 +126,8 @@ def _parts(tables: PaperTables) -> Finding:
 
 
 def _uncontrolled(study: Study, tables: PaperTables) -> Finding:
-    names = [row.scenario for row in paper.TABLE_2]
+    rows = study.world.table_2
+    names = [row.scenario for row in rows]
     burnt, steps = (
         [mean(study.values(name, NO_WATER, quantity)) for name in names] for quantity in ("n_burnt_out", "steps")
     )
@@ -138,8 +138,8 @@ def _uncontrolled(study: Study, tables: PaperTables) -> Finding:
         _degree(n_near, len(cells)),
         f"{n_near} of the {len(cells)} times and numbers of burnt-out buildings of the non-cooperative team have our "
         f"mean within 25 %. Left to itself the fire burns {_list(burnt)} buildings out in {_list(steps)} "
-        f"steps; the paper's non-cooperative team loses {_list(row.burnt_out[0] for row in paper.TABLE_2)} in "
-        f"{_list(row.steps[0] for row in paper.TABLE_2)}.",
+        f"steps; the paper's non-cooperative team loses {_list(row.burnt_out[0] for row in rows)} in "
+        f"{_list(row.steps[0] for row in rows)}.",
     )
 
 

@@ -56,22 +56,15 @@ def curriculum(tmp_path):
 
 
 TEST = paper.PaperTest("quick", 2, (90, 60), (5, 1), (3.0, 4.0), 5)
-SMALL_PAPER = {"TABLE_1": (paper.PaperTraining("quick", 50, 4.5, 5),), "TABLE_2": (TEST,), "TABLE_3": (TEST,)}
-
-
-def make_paper_small():
-    """Make a paper whose every scenario is a small town."""
-    vars(paper).update(SMALL_PAPER)
+SMALL_PAPER = paper.World("paper", "paper", (paper.PaperTraining("quick", 50, 4.5, 5),), (TEST,), (TEST,))
 
 
 @pytest.fixture
 def small(tmp_path, monkeypatch, curriculum):
     """A paper whose every scenario is a small town."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("fireworld.reproduction.reproduce.CURRICULUM", curriculum)
     monkeypatch.setattr("fireworld.reproduction.reproduce.PAPER", METHOD)
-    for name, rows in SMALL_PAPER.items():
-        monkeypatch.setattr(paper, name, rows)
+    monkeypatch.setitem(paper.WORLDS, "paper", replace(SMALL_PAPER, curriculum=str(curriculum)))
     return tmp_path
 
 
@@ -265,7 +258,7 @@ def test_wrong_arguments_take_one_line_and_leave_nothing(small, words, message):
 
 
 def test_a_curriculum_without_table_1_takes_one_line(small, curriculum, monkeypatch):
-    monkeypatch.setattr("fireworld.reproduction.paper.TABLE_1", (paper.PaperTraining("train-1", 50, 4.5, 5),))
+    monkeypatch.setitem(paper.WORLDS, "paper", paper.PAPER)
     with pytest.raises(TrainingError, match="expected all scenarios of the paper's Table 1"):
         reproduce("found", curriculum=curriculum)
     assert not (small / "found").exists()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.paper_world import ROWS, Fit, World, best_of, fit_of, grid, shipped_name, table, text_of
+from benchmarks.paper_world import ROWS, Fit, World, best_of, fit_of, grid, table, text_of
 from fireworld.executors import threads
 from fireworld.reproduction import paper
 from fireworld.scenario import load_scenario
@@ -12,12 +12,12 @@ from fireworld.scenario.shipped import shipped_folder
 from fireworld.simulation.built import CityCache
 
 SHIPPED = World(16.0, (0.6, 0.85), 2.0, 167)
-NAMES = [row.scenario for row in (*ROWS, *paper.TABLE_1)]
+NAMES = [row.scenario for row in (*ROWS, *paper.TESTS.table_1)]
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_shipped_scenarios_are_those_of_a_world_of_the_grid(name):
-    path = shipped_folder() / f"{shipped_name(name)}.yaml"
+    path = shipped_folder() / f"{paper.like_the_papers(name)}.yaml"
     assert path.read_text(encoding="utf-8") == text_of(SHIPPED, name)
     assert SHIPPED in grid()
     civilians = {key: getattr(load_scenario(path).civilians, key) for key in ("from_m", "to_m")}
