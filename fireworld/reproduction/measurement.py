@@ -220,7 +220,7 @@ class Measurement:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Send what decides the outcome; another process builds tests and cities once."""
-        settings = (self.n_repetitions, self.seeds, self.record_trainings)
+        settings = (self.n_repetitions, self.seeds, self.world, self.record_trainings)
         return _received, (self.folder, self.curriculum, self.method, *settings)
 
     def _test(

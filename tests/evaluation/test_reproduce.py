@@ -6,6 +6,7 @@ import json
 import shutil
 import signal
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 from threading import Event
@@ -202,7 +203,7 @@ def undrawn(monkeypatch):
 def test_from_python_with_an_executor_it_is_the_same(small, undrawn, curriculum):
     """The tables of threads and processes are equal; what is done shows itself."""
     told, found = [], {}
-    there = ProcessPoolExecutor(2, get_context("spawn"), initializer=make_paper_small)
+    there = ProcessPoolExecutor(2, get_context("spawn"))
     with there, ThreadPoolExecutor(2) as here:
         for name, executor in (("threads", 1), ("here", here), ("there", there)):
             words = {"repetitions": 2, "seeds": 2, "executor": executor}
