@@ -32,9 +32,7 @@ if TYPE_CHECKING:
 @click.option(
     "--world",
     type=click.Choice(["paper", "tests"]),
-    default="paper",
-    show_default=True,
-    help="A world like the paper's, or the denser city of `test-1`, `test-2`, `test-3`.",
+    help="A world like the paper's, or the denser city of `test-1` to `test-3`.  [default: paper; --resume: as begun]",
 )
 @click.option("--record-trainings", is_flag=True, help="Keep a training log of every training in DIR/trainings.")
 @click.option("--resume", is_flag=True, help="Continue what an interrupted call left in DIR.")
@@ -58,7 +56,7 @@ def command(
     on: str | None,
     out: Path,
     quick: bool,
-    world: str,
+    world: str | None,
     record_trainings: bool,
     resume: bool,
     force: bool,
@@ -84,6 +82,8 @@ def command(
     """
     if force and resume:
         raise click.UsageError("--force and --resume exclude each other.")
+    if readings is not None and world is not None:
+        raise click.UsageError("--readings begins with the world tests; its file says what else is tried, not --world.")
     announce_compilation()
     if readings is not None:
         executor = executor_of(on, jobs)

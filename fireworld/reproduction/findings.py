@@ -85,7 +85,7 @@ def tally(cells: Sequence[PaperCell]) -> str:
 def report_text(study: Study, tables: PaperTables) -> str:
     """Return the report as text: the paper's Tables 1 to 3 beside ours, and what was found."""
     lines = [
-        "paper: ours [95 % interval]",
+        f"in {tables.world.description}; paper: ours [95 % interval]",
         text_table(_HEADS, _rows(tables), "<<>>"),
         "= the paper's value is in it, ~ our mean is within 25 % of it, x neither",
         "",
@@ -102,8 +102,8 @@ def _cooperation(tables: PaperTables) -> Finding:
     return Finding(
         "Is the cooperative team better than the non-cooperative one (Table 2)?",
         "reproduced" if main.difference.above_zero else "open" if unsure else "not reproduced",
-        f"Share of the greatest score, mean over the three tests: {_difference(main)}; in the paper it is "
-        f"{theirs:+.2f}. {_directions(tables.tests)} {_sentence(tally(cells_of(tables.tests)))}",
+        f"Share of the greatest score, mean over the three tests, in {tables.world.description}: {_difference(main)}; "
+        f"in the paper it is {theirs:+.2f}. {_directions(tables.tests)} {_sentence(tally(cells_of(tables.tests)))}",
     )
 
 

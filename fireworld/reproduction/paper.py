@@ -37,6 +37,7 @@ class World:
     """The paper's tables, and the scenarios that stand for its own."""
 
     name: str
+    description: str
     curriculum: str
     """What its teams are trained in."""
     table_1: tuple[PaperTraining, ...]
@@ -51,6 +52,7 @@ class World:
 
 TESTS: Final = World(
     name="tests",
+    description="the dense city of test-1 to test-3 (--world tests)",
     curriculum="paper",
     table_1=(
         PaperTraining("train-1", 55, 9.977, 10),
@@ -83,6 +85,7 @@ def like_the_papers(name: str) -> str:
 
 PAPER: Final = World(
     name="paper",
+    description="a world like the paper's (--world paper)",
     curriculum="paper-like",
     table_1=tuple(replace(row, scenario=like_the_papers(row.scenario)) for row in TESTS.table_1),
     table_2=tuple(replace(row, scenario=like_the_papers(row.scenario)) for row in TESTS.table_2),

@@ -61,7 +61,8 @@ def _introduction(study: Study) -> str:
     n_runs = sum(len(row.seeds) for teams in study.outcomes.values() for rows in teams.values() for row in rows)
     return (
         "A. Abdolmaleki, M. Movahedi, N. Lau, L. P. Reis: <i>A Distributed Cooperative Reinforcement Learning Method "
-        "for Decision Making in Fire Brigade Teams</i> (RoboCup 2012), repeated: "
+        "for Decision Making in Fire Brigade Teams</i> (RoboCup 2012), repeated in "
+        f"{escape(study.world.description, quote=False)}: "
         f"<b>{study.n_repetitions}</b> trainings, each tested on <b>{len(study.seeds)}</b> seeds, {n_runs} test runs "
         "in all. Means are followed by their 95&nbsp;% interval over repetitions and seeds."
     )

@@ -76,7 +76,7 @@ def reproduce(
     repetitions: int | None = None,
     seeds: int | None = None,
     quick: bool = False,
-    world: str = DEFAULT_WORLD,
+    world: str | None = None,
     curriculum: Path | str | None = None,
     record_trainings: bool = False,
     resume: bool = False,
@@ -95,7 +95,8 @@ def reproduce(
         repetitions: trainings; None: 20, or 2 if quick.
         seeds: runs of each test; None: 20, or 5 if quick.
         quick: few repetitions and seeds: to see how it looks, not to claim anything.
-        world: "paper", a world like the paper's; or "tests", a denser city with smaller fires.
+        world: "paper", a world like the paper's; "tests", a denser city with smaller fires; None: that of the folder if
+            it is resumed, else "paper".
         curriculum: name or file of a curriculum that ends with the scenarios of Table 1; None: that of the world.
         record_trainings: keep the training log of every training in the folder's `trainings`, and read from it how the
             team learned; the tables are the same.
@@ -123,9 +124,9 @@ def reproduce(
     workers_for(executor)
     if util.find_spec("matplotlib") is None:
         raise ViewError("reproduce: matplotlib is not installed; try pip install 'fireworld[figures]'")
-    chosen = _world(world)
-    trained_in = _curriculum(chosen.curriculum if curriculum is None else curriculum, chosen)
     place = ReproductionFolder(path_of("folder", folder))
+    chosen = _world(world, place if resume else None)
+    trained_in = _curriculum(chosen.curriculum if curriculum is None else curriculum, chosen)
     if resume:
         place.find()
     else:
@@ -156,11 +157,16 @@ def reproduce(
             raise Interrupted(f"interrupted; {kept}: continue with --resume") from None
 
 
-def _world(given: str) -> World:
-    """Return a world by its name."""
-    if given not in WORLDS:
+def _world(given: str | None, resumed: ReproductionFolder | None) -> World:
+    """Return a world by its name; None: that of the folder that is resumed, or else the default."""
+    if given is not None and given not in WORLDS:
         raise ArgumentError(expected("world", "", "one of " + ", ".join(WORLDS), given))
-    return WORLDS[given]
+    if given is None and resumed is not None:
+        begun_with = resumed.tests
+        for world in WORLDS.values():
+            if begun_with == {row.scenario for row in world.tests}:
+                return world
+    return WORLDS[given or DEFAULT_WORLD]
 
 
 def _curriculum(given: Path | str, world: World) -> Curriculum:
