@@ -27,7 +27,7 @@ from fireworld.scenario import Scenario, load_scenario
 from fireworld.scenario.shipped import shipped_folder
 from fireworld.simulation.built import CityCache
 
-STREETS_M: Final = (8.0, 10.0, 12.0, 14.0, 16.0)
+STREETS_M: Final = (8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 20.0)
 FILLS: Final = ((0.5, 0.8), (0.6, 0.85), (0.7, 0.97))
 FIRES: Final = (1.0, 1.5, 2.0, 2.5)
 """How many times as many buildings burn at first as in today's tests."""
