@@ -3,7 +3,7 @@
 `python -m benchmarks.paper_world` runs a team that acts at random in every world of the grid, in the three tests with
 4 and with 7 and 8 brigades, and compares steps and burnt-out buildings with the rows "without cooperation" of the
 paper's Tables 2 and 3: nothing that anybody learned has a part in the choice. It prints the fits, today's tests among
-them, and says whether the shipped scenarios `paper-1` ... are those of the best fit; `--write` writes them. Minutes.
+them, and writes the scenarios `paper-1` ... of the best fit; with `--check` it says whether they are the shipped ones.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from fireworld.scenario import Scenario, load_scenario
 from fireworld.scenario.shipped import shipped_folder
 from fireworld.simulation.built import CityCache
 
-STREETS_M: Final = (8.0, 10.0, 12.0, 14.0, 16.0)
+STREETS_M: Final = (8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 20.0)
 FILLS: Final = ((0.5, 0.8), (0.6, 0.85), (0.7, 0.97))
 FIRES: Final = (1.0, 1.5, 2.0, 2.5)
 """How many times as many buildings burn at first as in today's tests."""
@@ -88,7 +88,7 @@ class Fit:
         return fmean(abs(math.log(max(ours, 1.0) / theirs)) for ours, theirs in pairs)
 
 
-ROWS: Final = (*paper.TABLE_2, *paper.TABLE_3)
+ROWS: Final = paper.TESTS.tests
 
 
 def grid() -> Iterator[World]:
@@ -114,11 +114,6 @@ def tests_in(world: World | None) -> list[Scenario]:
     return [load_scenario(row.scenario) if world is None else world.scenario(row.scenario) for row in ROWS]
 
 
-def shipped_name(name: str) -> str:
-    """Return how one of today's scenarios is called in the paper's world."""
-    return name.replace("train-", "paper-train-").replace("test-", "paper-")
-
-
 def text_of(world: World, name: str) -> str:
     """Return the file of a scenario in a world: that of today's, with other values."""
     base, lines = load_scenario(name), (shipped_folder() / f"{name}.yaml").read_text(encoding="utf-8").splitlines()
@@ -135,11 +130,12 @@ def text_of(world: World, name: str) -> str:
     return "\n".join(found) + "\n"
 
 
-def table(fits: Mapping[World, Fit], n: int) -> Iterator[str]:
+def table(fits: Mapping[World, Fit], n: int, *, todays: Fit) -> Iterator[str]:
     """Yield a Markdown table: the paper, today's tests, and the worlds that fit best."""
     yield "| world | " + " | ".join(f"{row.scenario}, {row.n_brigades}" for row in ROWS) + " | distance |"
     yield "|---" * (len(ROWS) + 2) + "|"
     yield _row("the paper, without cooperation", Fit([r.steps[0] for r in ROWS], [r.burnt_out[0] for r in ROWS]))
+    yield _row("today's tests", todays)
     for world in sorted(fits, key=lambda one: fits[one].distance)[:n]:
         low, high = world.fill
         built = f"{low:.0%} to {high:.0%} built"
@@ -154,27 +150,26 @@ def _row(name: str, fit: Fit) -> str:
 
 @click.command()
 @click.option("--jobs", type=click.IntRange(1), help="Runs at a time.  [default: cores]")
-@click.option("--write", is_flag=True, help="Write the scenarios of the best fit.")
+@click.option("--check", is_flag=True, help="Write nothing; exit code 1 if a shipped scenario is another.")
 @click.pass_context
-def main(context: click.Context, *, jobs: int | None, write: bool) -> None:
-    """Find the world most like the paper's; exit code 1 if the shipped one is another."""
+def main(context: click.Context, *, jobs: int | None, check: bool) -> None:
+    """Find the world most like the paper's, and write its scenarios."""
     workers, cities = workers_for(jobs), CityCache()
     worlds, fits = list(grid()), {}
     for number, world in enumerate(worlds, 1):
         fits[world] = fit_of(tests_in(world), cities, workers)
         click.echo(f"\r{number} of {len(worlds)} worlds", nl=False, err=True)
     click.echo("", err=True)
-    click.echo("\n".join(table(fits, N_SHOWN)))
-    click.echo(_row("today's tests", fit_of(tests_in(None), cities, workers)))
+    click.echo("\n".join(table(fits, N_SHOWN, todays=fit_of(tests_in(None), cities, workers))))
     best, differing = best_of(fits), []
-    for name in (*(row.scenario for row in ROWS), *(row.scenario for row in paper.TABLE_1)):
-        path, text = shipped_folder() / f"{shipped_name(name)}.yaml", text_of(best, name)
+    for name in (*(row.scenario for row in ROWS), *(row.scenario for row in paper.TESTS.table_1)):
+        path, text = shipped_folder() / f"{paper.like_the_papers(name)}.yaml", text_of(best, name)
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             differing.append(path.stem)
-            if write:
+            if not check:
                 write_file(path, text)
-    if differing and not write:
-        click.echo(f"not as shipped: {', '.join(differing)}; --write replaces them")
+    click.echo(f"{'another' if check else 'written'}: {', '.join(differing)}" if differing else "all as shipped")
+    if check and differing:
         context.exit(1)
 
 

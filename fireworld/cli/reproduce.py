@@ -29,6 +29,11 @@ if TYPE_CHECKING:
     help="Folder to make.",
 )
 @click.option("--quick", is_flag=True, help="Few repetitions and seeds: to see how it looks, not to claim anything.")
+@click.option(
+    "--world",
+    type=click.Choice(["paper", "tests"]),
+    help="A world like the paper's, or the denser city of `test-1` to `test-3`.  [default: paper; --resume: as begun]",
+)
 @click.option("--record-trainings", is_flag=True, help="Keep a training log of every training in DIR/trainings.")
 @click.option("--resume", is_flag=True, help="Continue what an interrupted call left in DIR.")
 @click.option("--force", is_flag=True, help="Replace an earlier reproduction in DIR.")
@@ -51,6 +56,7 @@ def command(
     on: str | None,
     out: Path,
     quick: bool,
+    world: str | None,
     record_trainings: bool,
     resume: bool,
     force: bool,
@@ -76,6 +82,8 @@ def command(
     """
     if force and resume:
         raise click.UsageError("--force and --resume exclude each other.")
+    if readings is not None and world is not None:
+        raise click.UsageError("--readings begins with the world tests; its file says what else is tried, not --world.")
     announce_compilation()
     if readings is not None:
         executor = executor_of(on, jobs)
@@ -90,6 +98,7 @@ def command(
             repetitions=repetitions,
             seeds=seeds,
             quick=quick,
+            world=world,
             record_trainings=record_trainings,
             resume=resume,
             force=force,

@@ -10,7 +10,6 @@ from typing import Final
 
 from fireworld.evaluation.statistics import Estimate
 from fireworld.outcome import COLUMNS
-from fireworld.reproduction import paper
 from fireworld.reproduction.paper_tables import PaperCell, PaperPair, PaperTables, cells_of
 from fireworld.reproduction.study import LearningCurve, Study
 
@@ -58,8 +57,9 @@ def _cooperation_rows(pairs: Iterable[PaperPair]) -> Rows:
 
 def _controls_rows(tables: PaperTables) -> Rows:
     """Score as a share of the greatest; interval; by team and scenario."""
+    world = tables.world
     yield "team", "scenario", *_ESTIMATE
-    for table, shares in ((paper.TABLE_2, tables.shares), (paper.TABLE_3, tables.shares_more_brigades)):
+    for table, shares in ((world.table_2, tables.shares), (world.table_3, tables.shares_more_brigades)):
         scenarios = [row.scenario for row in table]
         for share in shares:
             for scenario, found in zip(scenarios, share.by_scenario, strict=True):

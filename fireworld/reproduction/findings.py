@@ -8,7 +8,6 @@ from statistics import fmean
 from typing import Final, Literal
 
 from fireworld.evaluation.statistics import Estimate, mean
-from fireworld.reproduction import paper
 from fireworld.reproduction.paper_tables import (
     APART,
     NEAR,
@@ -86,7 +85,7 @@ def tally(cells: Sequence[PaperCell]) -> str:
 def report_text(study: Study, tables: PaperTables) -> str:
     """Return the report as text: the paper's Tables 1 to 3 beside ours, and what was found."""
     lines = [
-        "paper: ours [95 % interval]",
+        f"in {tables.world.description}; paper: ours [95 % interval]",
         text_table(_HEADS, _rows(tables), "<<>>"),
         "= the paper's value is in it, ~ our mean is within 25 % of it, x neither",
         "",
@@ -98,13 +97,13 @@ def report_text(study: Study, tables: PaperTables) -> str:
 
 def _cooperation(tables: PaperTables) -> Finding:
     main = tables.comparisons[0]
-    theirs = fmean((row.score[1] - row.score[0]) / row.score_max for row in paper.TABLE_2)
+    theirs = fmean((row.score[1] - row.score[0]) / row.score_max for row in tables.world.table_2)
     unsure = main.difference.low <= theirs <= main.difference.high
     return Finding(
         "Is the cooperative team better than the non-cooperative one (Table 2)?",
         "reproduced" if main.difference.above_zero else "open" if unsure else "not reproduced",
-        f"Share of the greatest score, mean over the three tests: {_difference(main)}; in the paper it is "
-        f"{theirs:+.2f}. {_directions(tables.tests)} {_sentence(tally(cells_of(tables.tests)))}",
+        f"Share of the greatest score, mean over the three tests, in {tables.world.description}: {_difference(main)}; "
+        f"in the paper it is {theirs:+.2f}. {_directions(tables.tests)} {_sentence(tally(cells_of(tables.tests)))}",
     )
 
 
@@ -127,7 +126,8 @@ def _parts(tables: PaperTables) -> Finding:
 
 
 def _uncontrolled(study: Study, tables: PaperTables) -> Finding:
-    names = [row.scenario for row in paper.TABLE_2]
+    rows = study.world.table_2
+    names = [row.scenario for row in rows]
     burnt, steps = (
         [mean(study.values(name, NO_WATER, quantity)) for name in names] for quantity in ("n_burnt_out", "steps")
     )
@@ -138,8 +138,8 @@ def _uncontrolled(study: Study, tables: PaperTables) -> Finding:
         _degree(n_near, len(cells)),
         f"{n_near} of the {len(cells)} times and numbers of burnt-out buildings of the non-cooperative team have our "
         f"mean within 25 %. Left to itself the fire burns {_list(burnt)} buildings out in {_list(steps)} "
-        f"steps; the paper's non-cooperative team loses {_list(row.burnt_out[0] for row in paper.TABLE_2)} in "
-        f"{_list(row.steps[0] for row in paper.TABLE_2)}.",
+        f"steps; the paper's non-cooperative team loses {_list(row.burnt_out[0] for row in rows)} in "
+        f"{_list(row.steps[0] for row in rows)}.",
     )
 
 

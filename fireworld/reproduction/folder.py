@@ -159,6 +159,13 @@ class ReproductionFolder:
         """Write what the work is begun with; errors as for `write_file`."""
         self._write(self.path / SETTINGS, {"format": FORMAT, **identity})
 
+    @property
+    def tests(self) -> set[str]:
+        """Names of the tests that the work was begun with, none if it was not; TrainingError if they cannot be read."""
+        found = self._read(self.path / SETTINGS, dict[str, Any]) or {}
+        tests = found.get("tests")
+        return set(tests) if isinstance(tests, dict) else set()
+
     def check_settings(self, identity: Mapping[str, Any]) -> None:
         """Check that the work was begun with the same settings; TrainingError if not, or if their file is damaged."""
         path = self.path / SETTINGS

@@ -19,8 +19,8 @@ from fireworld.policy.names import BUILT_IN
 from fireworld.policy.protocol import Policy
 from fireworld.policy.teams.table_team import TableTeam
 from fireworld.policy.words import N_STATES_ALONE
-from fireworld.reproduction import paper
 from fireworld.reproduction.folder import ReproductionFolder
+from fireworld.reproduction.paper import TESTS, World
 from fireworld.reproduction.repetitions import Repetition, n_scenarios, random_tables, train_repetition
 from fireworld.reproduction.study import (
     ALONE,
@@ -74,6 +74,7 @@ class Measurement:
     method: Sarsa
     n_repetitions: int
     seeds: Sequence[int]  # of the test runs
+    world: World = TESTS
     record_trainings: bool = False  # keep the training logs in the folder
     stop: Event = field(default_factory=Event)  # set it, and a part under way raises Interrupted
     on_progress: OnProgress = lambda *_: None  # called after every scenario of a training and every test of a policy
@@ -82,7 +83,7 @@ class Measurement:
     @cached_property
     def tests(self) -> Mapping[str, BuiltScenario]:
         """The tests of Tables 2 and 3, built."""
-        names = [row.scenario for row in (*paper.TABLE_2, *paper.TABLE_3)]
+        names = [row.scenario for row in self.world.tests]
         return {name: self.cities.build(load_scenario(name)) for name in names}
 
     @cached_property
@@ -152,6 +153,7 @@ class Measurement:
             for tested, controls in zip(of_repetitions, found[len(self.tests) :], strict=True)
         ]
         study = Study(
+            world=self.world,
             n_repetitions=self.n_repetitions,
             seeds=self.seeds,
             curves=[curve for repetition in repetitions for curve in repetition.curves],
@@ -218,7 +220,7 @@ class Measurement:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Send what decides the outcome; another process builds tests and cities once."""
-        settings = (self.n_repetitions, self.seeds, self.record_trainings)
+        settings = (self.n_repetitions, self.seeds, self.world, self.record_trainings)
         return _received, (self.folder, self.curriculum, self.method, *settings)
 
     def _test(

@@ -95,6 +95,7 @@ class TeamComparison:
 class PaperTables:
     """All tables of a reproduction."""
 
+    world: paper.World
     trainings: Sequence[PaperCell]
     converged: Sequence[Estimate]
     """Share of the repetitions in which the policy settled, by rows of Table 1."""
@@ -109,16 +110,18 @@ class PaperTables:
 
 def make_tables(study: Study) -> PaperTables:
     """Judge a study."""
-    names_2, names_3 = [row.scenario for row in paper.TABLE_2], [row.scenario for row in paper.TABLE_3]
+    world = study.world
+    names_2, names_3 = [row.scenario for row in world.table_2], [row.scenario for row in world.table_3]
     shares = _shares(study, names_2)
     return PaperTables(
-        trainings=[cell for row in paper.TABLE_1 for cell in _training_cells(study, row)],
+        world=world,
+        trainings=[cell for row in world.table_1 for cell in _training_cells(study, row)],
         converged=[
             estimate(_column(curve.converged for curve in study.curves_of(TOGETHER, row.scenario)))
-            for row in paper.TABLE_1
+            for row in world.table_1
         ],
-        tests=[pair for row in paper.TABLE_2 for pair in _pairs(study, row)],
-        more_brigades=[pair for row in paper.TABLE_3 for pair in _pairs(study, row)],
+        tests=[pair for row in world.table_2 for pair in _pairs(study, row)],
+        more_brigades=[pair for row in world.table_3 for pair in _pairs(study, row)],
         shares=shares,
         shares_more_brigades=_shares(study, names_3),
         comparisons=_comparisons(study, names_2, shares),

@@ -17,7 +17,7 @@ from fireworld.policy.names import NamedPolicy
 from fireworld.policy.teams.team import Team
 from fireworld.recording.record import play
 from fireworld.records import CityRecord, StepRecord
-from fireworld.reproduction import paper
+from fireworld.reproduction.paper import World
 from fireworld.reproduction.repetitions import Repetition
 from fireworld.reproduction.study import ALONE, TOGETHER, TOGETHER_WITHOUT_FLAGS, LearningCurve, Study
 from fireworld.scenario import load_scenario
@@ -39,15 +39,15 @@ class RecordedRun:
     last: StepRecord
 
 
-def runs_to_record(repetition: Repetition) -> list[tuple[str, str, Team]]:
+def runs_to_record(repetition: Repetition, world: World) -> list[tuple[str, str, Team]]:
     """Return scenario, team and its members for one run of each row of the paper's tables.
 
     In Table 1 it is the cooperative team as it was at the end of the row's scenario; in Tables 2 and 3 it is both teams
     as they are after all of their training.
     """
-    tests = [row.scenario for row in (*paper.TABLE_2, *paper.TABLE_3)]
+    tests = [row.scenario for row in world.tests]
     return [
-        *((row.scenario, TOGETHER, repetition.graduates[row.scenario]) for row in paper.TABLE_1),
+        *((row.scenario, TOGETHER, repetition.graduates[row.scenario]) for row in world.table_1),
         *((test, team, repetition.teams[team]) for test in tests for team in (ALONE, TOGETHER)),
     ]
 
@@ -67,7 +67,7 @@ def pictures(study: Study, recorded: Sequence[RecordedRun]) -> dict[str, Callabl
         "returns": lambda: png_bytes(draw_returns(study)),
         "policy-changes": lambda: png_bytes(draw_policy_changes(study)),
     }
-    tests = {row.scenario for row in (*paper.TABLE_2, *paper.TABLE_3)}
+    tests = {row.scenario for row in study.world.tests}
     for run in recorded:
         if run.scenario not in tests:
             continue
@@ -98,7 +98,7 @@ def _draw_curves(study: Study, label: str, of: Callable[[LearningCurve], Array])
             },
             marks={mark: row.convergence_episode},
         )
-        for row in paper.TABLE_1
+        for row in study.world.table_1
     ]
     return draw_learning_curves(panels, label=label, mark=mark)
 

@@ -9,7 +9,6 @@ from typing import Final
 
 from fireworld.evaluation.statistics import Estimate
 from fireworld.html_page import html_figure, html_mark, html_page, html_table, text_cell
-from fireworld.reproduction import paper
 from fireworld.reproduction.findings import caveat, findings, tally
 from fireworld.reproduction.paper_tables import (
     APART,
@@ -51,7 +50,7 @@ def report_page(study: Study, tables: PaperTables, images: Mapping[str, bytes]) 
         _image(images, "returns", "Return of each episode. Thick: mean over repetitions; thin: each of them."),
         _image(images, "policy-changes", "States in which the best action of a brigade changed."),
         "<h2>The city before and after</h2>",
-        *(_maps(images, row.scenario) for row in (*paper.TABLE_2, *paper.TABLE_3)),
+        *(_maps(images, row.scenario) for row in tables.world.tests),
         "<h2>How it was measured</h2>",
         " ".join(_METHOD.read_text(encoding="utf-8").split()),
     ]
@@ -62,7 +61,8 @@ def _introduction(study: Study) -> str:
     n_runs = sum(len(row.seeds) for teams in study.outcomes.values() for rows in teams.values() for row in rows)
     return (
         "A. Abdolmaleki, M. Movahedi, N. Lau, L. P. Reis: <i>A Distributed Cooperative Reinforcement Learning Method "
-        "for Decision Making in Fire Brigade Teams</i> (RoboCup 2012), repeated: "
+        "for Decision Making in Fire Brigade Teams</i> (RoboCup 2012), repeated in "
+        f"{escape(study.world.description, quote=False)}: "
         f"<b>{study.n_repetitions}</b> trainings, each tested on <b>{len(study.seeds)}</b> seeds, {n_runs} test runs "
         "in all. Means are followed by their 95&nbsp;% interval over repetitions and seeds."
     )
@@ -110,7 +110,7 @@ def _pairs(pairs: Sequence[PaperPair]) -> str:
 
 def _controls(tables: PaperTables) -> str:
     parts = ["<p>Share of the greatest score.</p>"]
-    for table, shares in ((paper.TABLE_2, tables.shares), (paper.TABLE_3, tables.shares_more_brigades)):
+    for table, shares in ((tables.world.table_2, tables.shares), (tables.world.table_3, tables.shares_more_brigades)):
         heads = ["team", "", *(row.scenario for row in table), "mean", "typical run"]
         parts.append(html_table(heads, [_share(row) for row in shares], n_text=2))
     return "\n".join([*parts, "<p>A typical run is the mean of the middle half of all runs.</p>"])

@@ -9,15 +9,15 @@ from pathlib import Path
 from threading import Event
 from typing import Final
 
-from fireworld.arguments import path_of, whole_number
+from fireworld.arguments import ArgumentError, path_of, whole_number
 from fireworld.errors import TrainingError, ViewError, expected
 from fireworld.executors import AnyExecutor, workers_for
 from fireworld.interrupt import Interrupted, gentle_interrupt
-from fireworld.reproduction import paper
 from fireworld.reproduction.csv_files import csv_files
 from fireworld.reproduction.findings import Finding, caveat, findings, report_text
 from fireworld.reproduction.folder import REPORT, ReproductionFolder
 from fireworld.reproduction.measurement import Measurement, OnProgress, Parts
+from fireworld.reproduction.paper import DEFAULT_WORLD, WORLDS, World
 from fireworld.reproduction.paper_tables import PaperTables, make_tables
 from fireworld.reproduction.recordings import pictures, record_run, runs_to_record
 from fireworld.reproduction.report_page import report_page
@@ -25,7 +25,6 @@ from fireworld.reproduction.study import Study
 from fireworld.training.curriculum import Curriculum, load_curriculum
 from fireworld.training.methods.sarsa import PAPER
 
-CURRICULUM: Final = "paper"
 FIRST_SEED: Final = 1000  # of the tests
 N_REPETITIONS: Final = 20
 N_SEEDS: Final = 20
@@ -77,6 +76,7 @@ def reproduce(
     repetitions: int | None = None,
     seeds: int | None = None,
     quick: bool = False,
+    world: str | None = None,
     curriculum: Path | str | None = None,
     record_trainings: bool = False,
     resume: bool = False,
@@ -95,7 +95,9 @@ def reproduce(
         repetitions: trainings; None: 20, or 2 if quick.
         seeds: runs of each test; None: 20, or 5 if quick.
         quick: few repetitions and seeds: to see how it looks, not to claim anything.
-        curriculum: name or file of a curriculum that ends with the scenarios of Table 1; None: the paper's.
+        world: "paper", a world like the paper's; "tests", a denser city with smaller fires; None: that of the folder if
+            it is resumed, else "paper".
+        curriculum: name or file of a curriculum that ends with the scenarios of Table 1; None: that of the world.
         record_trainings: keep the training log of every training in the folder's `trainings`, and read from it how the
             team learned; the tables are the same.
         resume: continue what an interrupted call left in the folder.
@@ -122,8 +124,9 @@ def reproduce(
     workers_for(executor)
     if util.find_spec("matplotlib") is None:
         raise ViewError("reproduce: matplotlib is not installed; try pip install 'fireworld[figures]'")
-    trained_in = _curriculum(CURRICULUM if curriculum is None else curriculum)
     place = ReproductionFolder(path_of("folder", folder))
+    chosen = _world(world, place if resume else None)
+    trained_in = _curriculum(chosen.curriculum if curriculum is None else curriculum, chosen)
     if resume:
         place.find()
     else:
@@ -137,6 +140,7 @@ def reproduce(
                 PAPER,
                 n_repetitions,
                 test_seeds,
+                world=chosen,
                 record_trainings=bool(record_trainings),
                 stop=asked,
                 on_progress=on_progress,
@@ -153,11 +157,23 @@ def reproduce(
             raise Interrupted(f"interrupted; {kept}: continue with --resume") from None
 
 
-def _curriculum(given: Path | str) -> Curriculum:
+def _world(given: str | None, resumed: ReproductionFolder | None) -> World:
+    """Return a world by its name; None: that of the folder that is resumed, or else the default."""
+    if given is not None and given not in WORLDS:
+        raise ArgumentError(expected("world", "", "one of " + ", ".join(WORLDS), given))
+    if given is None and resumed is not None:
+        begun_with = resumed.tests
+        for world in WORLDS.values():
+            if begun_with == {row.scenario for row in world.tests}:
+                return world
+    return WORLDS[given or DEFAULT_WORLD]
+
+
+def _curriculum(given: Path | str, world: World) -> Curriculum:
     """Read a curriculum."""
     curriculum = load_curriculum(given)
     together = {scenario.name for stage in curriculum.stages if stage.cooperation for scenario in stage.scenarios}
-    missing = [row.scenario for row in paper.TABLE_1 if row.scenario not in together]
+    missing = [row.scenario for row in world.table_1 if row.scenario not in together]
     if missing:
         wanted = "all scenarios of the paper's Table 1 in stages with cooperation"
         raise TrainingError(expected(str(given), "", wanted, f"none of {', '.join(missing)}"))
@@ -171,7 +187,7 @@ def _carry_out(measurement: Measurement, executor: AnyExecutor) -> Reproduction:
     tables = make_tables(study)
     for name, text in csv_files(study, tables).items():
         place.write(name, text)
-    to_record = runs_to_record(first)
+    to_record = runs_to_record(first, study.world)
     parts, recorded = Parts("recording", len(to_record), on_progress), []
     for run in to_record:
         if measurement.stop.is_set():

@@ -10,6 +10,7 @@ import numpy as np
 
 from fireworld.evaluation.runs import Outcomes
 from fireworld.kernels.arrays import Array
+from fireworld.reproduction.paper import TESTS, World
 from fireworld.training.log.records import Episode
 from fireworld.training.methods.sarsa import EpisodeReport
 
@@ -106,6 +107,7 @@ class Study:
     outcomes: Mapping[str, Mapping[str, Sequence[Outcomes]]]
     """By scenario and team: one Outcomes a repetition, one in all for UNTAUGHT."""
     agreement: Sequence[float]  # of each repetition, see Repetition.agreement
+    world: World = TESTS
 
     def values(self, scenario: str, team: str, quantity: str) -> Array:
         """Return one quantity, an attribute of Outcomes, of all runs: (repetitions or 1, seeds) float64."""

@@ -33,7 +33,7 @@ def study(*, together=0.75, alone=0.5, n_repetitions=2, n_seeds=3):
     seeds = list(range(n_seeds))
     share = dict.fromkeys(TEAMS, 0.5) | {TOGETHER: together, ALONE: alone}
     found = {}
-    for row in (*paper.TABLE_2, *paper.TABLE_3):
+    for row in paper.TESTS.tests:
         found[row.scenario] = {
             team: [
                 outcomes(
@@ -61,7 +61,7 @@ def study(*, together=0.75, alone=0.5, n_repetitions=2, n_seeds=3):
         )
         for repetition in range(1, n_repetitions + 1)
         for team in (TOGETHER, TOGETHER_WITHOUT_FLAGS)
-        for number, row in enumerate(paper.TABLE_1)
+        for number, row in enumerate(paper.TESTS.table_1)
     ]
     return Study(
         n_repetitions=n_repetitions,

@@ -18,7 +18,6 @@ from fireworld.executors.packing import Packer
 from fireworld.executors.receiving import work
 from fireworld.executors.self_test import self_test
 from fireworld.interrupt import Interrupted
-from fireworld.reproduction import paper
 from fireworld.reproduction.readings.choices import SHIPPED, digest_of, load_choices, read_as
 from fireworld.reproduction.readings.design import N_BASIC, design, designed, generators
 from fireworld.reproduction.readings.effects import main_effects, over_trainings, permutation_p, student_95
@@ -168,8 +167,7 @@ METHOD = Sarsa(n_episodes_max=3, n_episodes_unchanged=2)
 
 @pytest.fixture
 def small(tmp_path, monkeypatch):
-    for name, rows in SMALL_PAPER.items():
-        monkeypatch.setattr(paper, name, rows)
+    monkeypatch.setattr("fireworld.reproduction.readings.trial.TESTS", SMALL_PAPER)
     monkeypatch.setattr(try_readings_module, "QUICK", ReadingsSize("quick", 1, 2, METHOD))
     path = tmp_path / "small.yaml"
     path.write_text(CURRICULUM)

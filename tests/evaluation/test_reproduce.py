@@ -6,6 +6,7 @@ import json
 import shutil
 import signal
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 from threading import Event
@@ -56,22 +57,17 @@ def curriculum(tmp_path):
 
 
 TEST = paper.PaperTest("quick", 2, (90, 60), (5, 1), (3.0, 4.0), 5)
-SMALL_PAPER = {"TABLE_1": (paper.PaperTraining("quick", 50, 4.5, 5),), "TABLE_2": (TEST,), "TABLE_3": (TEST,)}
-
-
-def make_paper_small():
-    """Make a paper whose every scenario is a small town."""
-    vars(paper).update(SMALL_PAPER)
+SMALL_PAPER = paper.World(
+    "paper", "a small town", "paper", (paper.PaperTraining("quick", 50, 4.5, 5),), (TEST,), (TEST,)
+)
 
 
 @pytest.fixture
 def small(tmp_path, monkeypatch, curriculum):
     """A paper whose every scenario is a small town."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("fireworld.reproduction.reproduce.CURRICULUM", curriculum)
     monkeypatch.setattr("fireworld.reproduction.reproduce.PAPER", METHOD)
-    for name, rows in SMALL_PAPER.items():
-        monkeypatch.setattr(paper, name, rows)
+    monkeypatch.setitem(paper.WORLDS, "paper", replace(SMALL_PAPER, curriculum=str(curriculum)))
     return tmp_path
 
 
@@ -209,7 +205,7 @@ def undrawn(monkeypatch):
 def test_from_python_with_an_executor_it_is_the_same(small, undrawn, curriculum):
     """The tables of threads and processes are equal; what is done shows itself."""
     told, found = [], {}
-    there = ProcessPoolExecutor(2, get_context("spawn"), initializer=make_paper_small)
+    there = ProcessPoolExecutor(2, get_context("spawn"))
     with there, ThreadPoolExecutor(2) as here:
         for name, executor in (("threads", 1), ("here", here), ("there", there)):
             words = {"repetitions": 2, "seeds": 2, "executor": executor}
@@ -229,7 +225,7 @@ def test_from_python_with_an_executor_it_is_the_same(small, undrawn, curriculum)
     assert all([*each.values()] == [*folders[0].values()] for each in folders)
     one = found["there"]
     assert one.folder == Path("there")
-    assert repr(one).startswith("paper: ours [95 % interval]\nscenario  quantity")
+    assert repr(one).startswith("in a small town; paper: ours [95 % interval]\nscenario  quantity")
     assert [finding.question in repr(one) for finding in one.findings] == [True] * len(one.findings)
     assert one.caveat in repr(one)
     assert one._repr_html_().startswith('<iframe srcdoc="&lt;!doctype html&gt;')
@@ -247,12 +243,29 @@ def test_a_folder_of_an_earlier_version_is_resumed(small, undrawn, trained, monk
         assert (small / "found" / path.name).read_bytes() == path.read_bytes(), path.name
 
 
+def test_a_folder_is_resumed_in_its_world(begun, undrawn, trained, fireworld, monkeypatch):
+    """Whatever the default is by then, as in folders from before there were two worlds; another one is refused."""
+    small_town = paper.WORLDS["paper"]
+    monkeypatch.setitem(paper.WORLDS, "paper", paper.PAPER)
+    monkeypatch.setitem(paper.WORLDS, "tests", replace(small_town, name="tests"))
+    assert "settings.json: curriculum" in refusal(fireworld, begun, "--world", "paper")
+    assert fireworld(*FEW, "--resume").code == 0
+    assert trained == [2]
+
+
+def test_readings_have_no_world(small, fireworld):
+    done = fireworld(*FEW, "--readings", "--world", "paper")
+    assert (done.code, done.out) == (2, "")
+    assert "--readings begins with the world tests" in done.err
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         ({"repetitions": 0}, "repetitions: expected a whole number from 1 to 1000, got 0"),
         ({"seeds": "many"}, "seeds: expected a whole number"),
         ({"curriculum": "nowhere"}, "nowhere"),
+        ({"world": "dense"}, "world: expected one of paper, tests, got 'dense'"),
         ({"executor": "fibres"}, "executor: expected"),
         ({"resume": True}, "resume: expected a reproduction to continue"),
     ],
@@ -265,7 +278,7 @@ def test_wrong_arguments_take_one_line_and_leave_nothing(small, words, message):
 
 
 def test_a_curriculum_without_table_1_takes_one_line(small, curriculum, monkeypatch):
-    monkeypatch.setattr("fireworld.reproduction.paper.TABLE_1", (paper.PaperTraining("train-1", 50, 4.5, 5),))
+    monkeypatch.setitem(paper.WORLDS, "paper", paper.PAPER)
     with pytest.raises(TrainingError, match="expected all scenarios of the paper's Table 1"):
         reproduce("found", curriculum=curriculum)
     assert not (small / "found").exists()

@@ -112,7 +112,7 @@ def test_the_page_is_whole_and_needs_nothing_else():
     assert page.count("data:image/png;base64,") == 2
     for tag in ("table", "tr", "td", "span", "figure", "p", "h2"):
         assert len(re.findall(rf"<{tag}[ >]", page)) == page.count(f"</{tag}>"), tag
-    for row in (*paper.TABLE_1, *paper.TABLE_2, *paper.TABLE_3):
+    for row in (*paper.TESTS.table_1, *paper.TESTS.tests):
         assert row.scenario in page
     for finding in findings(study, tables):
         assert finding.question in page
@@ -122,5 +122,5 @@ def test_the_page_is_whole_and_needs_nothing_else():
 def test_convergence_graphs_show_every_scenario():
     for draw in (draw_returns, draw_policy_changes):
         figure = draw(synthetic.study())
-        assert [panel.get_title(loc="left") for panel in figure.axes] == [row.scenario for row in paper.TABLE_1]
+        assert [panel.get_title(loc="left") for panel in figure.axes] == [row.scenario for row in paper.TESTS.table_1]
         assert len(figure.axes[0].lines) == 2 * (2 + 1) + 1

@@ -1,4 +1,4 @@
-"""Digests of two short runs: the simulator's behaviour in 128 characters.
+"""Digests of a few short runs: the simulator's behaviour in some lines.
 
 A change of physics, of rules or of random draws changes them. If that is meant, renew them and say why in the commit:
 
@@ -22,6 +22,9 @@ PATH: Final = Path(__file__).with_name("golden.json")
 RUNS: Final = {
     "quick, each-another, seed 1": ("quick", "each-another", 1, 60),
     "train-5, random, seed 7": ("train-5", "random", 7, 40),
+    "paper-2, random, seed 7": ("paper-2", "random", 7, 40),
+    "paper-3-brigades-8, chief, seed 1": ("paper-3-brigades-8", "chief", 1, 40),
+    "paper-train-5, random, seed 7": ("paper-train-5", "random", 7, 40),
 }
 """Scenario, policy, seed and steps of each run."""
 

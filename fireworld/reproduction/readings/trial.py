@@ -14,7 +14,7 @@ import numpy as np
 from fireworld.interrupt import Interrupted
 from fireworld.policy.kernel import from_tables
 from fireworld.policy.words import N_FLAG_VALUES
-from fireworld.reproduction import paper
+from fireworld.reproduction.paper import TESTS
 from fireworld.reproduction.readings.choices import Reading, StudySettings
 from fireworld.scenario import Scenario, load_scenario
 from fireworld.scenario.scenario import read_city_file
@@ -75,7 +75,7 @@ def setting_of(reading: Reading, curriculum: Curriculum, method: Sarsa) -> Setti
         for stage in curriculum.stages
     ]
     in_tests = {"choices": varied.choices}
-    tests = [_varied(load_scenario(row.scenario), reading, in_tests) for row in paper.TABLE_2]
+    tests = [_varied(load_scenario(row.scenario), reading, in_tests) for row in TESTS.table_2]
     files = dict[str, bytes]()
     for scenario in (*(one for stage in stages for one in stage.scenarios), *tests):
         if scenario.city_sha256 is not None and scenario.city_sha256 not in files:
