@@ -23,11 +23,16 @@ def greedy(values: Array) -> int:
     return best
 
 
+@inner
+def tries_another(brigade: int, epsilon: float, seed: int, step: int) -> bool:
+    """Return whether a brigade that explores with probability epsilon does so in this step."""
+    return epsilon > 0.0 and uniform(seed, EXPLORE, brigade, step) < epsilon
+
+
 @kernel
 def explores(brigade: int, policy: PolicyArrays, seed: int, step: int) -> bool:
     """Return whether a brigade takes a random action in this step instead of the one its table prefers."""
-    epsilon = policy.epsilon[0]
-    return policy.kind[brigade] == TABLE and epsilon > 0.0 and uniform(seed, EXPLORE, brigade, step) < epsilon
+    return policy.kind[brigade] == TABLE and tries_another(brigade, policy.epsilon[0], seed, step)
 
 
 @kernel

@@ -37,6 +37,7 @@ def run_episode(row: Array) -> None:
     by_score = len(learner.of_targets.trace) > 0
     if learning:
         forget(learner)
+    if by_score:
         score(world.fire, world.civilians, city.geometry, outcome)
     begin(city.cover, world.fire, warmth)
     for step in range(clock[STEP] + 1, last_step + 2):
@@ -49,7 +50,7 @@ def run_episode(row: Array) -> None:
         clock[STEP] = step
         finish_step(city, world, constants, warmth, clock[SEED], step)
         if learning:
-            take_reward(outcome.reward[TOTAL] if not by_score else change_of_score(episode), learner)
+            take_reward(change_of_score(episode) if by_score else outcome.reward[TOTAL], learner)
             note_reward(step - 1, outcome.reward, learner)
         if is_over(outcome.counts[BURNING], city.buildings.later_step, step):
             if learning:

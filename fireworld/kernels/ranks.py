@@ -192,9 +192,6 @@ def value_targets(
         for other in range(N_ACTIONS):
             seen[N_TARGET_FEATURES + other] = 1.0 if other == action else 0.0
         around = reads_around(network)
-        if around:
-            sum_up(step, sight, ranks)
-            place_others(brigade, known, sight, ranks)
         for k in range(np.uint64(first), np.uint64(end)):
             see_place(brigade, np.int64(k), around, known, sight, ranks, seen)
             ranks.value[k] = value_by_network(network, seen, work)
@@ -250,6 +247,9 @@ def rank_targets(
     site = site_place(brigade, sight.brigades.site, sites)
     if site < 0:
         return best_action, best
+    if reads_around(network):
+        sum_up(step, sight, ranks)
+        place_others(brigade, known, sight, ranks)
     place = np.int64(-1)
     n_valued = N_ACTIONS if noting or not own else 0
     for action in range(-1 if own else 0, n_valued):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from fireworld.draws import ACTION, EXPLORE
+from fireworld.draws import ACTION
 from fireworld.kernels.arrays import Array, Learner, NetworkArrays, TargetLearner
-from fireworld.kernels.draws import below, uniform
+from fireworld.kernels.choice import keeps_choice, tries_another
+from fireworld.kernels.draws import below
 from fireworld.kernels.episode_arrays import Ranks
 from fireworld.kernels.jit import inner
 from fireworld.kernels.network import add_multiple, put_through, slope
@@ -16,7 +17,7 @@ from fireworld.kernels.situation import reads_around
 @inner
 def explored_place(brigade: int, first: int, end: int, epsilon: float, seed: int, step: int) -> int:
     """Return a place drawn from [first, end) with probability epsilon, else -1."""
-    if epsilon > 0.0 and uniform(seed, EXPLORE, brigade, step) < epsilon:
+    if tries_another(brigade, epsilon, seed, step):
         return first + below(seed, ACTION, brigade, step, end - first)
     return -1
 
@@ -139,8 +140,8 @@ def learn_target(brigade: int, next_value: float, network: NetworkArrays, learne
 @inner
 def keeps_target(brigade: int, before: int, step: int, site_of: Array, sight: Sight, learner: TargetLearner) -> bool:
     """Return whether a brigade that learns stays with its target: while that burns, for some steps by a clock."""
-    commit, sites = learner.commit[0], sight.sites
-    if commit <= 1 or before < 0 or (step + brigade) % commit == 0:
+    if not keeps_choice(brigade, before, learner.commit[0], step):
         return False
+    sites = sight.sites
     place = sites.place[before]
     return bool(place >= 0 and sites.number[place] == site_of[brigade])

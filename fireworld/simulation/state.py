@@ -29,6 +29,7 @@ from fireworld.kernels.arrays import (
     WorldState,
 )
 from fireworld.parameters import Parameters
+from fireworld.policy.kernel import NO_NETWORK, NO_TABLES
 from fireworld.records import Rewards, Score, filled
 from fireworld.rewards import TERMS
 from fireworld.simulation.city_arrays import air_shape
@@ -159,7 +160,7 @@ def fresh_target_learner(
 
 
 NO_TARGETS: Final = fresh_target_learner(
-    NetworkArrays(np.zeros(0, dtype=np.int64), np.zeros((0, 4), dtype=np.int64), np.zeros(0)),
+    NO_NETWORK,
     np.zeros(0),
     0,
     decay=0.0,
@@ -201,7 +202,7 @@ def fresh_trace(n_brigades: int, n_steps_max: int) -> Trace:
     )
 
 
-NO_LEARNER: Final = fresh_learner(np.zeros((1, 1, 4)), 0)._replace(learning=np.zeros(1, dtype=np.uint8))
+NO_LEARNER: Final = fresh_learner(NO_TABLES, 0)._replace(learning=np.zeros(1, dtype=np.uint8))
 """Of a team that learns nothing."""
 
 

@@ -27,6 +27,17 @@ def episode_seed(base: int, scenario_number: int, episode: int) -> int:
     return hash_key(base, EPISODE, scenario_number, episode) >> 1
 
 
+def fight_seed(base: int, number: int, round_number: int) -> int:
+    """Return the seed of a fight of a training that learns from many, 0 to 2**32 - 1.
+
+    Args:
+        base: the training's own seed.
+        number: of the fire, or of the lesson.
+        round_number: of the generation, or of the fight in its lesson.
+    """
+    return hash_key(base, EPISODE, number, round_number) >> 32
+
+
 @dataclass(frozen=True)
 class Seeds:
     """The seeds that follow from one base.

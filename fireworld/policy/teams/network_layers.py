@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -18,6 +19,8 @@ ACTIVATIONS: Final = {"relu": RELU, "tanh": TANH}
 """What may come between two layers; after the last there is nothing."""
 SEEN: Final = tuple(weight.name for weight in (*WEIGHTS, *AROUND))
 """What a network may read of a target: what a ranking weighs, in its order, and what is around it."""
+OWN_SEEN: Final = tuple(name for name in SEEN if name not in {weight.name for weight in OF_ACTION})
+"""The same where brigades name targets of their own: no action names them."""
 FEATURES: Final = SEEN[:N_TARGET_WEIGHTS]
 """The features of a target: what a network reads if nothing else is said."""
 N_LAYERS_MAX: Final = 8
@@ -42,8 +45,7 @@ def check_reading(features: object, own_targets: object, *, source: str) -> tupl
         raise TrainingError(expected(source, "own_targets", "true or false", own_targets))
     if not isinstance(features, list | tuple) or not features or not all(isinstance(one, str) for one in features):
         raise TrainingError(expected(source, "features", "a list of names, as temperature, volume", features))
-    no_actions = tuple(name for name in SEEN if name not in {weight.name for weight in OF_ACTION})
-    known = no_actions if own_targets else SEEN
+    known = OWN_SEEN if own_targets else SEEN
     for place, name in enumerate(features):
         if name in SEEN and name not in known:
             raise TrainingError(expected(source, "features", "no actions where targets are a brigade's own", name))
@@ -131,6 +133,21 @@ def plain_provenance(provenance: Mapping[str, Any], *, source: str) -> dict[str,
     except (TypeError, ValueError, RecursionError) as error:
         raise TrainingError(expected(source, "provenance", "keys and plain values", described(error))) from None
     return plain
+
+
+def unpack(numbers: Array, widths: Sequence[int]) -> tuple[Layer, ...]:
+    """Return the layers of a network by its numbers, in the order in which `pack` puts them.
+
+    Args:
+        numbers: (k,) float64, of each layer the biases, then the weights.
+        widths: inputs, then the outputs of each layer.
+    """
+    layers, place = [], 0
+    for n_in, n_out in pairwise(widths):
+        biases, weights = np.split(numbers[place : place + n_out * (1 + n_in)], [n_out])
+        layers.append(Layer(weights.reshape(n_in, n_out).copy(), biases.copy()))
+        place += n_out * (1 + n_in)
+    return tuple(layers)
 
 
 def pack(layers: Sequence[Layer], activations: Sequence[str], features: Sequence[str]) -> NetworkArrays:

@@ -277,9 +277,7 @@ def check_places(record: Any, n_brigades: Sequence[int]) -> None:
         raise LogError(f"{record.topic}: {fires[1]}: {int(seed.max())} is above {RUN_SEED_MAX}, the largest of a run")
     if isinstance(record, Played):
         check_played(record, n_brigades[record.scenario])
-    if isinstance(record, Lesson) and not len(record.fire) == len(record.seed) == len(record.score) == len(
-        record.n_steps
-    ):
+    if isinstance(record, Lesson) and len({*map(len, (record.fire, record.seed, record.score, record.n_steps))}) > 1:
         raise LogError(f"{record.topic}: its columns are not of the same fights")
     if isinstance(record, Tried) and not _fits(record):
         raise LogError(f"{record.topic}: its columns are not of the same rankings, weights and fires")

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from fireworld.draws import EPISODE, FIRE, WEIGHT, hash_key
+from fireworld.draws import FIRE, WEIGHT, hash_key
 from fireworld.errors import LogError, TrainingError, expected
 from fireworld.executors import Workers
 from fireworld.kernels.arrays import Array
@@ -23,11 +23,11 @@ from fireworld.policy.teams.ranking_team import RankingTeam
 from fireworld.policy.teams.ranking_words import OF_ACTION, OF_BRIGADE, OF_BUILDING, OF_TEAM, WEIGHTS, Weight
 from fireworld.policy.teams.team import Team
 from fireworld.simulation.built import BuiltScenario, CityCache
-from fireworld.training.curriculum import Curriculum
+from fireworld.training.curriculum import Curriculum, no_longer
 from fireworld.training.log.records import Tried
 from fireworld.training.method import Count, Method, Positive, PositiveShare, Report, Trainer
+from fireworld.training.seeds import fight_seed
 
-SEED_BITS: Final = 32
 GROUPS: Final[Mapping[str, Sequence[Weight]]] = {
     "the building": OF_BUILDING,
     "the brigade": OF_BRIGADE,
@@ -158,9 +158,7 @@ class SearchTrainer(Trainer[Search, Generation]):
         """
         if not self._fires:
             n = self.method.n_steps_max
-            scenarios = self.curriculum.scenarios
-            short = [one.with_values({"steps": n}) if one.steps > n else one for one in scenarios]
-            self._fires = [self._cities.build(scenario) for scenario in short]
+            self._fires = [self._cities.build(no_longer(scenario, n)) for scenario in self.curriculum.scenarios]
         with workers.make_pool(workers.n) as pool:
             while not self.done and not workers.stop.is_set():
                 report = self._generation(pool, workers.stop)
@@ -259,7 +257,7 @@ class SearchTrainer(Trainer[Search, Generation]):
         fill_normals(self.seed, WEIGHT, progress.generation, noise)
         candidates = progress.mean + progress.spread * noise
         fires = self._draw_fires()
-        seeds = [hash_key(self.seed, EPISODE, fire, progress.generation) >> (64 - SEED_BITS) for fire in fires]
+        seeds = [fight_seed(self.seed, fire, progress.generation) for fire in fires]
         shares = pool.map(
             lambda fight: math.nan if stop.is_set() else self._fight(*fight),
             ((candidate, *fire) for candidate in candidates for fire in zip(fires, seeds, strict=True)),

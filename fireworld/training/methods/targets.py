@@ -9,26 +9,25 @@ from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 
-from fireworld.draws import EPISODE, FIRE, WEIGHT, below, hash_key
+from fireworld.draws import FIRE, WEIGHT, below
 from fireworld.errors import LogError, TrainingError, expected
 from fireworld.executors import Workers
 from fireworld.kernels.arrays import Array, Learner, NetworkArrays
 from fireworld.kernels.draws import fill_normals
 from fireworld.kernels.situation import N_SEEN
-from fireworld.policy.kernel import from_network
-from fireworld.policy.teams.network_layers import Layer, pack
+from fireworld.policy.kernel import NO_TABLES, from_network
+from fireworld.policy.teams.network_layers import pack, unpack
 from fireworld.policy.teams.network_team import NetworkTeam
 from fireworld.policy.teams.npz import check_arrays, check_finite
 from fireworld.policy.teams.ranking_words import AROUND, OF_BRIGADE, OF_BUILDING, OF_TEAM
 from fireworld.policy.teams.team import Team
 from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.simulation.state import fresh_learner, fresh_target_learner
-from fireworld.training.curriculum import Curriculum
+from fireworld.training.curriculum import Curriculum, no_longer
 from fireworld.training.log.records import Lesson
 from fireworld.training.method import Count, Limits, Method, Positive, Report, Share, Trainer
+from fireworld.training.seeds import fight_seed
 
-SEED_BITS: Final = 32
-NO_TABLES: Final = np.zeros((1, 1, 4))
 OF_OTHERS: Final = frozenset({"others_here", "others_near", "enough", "side_others", "site_others"})
 """What a team without cooperation does not see."""
 HIDDEN_MAX: Final = 256
@@ -160,16 +159,9 @@ class TargetsTrainer(Trainer[Targets, LessonReport]):
     def team(self) -> NetworkTeam:
         """Return the team as it is now."""
         provenance = {**self.identity, "lessons_done": self.progress.lesson}
-        layers, place = [], 0
-        for n_in, n_out in zip(self._widths, self._widths[1:], strict=False):
-            biases = self.progress.numbers[place : place + n_out].copy()
-            place += n_out
-            layers.append(
-                Layer(self.progress.numbers[place : place + n_in * n_out].reshape(n_in, n_out).copy(), biases)
-            )
-            place += n_in * n_out
+        layers = unpack(self.progress.numbers, self._widths)
         after = (ACTIVATION,) * (len(layers) - 1)
-        return NetworkTeam(tuple(layers), after, self.method.features, own_targets=True, provenance=provenance)
+        return NetworkTeam(layers, after, self.method.features, own_targets=True, provenance=provenance)
 
     def state(self) -> dict[str, Array]:
         """Return the lesson, and what the means of the features say of a state."""
@@ -237,10 +229,7 @@ class TargetsTrainer(Trainer[Targets, LessonReport]):
         """Return a fire of the curriculum, no longer than a fight may be."""
         if number not in self._fires:
             scenario = self.curriculum.scenarios[number]
-            n = self.method.n_steps_max
-            self._fires[number] = self._cities.build(
-                scenario.with_values({"steps": n}) if scenario.steps > n else scenario
-            )
+            self._fires[number] = self._cities.build(no_longer(scenario, self.method.n_steps_max))
         return self._fires[number]
 
     def _network(self) -> NetworkArrays:
@@ -263,7 +252,7 @@ class TargetsTrainer(Trainer[Targets, LessonReport]):
         policy, epsilon = from_network(network, own_targets=True), self.epsilon(number)
         alpha = method.alpha * self.share_left(number)
         fires = [below(self.seed, FIRE, number, k, bound=self.curriculum.n_scenarios) for k in range(n_fights)]
-        seeds = [hash_key(self.seed, EPISODE, number, k) >> (64 - SEED_BITS) for k in range(n_fights)]
+        seeds = [fight_seed(self.seed, number, k) for k in range(n_fights)]
         teams: dict[int, tuple[Any, Learner]] = {}
         scores, errors, lengths = np.zeros(n_fights), np.zeros(n_fights), np.zeros(n_fights, dtype=np.int32)
         for k, (fire, seed) in enumerate(zip(fires, seeds, strict=True)):
