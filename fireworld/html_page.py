@@ -44,6 +44,11 @@ def html_page(title: str, body: Iterable[str], *, style: str = "") -> str:
     return f'<!doctype html>\n<html lang="en"><head>{head}</head><body>\n' + "\n".join(body) + "\n</body></html>\n"
 
 
+def html_frame(page: str) -> str:
+    """Return a whole page as a part of another one, in a frame of its own: for notebooks."""
+    return f'<iframe srcdoc="{escape(page)}" style="width: 100%; height: 40rem; border: 0"></iframe>'
+
+
 def html_table(heads: Sequence[str], rows: Iterable[Sequence[str]], *, n_text: int = 1) -> str:
     """Write a table; cells are HTML, to the right unless made by `text_cell`. The first `n_text` headings are words."""
     head = "".join(f"<th{' class=text' if k < n_text else ''}>{name}</th>" for k, name in enumerate(heads))

@@ -11,7 +11,7 @@ import click
 
 from fireworld.cli.compiling import announce_compilation
 from fireworld.cli.installed import check_matplotlib
-from fireworld.cli.options import SEED_MAX, executor_of, on_option
+from fireworld.cli.options import executor_of, first_seed_option, jobs_option, on_option
 from fireworld.cli.progress import runs_bar
 from fireworld.cli.reporting import check_reporting, print_annotations, reporting_options
 from fireworld.outcome import METRICS
@@ -34,11 +34,8 @@ EXIT_CODES: Final = {"not worse": 0, "worse": 1, "cannot tell": 3}
     "--seeds", "n_seeds", metavar="N", default=100, show_default=True, type=click.IntRange(1, 10_000),
     help="Runs of each policy in each scenario.",
 )  # fmt: skip
-@click.option(
-    "--first-seed", metavar="N", default=1, show_default=True, type=click.IntRange(0, SEED_MAX),
-    help="Seeds are counted from here.",
-)  # fmt: skip
-@click.option("--jobs", metavar="N", type=click.IntRange(1, 1000), help="Runs at a time.  [default: cores]")
+@first_seed_option(1)
+@jobs_option
 @on_option
 @click.option("--set", "settings", metavar="KEY=VALUE", multiple=True, help="Set a key of all scenarios; repeatable.")
 @click.option("--gate", is_flag=True, help="Turn the verdict into the exit code.")

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from fireworld.cli.compiling import announce_compilation
-from fireworld.cli.options import SEED_MAX, executor_of, on_option
+from fireworld.cli.options import executor_of, first_seed_option, jobs_option, on_option
 from fireworld.cli.progress import runs_bar
 
 
@@ -19,11 +19,8 @@ from fireworld.cli.progress import runs_bar
     "--seeds", "n_seeds", metavar="N", default=20, show_default=True, type=click.IntRange(1, 10_000),
     help="Runs of each policy in each scenario.",
 )  # fmt: skip
-@click.option(
-    "--first-seed", metavar="N", default=1, show_default=True, type=click.IntRange(0, SEED_MAX),
-    help="Seeds are counted from here.",
-)  # fmt: skip
-@click.option("--jobs", metavar="N", type=click.IntRange(1, 1000), help="Runs at a time.  [default: cores]")
+@first_seed_option(1)
+@jobs_option
 @on_option
 @click.option(
     "--results", metavar="FILE.parquet", type=click.Path(path_type=Path),

@@ -32,10 +32,21 @@ settings_option = click.option(
     "--set", "settings", metavar="KEY=VALUE", multiple=True, help="Set a key of the scenario; repeatable."
 )
 
+jobs_option = click.option(
+    "--jobs", metavar="N", type=click.IntRange(1, 1000), help="Runs at a time.  [default: cores]"
+)
 on_option = click.option(
     "--on", metavar="WHERE",
     help="Who does the work: threads, processes, dask, dask://HOST:PORT or MODULE:make_executor.",
 )  # fmt: skip
+
+
+def first_seed_option(default: int) -> Callable[[Command], Command]:
+    """Return the option that says from where seeds are counted."""
+    return click.option(
+        "--first-seed", metavar="N", default=default, show_default=True, type=click.IntRange(0, SEED_MAX),
+        help="Seeds are counted from here.",
+    )  # fmt: skip
 
 
 def executor_of(on: str | None, jobs: int | None) -> AnyExecutor:

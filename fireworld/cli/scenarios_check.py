@@ -8,7 +8,14 @@ from typing import get_args
 import click
 
 from fireworld.cli.compiling import announce_compilation
-from fireworld.cli.options import SEED_MAX, counts_option, held_option, lost_option, settings_option
+from fireworld.cli.options import (
+    counts_option,
+    first_seed_option,
+    held_option,
+    jobs_option,
+    lost_option,
+    settings_option,
+)
 from fireworld.cli.progress import BAR, COUNT, DESCRIPTION, LEFT, bars
 from fireworld.cli.tables import print_blocks
 from fireworld.evaluation.contested import FIRST_SEED, N_SEEDS, Contest
@@ -21,14 +28,11 @@ from fireworld.evaluation.contested import FIRST_SEED, N_SEEDS, Contest
     "--seeds", "n_seeds", metavar="N", default=N_SEEDS, show_default=True, type=click.IntRange(1, 10_000),
     help="Runs of each policy.",
 )  # fmt: skip
-@click.option(
-    "--first-seed", metavar="N", default=FIRST_SEED, show_default=True, type=click.IntRange(0, SEED_MAX),
-    help="Seeds are counted from here.",
-)  # fmt: skip
+@first_seed_option(FIRST_SEED)
 @lost_option
 @held_option
 @settings_option
-@click.option("--jobs", metavar="N", type=click.IntRange(1, 1000), help="Runs at a time.  [default: cores]")
+@jobs_option
 @click.option("--require", type=click.Choice(get_args(Contest)), help="Exit with 1 unless all fires are so.")
 @click.option("--json", "as_json", is_flag=True, help="Write JSON.")
 @click.option("--markdown", is_flag=True, help="Write a table in Markdown.")

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from fireworld.cli.compiling import announce_compilation
-from fireworld.cli.options import SEED_MAX, counts_option, held_option, lost_option
+from fireworld.cli.options import SEED_MAX, counts_option, held_option, jobs_option, lost_option
 from fireworld.cli.progress import BAR, COUNT, DESCRIPTION, ELAPSED, bars
 from fireworld.cli.tables import print_blocks
 from fireworld.evaluation.contested import N_SEEDS
@@ -50,7 +50,7 @@ from fireworld.evaluation.contested import N_SEEDS
 @lost_option
 @held_option
 @click.option("--set", "settings", metavar="KEY=VALUE", multiple=True, help="Set a key of the scenario; repeatable.")
-@click.option("--jobs", metavar="N", type=click.IntRange(1, 1000), help="Runs at a time.  [default: cores]")
+@jobs_option
 @click.option("--force", is_flag=True, help="Replace existing files.")
 @click.option("--json", "as_json", is_flag=True, help="Write JSON: also the places where no fire is contested.")
 @click.pass_context

@@ -27,12 +27,28 @@ _SEEDS: Final = 1
 
 
 @dataclass(frozen=True)
-class Estimate:
-    """A mean over repetitions and seeds, and how sure it is."""
+class Interval:
+    """A mean, and how sure it is."""
 
     mean: float
     low: float  # lower end of the 95 % interval
     high: float  # upper end of the 95 % interval
+
+    @property
+    def above_zero(self) -> bool:
+        """Whether the whole interval lies above zero."""
+        return self.low > 0.0
+
+    @property
+    def below_zero(self) -> bool:
+        """Whether the whole interval lies below zero."""
+        return self.high < 0.0
+
+
+@dataclass(frozen=True)
+class Estimate(Interval):
+    """A mean over repetitions and seeds, and how sure it is."""
+
     interquartile_mean: float  # mean of the middle half of all values: what a typical run comes to
     n_repetitions: int
     n_seeds: int
@@ -45,16 +61,6 @@ class Estimate:
     def ends(self) -> dict[str, float]:
         """Return the mean and the ends of its interval by name."""
         return {"mean": self.mean, "low": self.low, "high": self.high}
-
-    @property
-    def above_zero(self) -> bool:
-        """Whether the whole interval lies above zero."""
-        return self.low > 0.0
-
-    @property
-    def below_zero(self) -> bool:
-        """Whether the whole interval lies below zero."""
-        return self.high < 0.0
 
 
 def estimate(values: Array) -> Estimate:

@@ -21,10 +21,10 @@ from fireworld.scenario.yaml_text import read_yaml
 from fireworld.training.curriculum import SIZE_MAX_BYTES, StageText, build_stage
 
 NAMES: Final = (
-    "tests", "paper-world", "contested", "larger", "scarce-water", "two-sites", "three-sites", "few-brigades",
+    "tests", "contested", "larger", "scarce-water", "two-sites", "three-sites", "few-brigades",
     "many-brigades", "official-like",
 )  # fmt: skip
-"""All suites in the order in which they are shown; there are those that have a file."""
+"""All suites in the order in which they are shown."""
 
 
 class GroupText(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -69,7 +69,7 @@ def digest_of(digests: Sequence[str]) -> str:
 
 def suite_names() -> list[str]:
     """Name the suites, in the order in which they are shown."""
-    return [name for name in NAMES if (_folder() / f"{name}.yaml").is_file()]
+    return [*NAMES]
 
 
 def suites() -> list[Suite]:

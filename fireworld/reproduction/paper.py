@@ -75,7 +75,6 @@ TESTS: Final = World(
         PaperTest("test-3-brigades-8", 8, (456, 294), (318, 112), (6.76, 8.788), 10),
     ),
 )
-"""The dense city."""
 
 
 def like_the_papers(name: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from html import escape
 from importlib import util
 from pathlib import Path
 from threading import Event
@@ -12,6 +11,7 @@ from typing import Final
 from fireworld.arguments import ArgumentError, path_of, whole_number
 from fireworld.errors import TrainingError, ViewError, expected
 from fireworld.executors import AnyExecutor, workers_for
+from fireworld.html_page import html_frame
 from fireworld.interrupt import Interrupted, gentle_interrupt
 from fireworld.reproduction.csv_files import csv_files
 from fireworld.reproduction.findings import Finding, caveat, findings, report_text
@@ -66,8 +66,7 @@ class Reproduction:
 
     def _repr_html_(self) -> str:
         """Show the report in a notebook, in a frame of its own."""
-        page = escape(self.report.read_text(encoding="utf-8"))
-        return f'<iframe srcdoc="{page}" style="width: 100%; height: 40rem; border: 0"></iframe>'
+        return html_frame(self.report.read_text(encoding="utf-8"))
 
 
 def reproduce(

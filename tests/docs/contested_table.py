@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Final
 
 import fireworld as fw
-from tests.docs.pages import ROOT
+from tests.docs.pages import ROOT, with_part
 
 BEGIN: Final = "<!-- made by tests.docs.contested_table -->"
 END: Final = "<!-- end of the table -->"
@@ -17,9 +17,7 @@ PAGE: Final = ROOT / "docs" / "scenarios.md"
 
 def renew(page: str) -> str:
     """Return the page with its table made anew, as `fireworld scenarios check --markdown` writes it."""
-    head, _, rest = page.partition(BEGIN)
-    _, _, tail = rest.partition(END)
-    return f"{head}{BEGIN}\n\n{fw.check_scenarios().markdown}\n\n{END}{tail}"
+    return with_part(page, BEGIN, END, f"\n\n{fw.check_scenarios().markdown}\n\n")
 
 
 if __name__ == "__main__":

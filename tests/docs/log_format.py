@@ -23,7 +23,7 @@ from google.protobuf import descriptor_pb2
 
 from fireworld.records import PHASES, Snapshot
 from fireworld.training.log.records import TRAINING
-from tests.docs.pages import ROOT
+from tests.docs.pages import ROOT, with_part
 
 PAGE: Final = ROOT / "docs" / "log-format.md"
 TRAINING_PAGE: Final = ROOT / "docs" / "recorded-trainings.md"
@@ -113,9 +113,7 @@ def docs_text(topics: Iterable[type[Any]] = TOPICS) -> str:
 def with_generated_part(page: str) -> str:
     """Replace the generated part of a page about a format."""
     begin, topics = (BEGIN, TOPICS) if BEGIN in page else (TRAINING_BEGIN, TRAINING.topics)
-    before, _, rest = page.partition(begin)
-    _, _, after = rest.partition(END)
-    return f"{before}{begin}\n{docs_text(topics)}\n{END}{after}"
+    return with_part(page, begin, END, f"\n{docs_text(topics)}\n")
 
 
 if __name__ == "__main__":

@@ -21,6 +21,13 @@ def page_name(page: Path) -> str:
     return str(page.relative_to(ROOT))
 
 
+def with_part(page: str, begin: str, end: str, part: str) -> str:
+    """Return a page with another part between two marks, which stay."""
+    head, _, rest = page.partition(begin)
+    _, _, tail = rest.partition(end)
+    return f"{head}{begin}{part}{end}{tail}"
+
+
 def fenced(page: Path, language: str) -> list[str]:
     """Return the fenced blocks of one language."""
     return [code for found, code in FENCED.findall(page.read_text(encoding="utf-8")) if found == language]

@@ -15,7 +15,7 @@ from msgspec import NODEFAULT, Struct, inspect, to_builtins
 from fireworld.parameters import PRESETS
 from fireworld.scenario.document import Document, Overrides
 from fireworld.scenario.explain import bare, words
-from tests.docs.pages import ROOT
+from tests.docs.pages import ROOT, with_part
 
 BEGIN: Final = "<!-- made by tests.docs.scenario_reference -->"
 END: Final = "<!-- end -->"
@@ -33,9 +33,7 @@ def field_reference() -> str:
 
 def renew(page: str) -> str:
     """Return the page with its field reference made anew."""
-    head, _, rest = page.partition(BEGIN)
-    _, _, tail = rest.partition(END)
-    return f"{head}{BEGIN}\n\n{field_reference()}\n{END}{tail}"
+    return with_part(page, BEGIN, END, f"\n\n{field_reference()}\n")
 
 
 def _key_rows(document: inspect.Type, prefix: str) -> Iterator[str]:

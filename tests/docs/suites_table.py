@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Final
 
 import fireworld as fw
-from tests.docs.pages import ROOT
+from tests.docs.pages import ROOT, with_part
 
 BEGIN: Final = "<!-- made by tests.docs.suites_table -->"
 END: Final = "<!-- end of the suites -->"
@@ -17,11 +17,9 @@ PAGE: Final = ROOT / "docs" / "leaderboard.md"
 
 def renew(page: str) -> str:
     """Return the page with its table made anew."""
-    head, _, rest = page.partition(BEGIN)
-    _, _, tail = rest.partition(END)
     rows = (f"| `{one.name}` | {len(one.scenarios)} | {one.description} | `{one.digest[:12]}` |" for one in fw.suites())
     table = "\n".join(["| suite | scenarios | what it is | digest |", "|---|---|---|---|", *rows])
-    return f"{head}{BEGIN}\n\n{table}\n\n{END}{tail}"
+    return with_part(page, BEGIN, END, f"\n\n{table}\n\n")
 
 
 if __name__ == "__main__":

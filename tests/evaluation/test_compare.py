@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import subprocess
 import sys
 from xml.etree.ElementTree import parse
@@ -15,6 +14,7 @@ from fireworld.evaluation import comparison_runs
 from fireworld.evaluation.results import read_results
 from fireworld.policy.names import find_policy
 from fireworld.policy.teams.table_team import TableTeam
+from tests.evaluation.interrupting import interrupt_fourth_run
 
 pytestmark = pytest.mark.usefixtures("policies_file")
 QUICK = ("--scenarios", "quick", "--set", "steps=60")
@@ -202,24 +202,14 @@ def test_team_files_of_one_name_are_told_apart(fireworld, here):
 
 
 def test_ctrl_c_keeps_what_is_done(fireworld, here, monkeypatch):
-    runs = []
-
-    def interrupted_run(built, policy, *, seed):
-        runs.append(seed)
-        if len(runs) == 4:
-            signal.raise_signal(signal.SIGINT)
-        return run(built, policy, seed=seed)
-
-    run = comparison_runs.run_compiled
-    monkeypatch.setattr(signal, "getsignal", lambda _: signal.default_int_handler)
-    monkeypatch.setattr(comparison_runs, "run_compiled", interrupted_run)
+    go_on = interrupt_fourth_run(monkeypatch)
     words = ("compare", *BAD_FIRST, *QUICK, "--seeds", 50, "--jobs", 1, "--results", "runs.parquet")
     done = fireworld(*words)
     assert (done.code, done.out) == (130, "")
     n_kept = len(read_results(here / "runs.parquet"))
     assert 0 < n_kept < 100
     assert done.err == f"interrupted; {n_kept} of 100 runs were done: they are kept in runs.parquet\n"
-    monkeypatch.setattr(comparison_runs, "run_compiled", run)
+    go_on()
     again = fireworld(*words)
     assert (again.code, again.err) == (0, f"{n_kept} of 100 runs are known from runs.parquet\n")
 

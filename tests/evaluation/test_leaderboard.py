@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import subprocess
 import sys
 from threading import Event
@@ -22,6 +21,7 @@ from fireworld.evaluation.standings import Standing, known_policies, standings_o
 from fireworld.evaluation.statistics import estimate, estimate_over
 from fireworld.interrupt import Interrupted
 from fireworld.policy.names import find_policy
+from tests.evaluation.interrupting import interrupt_fourth_run
 
 pytestmark = pytest.mark.usefixtures("policies_file")
 QUICK = ("--suites", "quick", "--seeds", 3)
@@ -193,24 +193,14 @@ def test_names_are_shown_as_they_are():
 
 
 def test_ctrl_c_keeps_what_is_done_and_resume_goes_on(fireworld, here, monkeypatch):
-    runs = []
-
-    def interrupted_run(built, policy, *, seed):
-        runs.append(seed)
-        if len(runs) == 4:
-            signal.raise_signal(signal.SIGINT)
-        return run(built, policy, seed=seed)
-
-    run = comparison_runs.run_compiled
-    monkeypatch.setattr(signal, "getsignal", lambda _: signal.default_int_handler)
-    monkeypatch.setattr(comparison_runs, "run_compiled", interrupted_run)
+    go_on = interrupt_fourth_run(monkeypatch)
     words = ("leaderboard", "chief", "easiest", "--suites", "quick", "--jobs", 1, "--results", "board.parquet")
     done = fireworld(*words)
     assert (done.code, done.out) == (130, "")
     n_kept = len(read_results(here / "board.parquet"))
     assert 0 < n_kept < 40
     assert done.err == f"interrupted; {n_kept} of 40 runs were done: they are kept in board.parquet\n"
-    monkeypatch.setattr(comparison_runs, "run_compiled", run)
+    go_on()
     again = fireworld(*words, "--resume", "--json")
     assert (again.code, again.err) == (0, f"{n_kept} of 40 runs are known from board.parquet\n")
     assert again.out == fireworld(*words[:-2], "--json").out

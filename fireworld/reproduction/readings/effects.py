@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from fireworld.draws import below
+from fireworld.evaluation.statistics import Interval
 from fireworld.kernels.arrays import Array
 
 TRAININGS_LEAST: Final = 3
@@ -21,28 +22,15 @@ _NORMAL_95: Final = 1.959963984540054
 
 
 @dataclass(frozen=True)
-class Effect:
+class Effect(Interval):
     """A mean, or what the other level of a choice changes in one, and how sure that is."""
 
-    choice: str
-    mean: float
-    low: float  # of the 95 % interval
-    high: float
+    choice: str = ""
 
     @property
     def can_tell(self) -> bool:
         """Whether there is enough for an interval."""
         return math.isfinite(self.high)
-
-    @property
-    def above_zero(self) -> bool:
-        """Whether the whole interval lies above zero."""
-        return self.low > 0.0
-
-    @property
-    def below_zero(self) -> bool:
-        """Whether the whole interval lies below zero."""
-        return self.high < 0.0
 
     def text(self) -> str:
         """Return it for people: "+0.14 [-0.04, +0.31]"."""
@@ -68,7 +56,7 @@ def main_effects(names: Sequence[str], signs: Array, means: Array) -> list[Effec
     spread = math.sqrt(math.fsum(((means - fitted) ** 2).tolist()) / left) if left > 0 else math.inf
     half = student_95(left) * 2.0 * spread / math.sqrt(n_readings) if left > 0 else math.inf
     return [
-        Effect(name, float(one), float(one - half), float(one + half)) for name, one in zip(names, effects, strict=True)
+        Effect(float(one), float(one - half), float(one + half), name) for name, one in zip(names, effects, strict=True)
     ]
 
 
@@ -86,7 +74,7 @@ def over_trainings(values: Array) -> Effect:
     if n >= TRAININGS_LEAST:
         variance = math.fsum((one - mean) ** 2 for one in means) / (n - 1)
         half = student_95(n - 1) * math.sqrt(variance / n)
-    return Effect("", mean, mean - half, mean + half)
+    return Effect(mean, mean - half, mean + half)
 
 
 def permutation_p(signs: Array, means: Array) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from html import escape
 from importlib import util
 from pathlib import Path
 from threading import Event
@@ -12,6 +11,7 @@ from typing import Final, Literal
 from fireworld.arguments import ArgumentError, path_of, whole_number
 from fireworld.errors import ViewError, expected
 from fireworld.executors import AnyExecutor, workers_for
+from fireworld.html_page import html_frame
 from fireworld.reproduction.readings.choices import SHIPPED, load_choices
 from fireworld.reproduction.readings.findings import findings_text
 from fireworld.reproduction.readings.report import PAGE, write_readings
@@ -48,8 +48,7 @@ class TriedReadings:
 
     def _repr_html_(self) -> str:
         """Show the report in a notebook, in a frame of its own."""
-        page = escape(self.report.read_text(encoding="utf-8"))
-        return f'<iframe srcdoc="{page}" style="width: 100%; height: 40rem; border: 0"></iframe>'
+        return html_frame(self.report.read_text(encoding="utf-8"))
 
 
 def try_readings(
@@ -75,7 +74,7 @@ def try_readings(
     Args:
         folder: a free name or an empty folder, for the page and the tables.
         file: the choices, as readings.yaml has them; None: fireworld's own.
-        design: "screen", 64 readings, 2 trainings of each and 10 seeds; or "full", 128, 5 and 20.
+        design: "screen", 64 readings, 8 trainings of each and 10 seeds; or "full", 128, 5 and 20.
         repetitions: trainings of each reading instead.
         seeds: runs of each test instead.
         quick: 8 readings of the first four choices, with small trainings: to see how it looks, not to claim anything.
