@@ -33,6 +33,7 @@ WIDGET_PIXELS: Final = (1200, 800)
 """Width and height of what a notebook shows."""
 APPLICATION_ID: Final = "fireworld"
 _END_BYTES: Final = 32  # of a Rerun file, after its table of contents
+_WRITE_SECONDS: Final = 60.0  # for one block of a Rerun file, a few MB
 
 
 def save(
@@ -174,8 +175,8 @@ def _write_rrd(
 
         def write_out() -> None:
             try:
-                stream.flush()
-            except RuntimeError:  # the thread that writes has given up
+                stream.flush(timeout_sec=_WRITE_SECONDS)
+            except RuntimeError:  # the thread that writes has given up, and may not even say so
                 raise _no_room(path) from None
 
         _send(stream, recordings, focus, outcome, after_block=write_out)
