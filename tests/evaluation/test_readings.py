@@ -19,10 +19,11 @@ from fireworld.executors.receiving import work
 from fireworld.executors.self_test import self_test
 from fireworld.interrupt import Interrupted
 from fireworld.reproduction.readings.choices import SHIPPED, digest_of, load_choices, read_as
-from fireworld.reproduction.readings.design import N_BASIC, design, designed, generators
+from fireworld.reproduction.readings.design import N_BASIC, design, designed, further, generators
 from fireworld.reproduction.readings.effects import main_effects, over_trainings, permutation_p, student_95
+from fireworld.reproduction.readings.findings import findings_text
 from fireworld.reproduction.readings.runs import RUNS
-from fireworld.reproduction.readings.study import ReadingsSize
+from fireworld.reproduction.readings.study import ReadingsSize, ReadingsStudy
 from fireworld.reproduction.readings.timing import Timing, longest_first
 from fireworld.reproduction.readings.trial import Trial, setting_of
 from fireworld.simulation.built import CityCache
@@ -107,6 +108,33 @@ def test_the_shipped_choices_fit_into_the_design():
         assert readings[0].study == read_as(load_choices(), {}).study
 
 
+def test_every_level_is_tried_in_the_design_or_beside_it():
+    choices = load_choices()
+    _, _, designed_ones = designed(choices, kind="screen")
+    tried = [reading.levels for reading in [*designed_ones, *further(choices)]]
+    for choice in choices:
+        assert {levels.get(choice.name, choice.ours) for levels in tried} == set(choice.levels)
+    assert all(len(reading.levels) == 1 for reading in further(choices)), "all else is ours"
+
+
+def test_further_levels_are_reported_and_leave_the_effects_as_they_are():
+    choices = load_choices()
+    varied, signs, readings = designed(choices, kind="quick")
+    beside = further(choices)
+    draws = np.random.default_rng(3)
+    values = [draws.normal(0.1, 0.1, (3, 2)) for _ in range(len(readings) + len(beside))]
+    words = {"choices": varied, "signs": signs, "differences": values, "levels": values}
+    without = {"readings": readings, **words, "differences": values[:8], "levels": values[:8]}
+    found = ReadingsStudy(size=ReadingsSize("screen", 3, 2), readings=[*readings, *beside], **words)
+    alone = ReadingsStudy(size=ReadingsSize("screen", 3, 2, further=False), **without)
+    assert (found.effects, found.p) == (alone.effects, alone.p)
+    (sentence,) = set(findings_text(found)) - set(findings_text(alone))
+    assert sentence.startswith(
+        f"Further levels, all else ours, where it adds {found.estimates[0].text()}: epsilon not-reset"
+    )
+    assert all(estimate.text() in sentence for estimate in found.estimates[8:])
+
+
 def test_effects_of_made_up_readings():
     signs = design(8, 5)
     means = 0.1 + 0.15 * signs[:, 2] - 0.05 * signs[:, 5] + 0.3 * signs[:, 0] * signs[:, 1]
@@ -168,7 +196,7 @@ METHOD = Sarsa(n_episodes_max=3, n_episodes_unchanged=2)
 @pytest.fixture
 def small(tmp_path, monkeypatch):
     monkeypatch.setattr("fireworld.reproduction.readings.trial.TESTS", SMALL_PAPER)
-    monkeypatch.setattr(try_readings_module, "QUICK", ReadingsSize("quick", 1, 2, METHOD))
+    monkeypatch.setattr(try_readings_module, "QUICK", ReadingsSize("quick", 1, 2, METHOD, further=False))
     path = tmp_path / "small.yaml"
     path.write_text(CURRICULUM)
     return path

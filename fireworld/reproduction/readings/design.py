@@ -4,6 +4,8 @@ A full factorial of 32 runs in 5 basic columns has 16 products of an odd number 
 three of these multiply to another odd product, never to 1: no main effect is mixed up with an interaction of two. A
 design of 32 runs has room for 16 choices; of 64, in 6 basic columns, for 32. It is its own foldover: the mirror of each
 reading, with all levels exchanged, is in it too.
+
+What a choice has of further levels is tried beside the design, each in a reading that is ours in everything else.
 """
 
 from __future__ import annotations
@@ -33,6 +35,17 @@ def design(n_choices: int, n_basic: int) -> Array:
     basic = np.array([1 - 2 * (runs >> column & 1) for column in range(n_basic)])
     signs = [-basic[list(columns)].prod(axis=0) for columns in generators(n_choices, n_basic)]
     return np.array(signs, dtype=np.int64).T
+
+
+def further(choices: Sequence[OpenChoice]) -> list[Reading]:
+    """Return the readings of the levels that no design varies, one for each: all else is read as ours."""
+    return [
+        read_as(choices, {choice.name: level})
+        for choice in choices
+        if choice.screen
+        for level in choice.levels
+        if level not in choice.screen
+    ]
 
 
 def designed(choices: Sequence[OpenChoice], *, kind: str) -> tuple[list[OpenChoice], Array, list[Reading]]:

@@ -10,10 +10,10 @@ from fireworld.reproduction.readings.study import ReadingsStudy
 
 def findings_text(study: ReadingsStudy) -> list[str]:
     """Return what was found, a sentence each, written from the numbers."""
-    found = study.estimates
-    mean = fmean(one.mean for one in found)
+    found, n = study.estimates, study.n_designed
+    mean = fmean(one.mean for one in found[:n])
     said = [
-        f"Over {len(found)} readings cooperation adds {mean:+.2f} of the greatest score on the mean; the paper: +0.60.",
+        f"Over {n} readings cooperation adds {mean:+.2f} of the greatest score on the mean; the paper: +0.60.",
         _intervals_text(study),
         f"That no reading matters has p = {study.p:.3f} (main effects together, {len(study.choices)} choices).",
     ]
@@ -26,6 +26,9 @@ def findings_text(study: ReadingsStudy) -> list[str]:
     sure = [one for one in study.level_effects if one.above_zero or one.below_zero]
     if sure:
         said.append("On the cooperative team's level: " + "; ".join(f"{one.choice} {one.text()}" for one in sure) + ".")
+    if len(found) > n:
+        further = (f"{study.named(number)} {found[number].text()}" for number in range(n, len(found)))
+        said.append(f"Further levels, all else ours, where it adds {found[0].text()}: " + "; ".join(further) + ".")
     for number, values in study.confirmed.items():
         again, first = over_trainings(values), found[number]
         word = "holds" if again.above_zero else "does not hold" if again.can_tell else "can be neither held nor denied"
@@ -40,7 +43,7 @@ def findings_text(study: ReadingsStudy) -> list[str]:
 
 def _intervals_text(study: ReadingsStudy) -> str:
     """Say in how many readings the interval lies off 0."""
-    found = study.estimates
+    found = study.estimates[: study.n_designed]
     if not all(one.can_tell for one in found):
         return (
             f"With {study.size.trainings} trainings of each nobody can say of a single reading whether it adds "

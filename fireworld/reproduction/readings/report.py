@@ -25,7 +25,13 @@ def write_readings(study: ReadingsStudy, folder: Path) -> Path:
     write_file(folder / EFFECTS, _effects(study))
     write_file(folder / CURVE, _curve(study))
     estimates = [(one.mean, *((one.low, one.high) if one.can_tell else (one.mean,) * 2)) for one in study.estimates]
-    names, others = [choice.name for choice in study.choices], [[*map(bool, row > 0)] for row in study.signs]
+    names, others = (
+        [choice.name for choice in study.choices],
+        [
+            [study.level(number, choice) != choice.ours for choice in study.choices]
+            for number in range(len(study.readings))
+        ],
+    )
     label = "cooperative - non-cooperative"
     image = png_bytes(draw_specification(estimates, names, others, label=label))
     write_file(folder / FIGURE, image)
@@ -45,7 +51,7 @@ def _curve(study: ReadingsStudy) -> str:
     lines = ["reading,mean,low_95,high_95," + ",".join(choice.name for choice in study.choices)]
     found = study.estimates
     for number in sorted(range(len(found)), key=lambda n: (found[n].mean, n)):
-        levels = (choice.screen[int(sign > 0)] for choice, sign in zip(study.choices, study.signs[number], strict=True))
+        levels = (study.level(number, choice) for choice in study.choices)
         one = found[number]
         ends = f"{one.low!r},{one.high!r}" if one.can_tell else ","
         lines.append(f"{number},{one.mean!r},{ends}," + ",".join(levels))
@@ -68,7 +74,8 @@ def _page(study: ReadingsStudy, image: bytes) -> str:
         f"<h2>Findings</h2><ul>{said}</ul>",
         "<h2>Main effects</h2>",
         html_table(heads, rows, n_text=4),
-        "<p>Of the other level against ours, with all other choices balanced; 95&nbsp;% intervals over readings.</p>",
+        "<p>Of the other level against ours, with all other choices balanced; 95&nbsp;% intervals over the readings of "
+        "the design.</p>",
         "<h2>All readings</h2>",
         html_figure(
             image,

@@ -15,7 +15,7 @@ from fireworld.executors import AnyExecutor, Workers, workers_for
 from fireworld.interrupt import Interrupted, gentle_interrupt
 from fireworld.kernels.arrays import Array
 from fireworld.reproduction.readings.choices import OpenChoice, Reading, digest_of
-from fireworld.reproduction.readings.design import designed
+from fireworld.reproduction.readings.design import designed, further
 from fireworld.reproduction.readings.effects import Effect, main_effects, over_trainings, permutation_p
 from fireworld.reproduction.readings.runs import Key, Runs
 from fireworld.reproduction.readings.timing import Timing
@@ -35,13 +35,17 @@ OnProgress = Callable[[str, int, int], object]
 
 @dataclass(frozen=True)
 class ReadingsSize:
-    """How much is tried: trainings of each reading, at least so many fresh ones of the best, seeds of each test."""
+    """How much is tried: trainings of each reading, at least so many fresh ones of the best, seeds of each test.
+
+    `further`: levels that the design leaves out are tried beside it.
+    """
 
     design: str
     trainings: int
     seeds: int
     method: Sarsa = PAPER
     fresh: int = 1
+    further: bool = True
 
     @property
     def n_fresh(self) -> int:
@@ -51,7 +55,7 @@ class ReadingsSize:
 
 SCREEN: Final = ReadingsSize("screen", 8, 10, fresh=20)
 FULL: Final = ReadingsSize("full", 5, 20, fresh=5)
-QUICK: Final = ReadingsSize("quick", 1, 2, Sarsa(n_episodes_max=6, n_episodes_unchanged=3))
+QUICK: Final = ReadingsSize("quick", 1, 2, Sarsa(n_episodes_max=6, n_episodes_unchanged=3), further=False)
 
 
 @dataclass(frozen=True)
@@ -61,8 +65,8 @@ class ReadingsStudy:
     Attributes:
         size: how much was tried.
         choices: those that were varied.
-        signs: (readings, choices), -1 ours and 1 the other level.
-        readings: the readings.
+        signs: (readings of the design, choices), -1 ours and 1 the other level.
+        readings: those of the design, the first of which is ours; then those of further levels.
         differences: of each reading, cooperative - non-cooperative, share of the greatest score: (trainings, seeds).
         levels: of each reading, the cooperative team's share.
         confirmed: the same differences of the best readings in fresh trainings, by the number of the reading.
@@ -77,6 +81,11 @@ class ReadingsStudy:
     levels: Sequence[Array]
     confirmed: dict[int, Array] = field(default_factory=dict)
     timing: Timing = field(default_factory=Timing)
+
+    @property
+    def n_designed(self) -> int:
+        """Readings of the design."""
+        return len(self.signs)
 
     @property
     def estimates(self) -> list[Effect]:
@@ -96,16 +105,22 @@ class ReadingsStudy:
     @property
     def p(self) -> float:
         """How probable effects as large are if no reading matters."""
-        return permutation_p(self.signs, np.array([values.mean() for values in self.differences]))
+        return permutation_p(self.signs, self._means(self.differences))
 
     def named(self, number: int) -> str:
         """Return in what a reading is not ours."""
-        row = zip(self.choices, self.signs[number], strict=True)
-        return ", ".join(f"{one.name} {one.screen[1]}" for one, sign in row if sign > 0) or "ours"
+        found = ((one, self.level(number, one)) for one in self.choices)
+        return ", ".join(f"{one.name} {level}" for one, level in found if level != one.ours) or "ours"
+
+    def level(self, number: int, choice: OpenChoice) -> str:
+        """Return the level of a choice in a reading."""
+        return self.readings[number].levels.get(choice.name, choice.ours)
 
     def _effects(self, values: Sequence[Array]) -> list[Effect]:
-        names = [choice.name for choice in self.choices]
-        return main_effects(names, self.signs, np.array([float(one.mean()) for one in values]))
+        return main_effects([choice.name for choice in self.choices], self.signs, self._means(values))
+
+    def _means(self, values: Sequence[Array]) -> Array:
+        return np.array([float(one.mean()) for one in values[: self.n_designed]])
 
 
 def best_of(differences: Sequence[Array]) -> list[int]:
@@ -141,6 +156,7 @@ def measure_readings(
     Raises: as `try_readings`.
     """
     varied, signs, readings = designed(choices, kind=size.design)
+    readings += further(choices) if size.further else []
     trained_in = load_curriculum(curriculum)
     seeds = range(FIRST_SEED, FIRST_SEED + size.seeds)
     with gentle_interrupt(stop) as asked:
