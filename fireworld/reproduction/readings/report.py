@@ -74,8 +74,7 @@ def _page(study: ReadingsStudy, image: bytes) -> str:
         f"<h2>Findings</h2><ul>{said}</ul>",
         "<h2>Main effects</h2>",
         html_table(heads, rows, n_text=4),
-        "<p>Of the other level against ours, with all other choices balanced; 95&nbsp;% intervals over the readings of "
-        "the design.</p>",
+        "<p>Of the other level against ours, all other choices balanced, over the readings of the design.</p>",
         "<h2>All readings</h2>",
         html_figure(
             image,
