@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 
 POLICIES = Path(__file__).with_name("policies.py")
+LEAN_ON_LIBRARIES = ("cli", "envs", "executors", "recorder", "viewer")
+"""Folders whose slow tests, too, run with the oldest libraries."""
 
 # Tests call the inner kernels one by one; see fireworld.kernels.jit.
 os.environ["FIREWORLD_OPEN_KERNELS"] = "1"
@@ -31,6 +33,14 @@ for name in (
     os.environ.pop(name, None)
 
 pytest_plugins = ["pytester"]
+
+
+def pytest_collection_modifyitems(items):
+    """Mark the tests that lean on libraries by the folder they are in."""
+    folders = [Path(__file__).with_name(name) for name in LEAN_ON_LIBRARIES]
+    for item in items:
+        if any(folder in item.path.parents for folder in folders):
+            item.add_marker("libraries")
 
 
 @pytest.fixture
