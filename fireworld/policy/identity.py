@@ -16,6 +16,7 @@ from contextlib import suppress
 from enum import Enum
 from functools import cached_property, partial
 from pathlib import Path, PurePath
+from threading import Lock
 from types import CellType, CodeType, FunctionType, GetSetDescriptorType, MemberDescriptorType, MethodType, ModuleType
 from typing import Any, Final
 
@@ -27,6 +28,8 @@ LIBRARIES: Final = (
     "<",  # code without a file
 )
 """Where code that is not the user's own comes from."""
+_PARSING: Final = Lock()
+"""Python 3.11 counts how deep a tree is for all threads together: two that parse at once may get a SystemError."""
 NOTEBOOK: Final = "__main__"
 """The module of what is made in a notebook, or in a script that is run."""
 _NO_MEMBERS: Final = ("_abc_impl", "__annotate__", "__annotate_func__")
@@ -105,7 +108,9 @@ def _is_inside(other: ModuleType, package: ModuleType) -> bool:
 def _imported_by(module: ModuleType) -> set[str]:
     """Return the full names of what a module imports when it is imported; some are names in modules."""
     try:
-        tree = ast.parse(inspect.getsource(module))
+        source = inspect.getsource(module)
+        with _PARSING:
+            tree = ast.parse(source)
     except (OSError, TypeError, SyntaxError, ValueError):
         return set()
     found = set()
