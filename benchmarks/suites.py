@@ -105,8 +105,15 @@ def fires_of(group: Group) -> Iterator[tuple[int, Scenario]]:
             yield city, fire
 
 
-def line(fire: Scenario, *, city: int | None = None, times: float = 1.0) -> str:
-    """Write the keys of a fire, with so many times as many burning buildings."""
+def flow(values: Mapping[str, Any]) -> str:
+    """Write values in a line of YAML."""
+    return yaml.safe_dump(dict(values), default_flow_style=True, width=1000).strip()
+
+
+def line(
+    fire: Scenario, *, city: int | None = None, times: float = 1.0, conditions: Mapping[str, Any] | None = None
+) -> str:
+    """Write the keys of a fire, with so many times as many burning buildings; its conditions, if any, before them."""
     sites = (
         f"{{at: [{fire.at[0]:.3f}, {fire.at[1]:.3f}], n_buildings: {round(times * (fire.n_buildings or 0))}}}"
         for fire in fire.fires
@@ -114,15 +121,15 @@ def line(fire: Scenario, *, city: int | None = None, times: float = 1.0) -> str:
     )
     keys = {} if city is None else {"city.generated.seed": city}
     keys |= {"fires": f"[{', '.join(sites)}]", "civilians.n": fire.civilians.n, "civilians.seed": fire.civilians.seed}
-    return "      - {" + ", ".join(f"{key}: {value}" for key, value in keys.items()) + "}\n"
+    before = [flow(conditions)[1:-1]] if conditions else []
+    return "      - {" + ", ".join([*before, *(f"{key}: {value}" for key, value in keys.items())]) + "}\n"
 
 
 def suite_text(description: str, groups: Sequence[tuple[str, Mapping[str, Any], Sequence[str]]]) -> str:
     """Write a suite: of each group the base, what is set in all its scenarios, and the line of each."""
     text = f"# Made by `python -m benchmarks.suites`, which says how.\ndescription: {description!r}\ngroups:\n"
     for base, conditions, lines in groups:
-        conditioned = yaml.safe_dump(dict(conditions), default_flow_style=True, width=1000).strip()
-        text += f"  - base: {base}\n    set: {conditioned}\n    each:\n" + "".join(lines)
+        text += f"  - base: {base}\n    set: {flow(conditions)}\n    each:\n" + "".join(lines)
     return text
 
 

@@ -35,6 +35,10 @@ FIRE: Final = 12
 """Purpose: which fires a generation of a search meets. Entity: scenario; step: generation."""
 WEIGHT: Final = 13
 """Purpose: the noise of a candidate's weights. Entity: candidate and weight; step: generation."""
+BEGINNING: Final = 14
+"""Purpose: the first weights of a network that evolves. Entity: weight."""
+CHECK: Final = 15
+"""Purpose: the seed of a fight by which it is decided which team of a training is kept. Entity: scenario."""
 
 MASK: Final = (1 << 64) - 1
 INCREMENT: Final = 0x9E3779B97F4A7C15

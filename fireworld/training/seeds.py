@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from fireworld.arguments import seed_of, whole_number
-from fireworld.draws import EPISODE, hash_key
+from fireworld.draws import CHECK, EPISODE, hash_key
 
 WORKERS_MAX: Final = 1 << 11
 EPISODES_MAX: Final = 1 << 20
@@ -36,6 +36,11 @@ def fight_seed(base: int, number: int, round_number: int) -> int:
         round_number: of the generation, or of the fight in its lesson.
     """
     return hash_key(base, EPISODE, number, round_number) >> 32
+
+
+def check_seed(base: int, number: int) -> int:
+    """Return the seed of a fight by which a training decides what to keep, 0 to 2**32 - 1; arguments as above."""
+    return hash_key(base, CHECK, number, 0) >> 32
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from benchmarks.conditions import CONDITIONS
 from fireworld.errors import FireworldError, TrainingError
+from fireworld.evaluation.suites import suites
 from fireworld.training.curriculum import curriculum_names, load_curriculum
 
 
@@ -90,6 +92,27 @@ def test_what_is_learned_in_is_not_what_is_tested_in():
         cities.append({scenario.city.generated.seed for scenario in scenarios})
     assert not cities[0] & cities[1]
     assert all(len(some) >= 5 for some in cities)
+
+
+def test_every_condition_has_fires_in_cities_of_its_own():
+    curriculum = load_curriculum("conditions")
+    assert [stage.name for stage in curriculum.stages] == [*CONDITIONS]
+    assert len({scenario.digest for scenario in curriculum.scenarios}) == curriculum.n_scenarios
+    others = [one for name in curriculum_names() if name != "conditions" for one in load_curriculum(name).scenarios]
+    others += [scenario for one in suites() for scenario in one.scenarios]
+    seeds = {one.city.generated.seed for one in others if one.city.generated}
+    for stage in curriculum.stages:
+        assert 20 <= len(stage.scenarios) <= 40
+        assert stage.cooperation
+        assert seeds.isdisjoint(one.city.generated.seed for one in stage.scenarios)
+    found = {stage.name: stage.scenarios for stage in curriculum.stages}
+    n_brigades = {name: {one.brigades.n for one in some} for name, some in found.items()}
+    special = {"few-brigades": {2, 3}, "many-brigades": {6, 8}, "official-like": {12, 16}}
+    assert n_brigades == {name: special.get(name, {4}) for name in found}
+    n_sites = {name: {len(one.fires) for one in some} for name, some in found.items()}
+    assert n_sites == {name: {{"two-sites": 2, "three-sites": 3}.get(name, 1)} for name in found}
+    assert {one.resolved_parameters.brigades.refuge_refill_litres for one in found["little-refill"]} == {500}
+    assert {len(one.city.generated.refuges) for one in found["one-refuge"]} == {1}
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,8 @@ from tests.training.conftest import SHORT, SHORT_WORDS
 FEW = {"n_episodes_max": 6, "n_episodes_unchanged": 3}
 SEARCH = {"n_generations": 3, "n_candidates": 4, "n_best": 2, "n_fires": 2, "n_steps_max": 10}
 TARGETS = {"n_lessons": 3, "n_fights": 3, "n_steps_max": 10, "hidden": 3}
-SETTINGS = {"paper": FEW, "search": SEARCH, "targets": TARGETS}
+EVOLUTION = {"n_generations": 3, "n_pairs": 2, "n_fires": 2, "n_steps_max": 10, "hidden": 2}
+SETTINGS = {"paper": FEW, "search": SEARCH, "targets": TARGETS, "evolution": EVOLUTION}
 
 
 @pytest.fixture
@@ -164,13 +165,13 @@ def test_a_callback_that_fails_is_the_callers_matter(here, files):
     [
         (
             {"curriculum": "absent"},
-            "^absent: expected a curriculum file or one of contested, .*, or a scenario, got No ",
+            "^absent: expected a curriculum file or one of conditions, contested, .*, or a scenario, got No ",
         ),
         (
             {"curriculum": 3},
             "^curriculum: expected a curriculum or a scenario: an object, a name or a path, got 'int'$",
         ),
-        ({"method": "magic"}, "^--method: expected one of paper, sarsa, search, targets, got 'magic'$"),
+        ({"method": "magic"}, "^--method: expected one of paper, evolution, sarsa, search, targets, got 'magic'$"),
         ({"method": 3}, "^--method: expected a name or a Method, got 'int'$"),
         ({"seed": -1}, "^seed: expected a whole number from 0 to 4294967295, got -1$"),
         ({"seed": 1.0}, "^seed: expected a whole number from 0 to 4294967295, got 1.0$"),

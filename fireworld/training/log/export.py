@@ -16,12 +16,12 @@ from fireworld.errors import LogError, expected, nearest
 from fireworld.files import new_folder
 from fireworld.policy.teams.ranking_words import WEIGHTS
 from fireworld.policy.teams.table_words import first_state
-from fireworld.records import ACTION_NAMES, ACTIONS, CHOICES
+from fireworld.records import ACTION_NAMES, ACTIONS, CHOICES, Array
 from fireworld.rewards import TERMS
 from fireworld.training.log.learned import LearnedEpisode
 from fireworld.training.log.played import Played
 from fireworld.training.log.reader import Part, TrainingLog
-from fireworld.training.log.records import Episode, Lesson, Tables, Tried
+from fireworld.training.log.records import Episode, Evolved, Lesson, Tables, Tried
 from fireworld.training.log.rows_file import SUFFIX, Rows, RowsFile, check_pyarrow
 
 TABLES: Final[Mapping[str, str]] = {
@@ -33,6 +33,8 @@ TABLES: Final[Mapping[str, str]] = {
     "fights": "a ranking on a fire of its generation",
     "lessons": "a lesson in which a network learned: how its fights went",
     "lesson_fights": "a fight of a lesson",
+    "evolved": "a generation of an evolution: how its candidates fared, and what the checks said",
+    "evolved_fights": "a candidate on a fire of its generation",
     "played": "an episode that a learner played: how it went",
     "actions": "a brigade in a step of an episode that a learner played: what it did, as far as it is known",
 }
@@ -41,6 +43,7 @@ OF_KIND: Final[Mapping[type[Any], tuple[str, ...]]] = {
     Episode: ("episodes", "steps", "tables"),
     Tried: ("generations", "candidates", "fights"),
     Lesson: ("lessons", "lesson_fights"),
+    Evolved: ("evolved", "evolved_fights"),
     Played: ("played", "actions"),
 }
 
@@ -78,6 +81,8 @@ def rows_of(log: TrainingLog, names: Collection[str]) -> Iterator[tuple[str, Row
             yield from _generation_rows(part[Tried], scenarios, names)
         elif Lesson in part:
             yield from _lesson_rows(part[Lesson], scenarios, names)
+        elif Evolved in part:
+            yield from _evolved_rows(part[Evolved], scenarios, names)
 
 
 def table_arrays(log: TrainingLog, name: str) -> Rows:
@@ -162,16 +167,28 @@ def _generation_rows(tried: Tried, scenarios: list[str], names: Collection[str])
             },
         )
     if "fights" in names:
-        yield (
-            "fights",
-            {
-                "generation": np.full(n * n_fires, tried.generation),
-                "candidate": np.repeat(np.arange(n), n_fires),
-                "scenario": np.tile([scenarios[k] for k in tried.fire], n),
-                "seed": np.tile(tried.seed, n),
-                "score": scores.ravel(),
-            },
-        )
+        yield "fights", _fight_rows(tried, scores, scenarios)
+
+
+def _fight_rows(record: Tried | Evolved, scores: Array, scenarios: list[str]) -> Rows:
+    """Return the fights of a generation of their scores, (candidates, fires)."""
+    n, n_fires = scores.shape
+    return {
+        "generation": np.full(n * n_fires, record.generation),
+        "candidate": np.repeat(np.arange(n), n_fires),
+        "scenario": np.tile([scenarios[k] for k in record.fire], n),
+        "seed": np.tile(record.seed, n),
+        "score": scores.ravel(),
+    }
+
+
+def _evolved_rows(evolved: Evolved, scenarios: list[str], names: Collection[str]) -> Iterator[tuple[str, Rows]]:
+    if "evolved" in names:
+        values = {item.name: getattr(evolved, item.name) for item in fields(evolved) if "per" not in item.metadata}
+        yield "evolved", {name: np.array([one]) for name, one in values.items()}
+    if "evolved_fights" in names:
+        scores = evolved.scores.reshape(-1, len(evolved.fire))
+        yield "evolved_fights", _fight_rows(evolved, scores, scenarios)
 
 
 def _lesson_rows(lesson: Lesson, scenarios: list[str], names: Collection[str]) -> Iterator[tuple[str, Rows]]:

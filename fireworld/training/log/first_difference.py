@@ -15,7 +15,7 @@ from fireworld.records import ACTIONS, CHOICES, Array
 from fireworld.scenario import Scenario
 from fireworld.training.log.learned import LearnedEpisode, learned
 from fireworld.training.log.reader import Part, TrainingLog
-from fireworld.training.log.records import TERM_NAMES, Episode, TrainingHeader, Tried, Updates, part_number
+from fireworld.training.log.records import TERM_NAMES, Episode, Evolved, TrainingHeader, Tried, Updates, part_number
 from fireworld.training.method import Method, Trainer
 from fireworld.training.methods.sarsa import Progress, SarsaTrainer
 
@@ -163,6 +163,8 @@ def _in_generation(a: Trained, number: int, record: Any, name: str, x: Any, y: A
             if isinstance(record, Tried) and name in {"weights", "scores"}:
                 width = len(x) // max(1, len(record.weights) // len(record.mean))
                 what = f"{name} of ranking {k // width}, {k % width}"
+            if isinstance(record, Evolved) and name == "scores":
+                what = f"scores of candidate {k // len(record.fire)}, {k % len(record.fire)}"
     return _place(a, number, record, phase=PHASE_OF.get(name, "end"), what=what, a_b=pair)
 
 

@@ -239,6 +239,35 @@ class Lesson:
 
 
 @dataclass(frozen=True)
+class Evolved:
+    """A generation of an evolution of networks: the fights of its candidates, and what came of them.
+
+    The candidates follow from seed, generation and the mean before it.
+    """
+
+    topic: ClassVar[str] = "/evolved"
+    generation: int = value(1, "sfixed32", "its number, from 0")
+    score_mean: float = value(2, "double", "of all candidates, as a share of the maximum; all conditions count equally")
+    score_best: float = value(3, "double", "of the best candidate")
+    score_checked: float = value(4, "double", "of the mean on all fires, when it was last checked")
+    score_kept: float = value(5, "double", "the best of those: that of the team")
+    fire: Array = column(6, "sfixed32", "the scenario of each fire, a position in /plan", per="fire")
+    seed: Array = column(7, "fixed64", "of the random draws of each fire", per="fire")
+    scores: Array = column(
+        8,
+        "double",
+        "of each candidate on each fire, candidate by candidate, as a share of the maximum; of the first half the "
+        "noise is added, of the second subtracted",
+        per="candidate",
+    )
+    mean: Array = column(
+        9, "double", "biases and weights, layer by layer, that the next candidates are drawn around", per="weight"
+    )
+    direction: Array = column(10, "double", "in which the mean moved", per="weight")
+    kept: Array = column(11, "double", "biases and weights of the team", per="weight")
+
+
+@dataclass(frozen=True)
 class PartCommit:
     """The end of a part, an episode or a generation: without it the part does not count."""
 
@@ -266,7 +295,8 @@ def check_places(record: Any, n_brigades: Sequence[int]) -> None:
         LogError: it is not.
     """
     fights = ("fire", "seed")
-    places = {Episode: ("scenario", "seed"), Played: ("scenario", "seed"), Tried: fights, Lesson: fights}
+    places = {Episode: ("scenario", "seed"), Played: ("scenario", "seed"), Tried: fights}
+    places |= {Lesson: fights, Evolved: fights}
     fires = places.get(type(record))
     if fires is None:
         return
@@ -281,6 +311,8 @@ def check_places(record: Any, n_brigades: Sequence[int]) -> None:
         raise LogError(f"{record.topic}: its columns are not of the same fights")
     if isinstance(record, Tried) and not _fits(record):
         raise LogError(f"{record.topic}: its columns are not of the same rankings, weights and fires")
+    if isinstance(record, Evolved) and not _fits_evolved(record):
+        raise LogError(f"{record.topic}: its columns are not of the same networks and fires")
 
 
 def _fits(tried: Tried) -> bool:
@@ -293,13 +325,21 @@ def _fits(tried: Tried) -> bool:
     return len(tried.weights) // n_weights * len(tried.fire) == len(tried.scores)
 
 
+def _fits_evolved(evolved: Evolved) -> bool:
+    """Return whether the columns of a generation are of the same networks and fires."""
+    n_fires = len(evolved.fire)
+    if len({*map(len, (evolved.mean, evolved.direction, evolved.kept))}) > 1 or len(evolved.seed) != n_fires:
+        return False
+    return n_fires > 0 and len(evolved.scores) % (2 * n_fires) == 0
+
+
 TRAINING: Final = LogKind(
     format=FORMAT,
     metadata_name="fireworld.training",
     header_type=TrainingHeader,
     commit_type=PartCommit,
     first_type=Plan,
-    topics=(Plan, Episode, Tables, Updates, Tried, Lesson, Played, PartCommit),
+    topics=(Plan, Episode, Tables, Updates, Tried, Lesson, Evolved, Played, PartCommit),
     unchained=frozenset({Tables.topic, Updates.topic}),
     unit="part",
     rescue="--resume to continue, or --force to begin again",

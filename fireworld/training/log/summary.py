@@ -10,7 +10,7 @@ from typing import Any, Final
 from fireworld.shown import SHOWN_MAX, Block, TextTable
 from fireworld.training.log.played import Played
 from fireworld.training.log.reader import TrainingLog
-from fireworld.training.log.records import FORMAT, Episode, Lesson, Tried
+from fireworld.training.log.records import FORMAT, Episode, Evolved, Lesson, Tried
 from fireworld.training.log.spread import LAST
 from fireworld.version import simulator_version
 
@@ -104,6 +104,13 @@ COLUMNS: Final[Mapping[type[Any], Mapping[str, tuple[str, str]]]] = {
         "epsilon": ("epsilon", ".3f"),
         "score": ("score_mean", ".3f"),
         "TD error": ("error_mean", ".2f"),
+    },
+    Evolved: {
+        "generation": ("generation", "d"),
+        "score": ("score_mean", ".3f"),
+        "of the best": ("score_best", ".3f"),
+        "on all fires": ("score_checked", ".3f"),
+        "of the team": ("score_kept", ".3f"),
     },
 }
 """What is shown of parts that are of no one scenario: by heading, the field and how it is written."""

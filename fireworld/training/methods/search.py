@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from threading import Event
@@ -11,9 +11,8 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from fireworld.draws import FIRE, WEIGHT, hash_key
+from fireworld.draws import WEIGHT
 from fireworld.errors import LogError, TrainingError, expected
-from fireworld.executors import Workers
 from fireworld.kernels.arrays import Array
 from fireworld.kernels.draws import fill_normals
 from fireworld.kernels.ranking import N_OF_TEAM, N_TARGET_FEATURES, N_WEIGHTS
@@ -22,11 +21,11 @@ from fireworld.policy.teams.npz import check_arrays, check_finite
 from fireworld.policy.teams.ranking_team import RankingTeam
 from fireworld.policy.teams.ranking_words import OF_ACTION, OF_BRIGADE, OF_BUILDING, OF_TEAM, WEIGHTS, Weight
 from fireworld.policy.teams.team import Team
-from fireworld.simulation.built import BuiltScenario, CityCache
-from fireworld.training.curriculum import Curriculum, no_longer
+from fireworld.simulation.built import CityCache
+from fireworld.training.curriculum import Curriculum
+from fireworld.training.generations import GenerationMethod, GenerationTrainer
 from fireworld.training.log.records import Tried
-from fireworld.training.method import Count, Method, Positive, PositiveShare, Report, Trainer
-from fireworld.training.seeds import fight_seed
+from fireworld.training.method import Count, Positive, PositiveShare, Report
 
 GROUPS: Final[Mapping[str, Sequence[Weight]]] = {
     "the building": OF_BUILDING,
@@ -46,7 +45,7 @@ The team is the mean of the weights. What a weight counts:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Search(Method):
+class Search(GenerationMethod):
     """Search for the weights of a ranking."""
 
     name: ClassVar[str] = "search"
@@ -120,50 +119,30 @@ class Progress:
     spread: Array  # (17,) float64
 
 
-class SearchTrainer(Trainer[Search, Generation]):
+class SearchTrainer(GenerationTrainer[Search, Generation]):
     """Searches for one ranking, a report after every generation; arguments as for `Method.trainer`.
 
     The scenarios of the curriculum are the fires, whatever their stage.
     """
 
     report_type: ClassVar[type[Report]] = Generation
-    unit: ClassVar[str] = "generation"
     plots: ClassVar[Mapping[str, str]] = {
         "score": "Score, as a share of the maximum",
         "spread": "Spread: mean standard deviation of the weights",
     }
-    uses_workers: ClassVar[bool] = True
     topics: ClassVar[tuple[type[Any], ...]] = (Tried,)
     whole: ClassVar[type[Any] | None] = Tried
 
     def __init__(self, curriculum: Curriculum, method: Search, *, seed: int, cities: CityCache | None = None) -> None:
-        super().__init__(curriculum, method, seed=seed)
-        self._cities = cities if cities is not None else CityCache()
-        self._fires: list[BuiltScenario] = []
+        super().__init__(curriculum, method, seed=seed, cities=cities)
         self._free = self.free_weights()
         self._tried: Tried | None = None
         self.progress = Progress(0, np.zeros(len(self._free)), np.where(self._free, method.spread, 0.0))
 
     @property
-    def share_done(self) -> float:
-        """How many of the generations are done."""
-        return self.progress.generation / self.method.n_generations
-
-    def run(self, workers: Workers) -> Iterator[Generation]:
-        """Search, yielding a report after every generation.
-
-        Args:
-            workers: who fights, in threads. When their `stop` is set, the generation under way is left, as if it had
-                not begun.
-        """
-        if not self._fires:
-            n = self.method.n_steps_max
-            self._fires = [self._cities.build(no_longer(scenario, n)) for scenario in self.curriculum.scenarios]
-        with workers.make_pool(workers.n) as pool:
-            while not self.done and not workers.stop.is_set():
-                report = self._generation(pool, workers.stop)
-                if report is not None:
-                    yield report
+    def generation(self) -> int:
+        """How many generations are done."""
+        return self.progress.generation
 
     def team(self) -> RankingTeam:
         """Return what has been found so far: the mean of the distribution that candidates are drawn from."""
@@ -178,17 +157,15 @@ class SearchTrainer(Trainer[Search, Generation]):
     def restore(self, team: Team, state: Mapping[str, Array], *, source: str) -> None:
         """Continue where another trainer stood; see `Trainer.restore`."""
         check_arrays(state, "spread", "generation", source=source)
-        spread, generation = state["spread"], state["generation"]
+        spread = state["spread"]
         if spread.shape != (N_WEIGHTS,) or spread.dtype != np.float64 or (spread < 0).any():
             wanted = f"{N_WEIGHTS} numbers >= 0"
             raise TrainingError(expected(source, "spread", wanted, f"{spread.dtype} {spread.shape}"))
         check_finite(spread, "spread", source=source)
-        n = self.method.n_generations
-        if generation.shape != (1,) or generation.dtype != np.int64 or not 0 <= generation[0] <= n:
-            raise TrainingError(expected(source, "generation", f"a whole number up to {n}", str(generation.tolist())))
+        generation = self._generation_of(state, source=source)
         if not isinstance(team, RankingTeam):
             raise TrainingError(expected(source, "", RankingTeam.what, team.what))
-        self.progress = Progress(int(generation[0]), team.weights[0].copy(), spread.copy())
+        self.progress = Progress(generation, team.weights[0].copy(), spread.copy())
 
     def records(self) -> list[Any]:
         """Return the last generation, with all that was tried in it."""
@@ -235,9 +212,9 @@ class SearchTrainer(Trainer[Search, Generation]):
             free[N_TARGET_FEATURES:] = False
         return free
 
-    def policy_of(self, weights: Array) -> KernelPolicy:
-        """Return the policy of a team whose brigades all follow these weights."""
-        return from_rankings(weights[np.newaxis], own_targets=self.method.own_targets)
+    def policy_of(self, numbers: Array) -> KernelPolicy:
+        """Return the policy of a team whose brigades all follow these weights, (17,) float64."""
+        return from_rankings(numbers[np.newaxis], own_targets=self.method.own_targets)
 
     def _plot(self, group: str) -> str:
         return f"weights/{group.replace(' ', '-')}"
@@ -256,14 +233,10 @@ class SearchTrainer(Trainer[Search, Generation]):
         noise = np.zeros((method.n_candidates, len(self._free)))
         fill_normals(self.seed, WEIGHT, progress.generation, noise)
         candidates = progress.mean + progress.spread * noise
-        fires = self._draw_fires()
-        seeds = [fight_seed(self.seed, fire, progress.generation) for fire in fires]
-        shares = pool.map(
-            lambda fight: math.nan if stop.is_set() else self._fight(*fight),
-            ((candidate, *fire) for candidate in candidates for fire in zip(fires, seeds, strict=True)),
-        )
-        scores = np.array(list(shares)).reshape(len(candidates), len(fires))
-        if np.isnan(scores).any():
+        fires = self._draw_fires(range(len(self._fires)), method.n_fires)
+        seeds = self._seeds(fires)
+        scores = self._scores(pool, stop, candidates, fires, seeds)
+        if scores is None:
             return None
         means = [math.fsum(row) / len(fires) for row in scores]  # fsum: the same sum whatever the machine
         best = sorted(range(len(means)), key=lambda k: -means[k])[: method.n_best]
@@ -293,18 +266,6 @@ class SearchTrainer(Trainer[Search, Generation]):
             score_best=tried.score_best,
             spread=tried.spread_mean,
         )
-
-    def _draw_fires(self) -> list[int]:
-        """Draw the fires of a generation, without repetition while there are enough."""
-        generation = self.progress.generation
-        order = sorted(range(len(self._fires)), key=lambda fire: hash_key(self.seed, FIRE, fire, generation))
-        return order[: self.method.n_fires]
-
-    def _fight(self, weights: Array, fire: int, seed: int) -> float:
-        """Return the score of a ranking on a fire, as a share of the maximum."""
-        world = self._fires[fire].world(seed=seed)
-        world.run(self.policy_of(weights).for_brigades(world.n_brigades))
-        return world.outcome.score_share
 
 
 def _moved(progress: Progress, best: Array, method: Search, free: Array) -> Progress:

@@ -13,7 +13,9 @@ from tests.training.conftest import TINY
 
 SHORT = {"n_episodes_max": 6, "n_episodes_unchanged": 3}
 SHORT_TARGETS = {"n_lessons": 3, "n_fights": 5, "n_steps_max": 10, "hidden": 4}
+SHORT_EVOLUTION = {"n_generations": 3, "n_pairs": 2, "n_fires": 2, "n_steps_max": 10, "hidden": 2, "check_every": 2}
 SHORT_SEARCH = {"n_generations": 3, "n_candidates": 4, "n_best": 2, "n_fires": 2, "n_steps_max": 10}
+SHORT_OF = {"paper": SHORT, "search": SHORT_SEARCH, "targets": SHORT_TARGETS, "evolution": SHORT_EVOLUTION}
 
 
 @pytest.fixture(scope="session")
@@ -34,7 +36,7 @@ def make_log(curriculum, tmp_path_factory):
     folder, made = tmp_path_factory.mktemp("trainings"), {}
 
     def make(method="paper", seed=1, **settings):
-        short = {"paper": SHORT, "search": SHORT_SEARCH, "targets": SHORT_TARGETS}[method]
+        short = SHORT_OF[method]
         key = repr((method, seed, sorted(settings.items())))
         if key not in made:
             path = folder / f"{len(made)}.mcap"

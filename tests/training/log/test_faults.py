@@ -157,6 +157,25 @@ def test_generations_whose_columns_do_not_fit_are_refused(make_log, tmp_path, na
         export_training(open_training(path), tmp_path / "tables")
 
 
+@pytest.mark.parametrize("name", ["scores", "fire", "seed", "mean", "direction", "kept"])
+def test_generations_of_networks_whose_columns_do_not_fit_are_refused(make_log, tmp_path, name):
+    from dataclasses import replace
+
+    from fireworld_recorder.codec import decode, encode
+
+    from fireworld.training.log.records import Evolved
+
+    log = open_training(make_log("evolution"))
+
+    def change(_, messages):
+        evolved = decode(Evolved, dict(messages)["/evolved"])
+        return [("/evolved", encode(replace(evolved, **{name: getattr(evolved, name)[:-1]})))]
+
+    path = rewrite(log, tmp_path / "a.mcap", change=change)
+    with pytest.raises(LogError, match="part 0: /evolved: its columns are not of the same networks and fires"):
+        export_training(open_training(path), tmp_path / "tables")
+
+
 @pytest.mark.parametrize(("name", "value"), [("scenario", 99), ("scenario", -1), ("seed", 2**63)])
 def test_places_and_seeds_that_cannot_be_are_refused_by_every_command(log, tmp_path, fireworld, name, value):
     from dataclasses import replace

@@ -16,7 +16,7 @@ from fireworld.training.log import verify
 from fireworld.training.log.reader import TrainingLog, open_training
 from fireworld.training.train import train
 from fireworld.training.training import StopTraining
-from tests.training.log.conftest import SHORT, SHORT_SEARCH, SHORT_TARGETS
+from tests.training.log.conftest import SHORT, SHORT_OF
 
 
 def cut(whole, folder, n_bytes):
@@ -29,7 +29,7 @@ def cut(whole, folder, n_bytes):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("method", "short"), [("paper", SHORT), ("search", SHORT_SEARCH), ("targets", SHORT_TARGETS)])
+@pytest.mark.parametrize(("method", "short"), [*SHORT_OF.items()])
 def test_a_log_that_was_cut_anywhere_is_continued_to_the_same_bytes(curriculum, make_log, tmp_path, method, short):
     source = make_log(method)
     whole, team = source.read_bytes(), source.with_suffix(".npz").read_bytes()
@@ -149,7 +149,7 @@ def test_a_training_that_is_killed_continues(curriculum_file, make_log, tmp_path
     assert n_kills > 0
 
 
-@pytest.mark.parametrize(("method", "short"), [("paper", SHORT), ("search", SHORT_SEARCH), ("targets", SHORT_TARGETS)])
+@pytest.mark.parametrize(("method", "short"), [*SHORT_OF.items()])
 def test_another_simulator_continues_what_it_learns_alike(curriculum, make_log, tmp_path, monkeypatch, method, short):
     """As verification does, it is judged by what comes out of the last part, not by its sources."""
     whole = make_log(method).read_bytes()
@@ -159,7 +159,7 @@ def test_another_simulator_continues_what_it_learns_alike(curriculum, make_log, 
     assert path.read_bytes() == whole
 
 
-@pytest.mark.parametrize(("method", "short"), [("paper", SHORT), ("search", SHORT_SEARCH), ("targets", SHORT_TARGETS)])
+@pytest.mark.parametrize(("method", "short"), [*SHORT_OF.items()])
 def test_another_simulator_that_learns_otherwise_is_noticed(curriculum, make_log, tmp_path, monkeypatch, method, short):
     whole = make_log(method).read_bytes()
     path = cut(whole, tmp_path, 9 * len(whole) // 10)
@@ -168,7 +168,7 @@ def test_another_simulator_that_learns_otherwise_is_noticed(curriculum, make_log
     monkeypatch.setattr(TrainingLog, "trainer_before", lambda log, number: before(log, number - 1))
     monkeypatch.setattr(verify, "simulator_digest", lambda: "ab" * 32)
     last = len(open_training(partial, partial=True)) - 1
-    unit = {"paper": "episode", "search": "generation", "targets": "lesson"}[method]
+    unit = {"paper": "episode", "search": "generation", "targets": "lesson", "evolution": "generation"}[method]
     wanted = rf"t\.mcap\.partial: simulator: expected .*\+[0-9a-f]{{12}}, got .* with which {unit} {last} comes out"
     with pytest.raises(TrainingError, match=f"{wanted} otherwise; begin again with --force"):
         train(curriculum, method=method, set=short, record=path, resume=True)

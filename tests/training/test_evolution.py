@@ -1,0 +1,312 @@
+"""Evolving a network: what it starts with, that it is the same for any number of threads, resumed, replayed."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from fireworld.draws import WEIGHT
+from fireworld.errors import LogError, TrainingError
+from fireworld.executors import threads
+from fireworld.kernels.draws import normal
+from fireworld.policy.teams.network_layers import OWN_SEEN, pack
+from fireworld.policy.teams.network_team import NetworkTeam
+from fireworld.policy.teams.team import load_team
+from fireworld.scenario import load_scenario
+from fireworld.simulation.built import CityCache, build_scenario
+from fireworld.training.curriculum import load_curriculum
+from fireworld.training.log.reader import open_training
+from fireworld.training.log.records import Evolved
+from fireworld.training.methods.evolution import Evolution, EvolutionTrainer, centred_ranks
+from fireworld.training.train import train
+from fireworld.training.training import StopTraining
+from tests.training.test_search import SetAfter
+
+FIRES = """
+stages:
+  - name: usual
+    cooperation: true
+    base: quick
+    each: [{fires.0.n_buildings: 4}, {fires.0.n_buildings: 6}, {fires.0.n_buildings: 7}]
+  - name: many
+    cooperation: true
+    base: quick
+    set: {brigades.n: 4}
+    each: [{fires.0.n_buildings: 8}, {fires.0.n_buildings: 9}]
+"""
+SHORT = {"n_generations": 2, "n_pairs": 2, "n_fires": 3, "n_steps_max": 25, "hidden": 3, "check_every": 1}
+
+
+@pytest.fixture(scope="module")
+def fires(tmp_path_factory):
+    path = tmp_path_factory.mktemp("evolution") / "fires.yaml"
+    path.write_text(FIRES)
+    return load_curriculum(path)
+
+
+@pytest.fixture(scope="module")
+def make(fires):
+    cities = CityCache()
+
+    def make(*, seed=1, **changes):
+        return EvolutionTrainer(fires, Evolution(**{**SHORT, **changes}), seed=seed, cities=cities)
+
+    return make
+
+
+def evolved(trainer, *, n_threads=1):
+    """Evolve to the end; return the mean, the direction and what is kept."""
+    list(trainer.run(threads(n_threads)))
+    assert trainer.done
+    return tuple(
+        array.tobytes() for array in (trainer.progress.mean, trainer.progress.direction, trainer.progress.kept)
+    )
+
+
+def test_the_same_whatever_the_number_of_threads(make):
+    one, two = make(), make()
+    reports = [list(trainer.run(threads(n))) for trainer, n in ((one, 1), (two, 2))]
+    assert reports[0] == reports[1]
+    assert [report.generation for report in reports[0]] == [0, 1]
+    assert one.team().to_bytes() == two.team().to_bytes()
+    assert evolved(one) == evolved(two)
+
+
+def test_other_seeds_and_hyperparameters_another_evolution(make):
+    variants = (
+        {},
+        {"seed": 2},
+        {"start": "none"},
+        {"n_fires": 2},
+        {"noise": 0.2},
+        {"rate": 1.0},
+        {"momentum": 0.0},
+        {"n_pairs": 3},
+        {"n_steps_max": 5},
+    )
+    assert len({evolved(make(**variant))[0] for variant in variants}) == len(variants)
+
+
+def decisions(team, name, *, seed=3):
+    """Return what the brigades of a scenario go for, and the digest of all that comes of it, step by step."""
+    world = build_scenario(load_scenario(name)).world(seed=seed)
+    policy, found = team.policy(), []
+    while not (world.terminated or world.truncated):
+        world.step(policy)
+        found.append((world.state.brigades.target.tolist(), world.digest()))
+    return found
+
+
+@pytest.mark.parametrize("hidden", [0, 2, 12])
+@pytest.mark.parametrize("name", ["quick", "test-2"])
+def test_it_starts_with_what_the_best_ranking_does(make, hidden, name):
+    team = make(hidden=hidden).team()
+    assert isinstance(team, NetworkTeam)
+    assert team.widths == ((26, hidden, 1) if hidden else (26, 1))
+    assert decisions(team, name) == decisions(load_team("best"), name)
+
+
+def test_without_a_start_all_targets_are_worth_the_same(make):
+    team = make(start="none").team()
+    assert not team.layers[-1].weights.any()
+    assert team.layers[0].weights.any(), "hidden weights are drawn"
+    assert "start" not in make(start="none").identity
+    assert make().identity["start"] == load_team("best").digest
+
+
+def test_a_start_that_is_no_ranking(make, monkeypatch):
+    network = make().team()
+    monkeypatch.setattr("fireworld.training.methods.evolution.load_team", lambda _: network)
+    with pytest.raises(
+        TrainingError, match=r"^method: start: expected best to be one ranking of own targets, got a net"
+    ):
+        make()
+
+
+@pytest.mark.parametrize("n_threads", [1, 2])
+@pytest.mark.parametrize(("n_looks", "n_done"), [(1, 0), (6, 0), (13, 0), (18, 0), (22, 0), (23, 1), (36, 1), (40, 1)])
+def test_stopped_within_a_generation_and_resumed(make, n_looks, n_done, n_threads):
+    """A generation looks once, and for 4 x 3 fights and 5 of a check; the first one has two checks."""
+    whole, trainer = make(), make()
+    reports = list(whole.run(threads(1)))
+    assert list(trainer.run(threads(n_threads, stop=SetAfter(n_looks)))) == reports[:n_done]
+    second = make()
+    second.restore(trainer.team(), trainer.state(), source="t.npz")
+    assert list(second.run(threads(n_threads))) == reports[n_done:]
+    assert second.team().to_bytes() == whole.team().to_bytes()
+    assert evolved(second) == evolved(whole)
+
+
+def test_resumed_from_a_checkpoint_and_from_a_log_it_ends_with_the_same_bytes(fires, tmp_path):
+    def stop(training, report):
+        if training.n_reports == 1:
+            raise StopTraining
+
+    def bytes_of(name, *, record, **options):
+        names = {"output": tmp_path / f"{name}.npz", **({"record": tmp_path / f"{name}.mcap"} if record else {})}
+        train(fires, method="evolution", set=SHORT, **names, **options)
+        return [path.read_bytes() for path in names.values() if path.exists()]
+
+    for record in (True, False):
+        whole = bytes_of(f"whole-{record}", record=record, jobs=2)
+        name = f"parted-{record}"
+        assert len(bytes_of(name, record=record, jobs=1, callbacks=[stop])) == 0
+        assert bytes_of(name, record=record, jobs=1, resume=True) == whole
+
+
+def test_a_log_is_followed_to_the_same_state(fires, make, tmp_path):
+    path = tmp_path / "t.mcap"
+    train(fires, method="evolution", set=SHORT, record=path)
+    log, trained, followed = open_training(path), make(), make()
+    reports = list(trained)
+    assert [followed.follow(part) for part in log.parts()] == reports == [report for _, report in log.reports()]
+    assert evolved(followed) == evolved(trained)
+    assert followed.points(reports[-1]) == trained.points(reports[-1])
+    assert log.team().digest == trained.team().digest
+    for part in log.parts():
+        assert len(part[Evolved].scores) == 2 * 2 * 3
+    with pytest.raises(LogError, match=r"^a part holds no generation of networks of 85 numbers$"):
+        make(start="none").follow({})
+    with pytest.raises(LogError, match=r"^a part holds no generation of networks of 57 numbers$"):
+        make(hidden=2).follow(next(iter(log.parts())))
+
+
+def test_one_generation_by_hand(make, monkeypatch):
+    """The direction is the noise of each pair, as much as the one fared better than the other, by their ranks."""
+    trainer = make(n_generations=1, momentum=0.25, rate=2.0, noise=0.5, n_fires=5, check_every=9)
+    start = trainer.progress.mean
+    tried = []
+
+    def fight(numbers, fire, _seed):
+        tried.append(numbers)
+        return (numbers[5] + 10 * (fire >= 3)) / 20
+
+    monkeypatch.setattr(trainer, "_fight", fight)
+    monkeypatch.setattr(trainer, "_fight_to_the_end", fight)
+    (report,) = trainer.run(threads(1))
+    n = len(start)
+    noise = np.array([[normal(1, WEIGHT, row * n + k, 0) for k in range(n)] for row in range(2)])
+    noise[:, -4] = 0.0  # the last layer is a bias and three weights
+    candidates = [start + 0.5 * noise[0], start + 0.5 * noise[1], start - 0.5 * noise[0], start - 0.5 * noise[1]]
+    assert np.array(tried[:20:5]) == pytest.approx(np.array(candidates))
+    values = [one[5] for one in candidates]
+    rank = [sorted(values).index(one) / 3 for one in values]
+    new = ((rank[0] - rank[2]) * noise[0] + (rank[1] - rank[3]) * noise[1]) / 2
+    assert trainer.progress.direction == pytest.approx(0.75 * new)
+    assert trainer.progress.mean == pytest.approx(start + 2.0 * 0.75 * new)
+    assert report.score_best == pytest.approx(max(values) / 20 + 0.25), "both conditions count equally: 3 fires and 2"
+    assert report.score_mean == pytest.approx(np.mean(values) / 20 + 0.25)
+    better = trainer.progress.mean[5] > start[5]
+    assert (trainer.progress.kept == (trainer.progress.mean if better else start)).all()
+    assert better
+    assert report.score_kept == report.score_checked == pytest.approx(trainer.progress.mean[5] / 20 + 0.25)
+
+
+def test_the_start_is_kept_until_something_is_better(make, monkeypatch):
+    trainer = make(n_generations=7, check_every=3)
+    start = trainer.progress.mean.copy()
+    n_checks = 0
+
+    def score(_pool, _stop, numbers):
+        nonlocal n_checks
+        n_checks += 1
+        return 1.0 if (numbers == start).all() else 0.5
+
+    monkeypatch.setattr(trainer, "_score_on_all", score)
+    monkeypatch.setattr(trainer, "_fight", lambda numbers, *_: numbers[0] / 100)
+    reports = list(trainer)
+    assert n_checks == 4, "of the start, and after the generations 3, 6 and 7"
+    assert [report.score_checked for report in reports] == [1.0, 1.0, 0.5, 0.5, 0.5, 0.5, 0.5]
+    assert {report.score_kept for report in reports} == {1.0}
+    assert (pack(trainer.team().layers, ("relu",), OWN_SEEN).number == start).all()
+    assert (trainer.progress.mean != start).any()
+
+
+def test_all_candidates_meet_the_same_fires_of_all_conditions(make, monkeypatch):
+    trainer = make(n_generations=6, n_pairs=1, check_every=99)
+    fought = []
+    monkeypatch.setattr(trainer, "_score_on_all", lambda *_: 0.5)
+    monkeypatch.setattr(trainer, "_fight", lambda _, *fire: fought.append(fire) or 0.5)
+    list(trainer)
+    generations = [fought[k : k + 6] for k in range(0, 36, 6)]
+    assert all(one[:3] == one[3:] for one in generations)
+    n_usual = [sum(fire < 3 for fire, _ in one[:3]) for one in generations]
+    assert n_usual == [2, 1, 2, 1, 2, 1], "the third fire goes to the conditions in turn"
+    assert len({*fought}) == 18, "other draws in every generation"
+    assert len(Counter(fire for fire, _ in fought)) == 5
+    assert trainer.progress.mean.tolist() == make().progress.mean.tolist(), "who all fare alike go nowhere"
+
+
+def test_checks_are_fought_to_the_end(make, fires, monkeypatch):
+    longest = {"fight": 0, "check": 0}
+
+    def score(_numbers, world):
+        of_check = world.n_steps_max == fires.scenarios[0].steps
+        longest["check" if of_check else "fight"] = max(longest["check" if of_check else "fight"], world.n_steps_max)
+        return 0.5
+
+    trainer = make()
+    monkeypatch.setattr(trainer, "_score", score)
+    list(trainer)
+    assert longest == {"fight": 25, "check": 100}
+
+
+def test_curves(make):
+    trainer = make()
+    for report in trainer:
+        found = trainer.points(report)
+        assert {*found} == {*trainer.plots, *trainer.own_plots()}
+        assert {*found["conditions"]} == {"usual", "many"}
+        assert math.isclose(math.fsum(found["conditions"].values()) / 2, report.score_mean)
+        assert trainer.numbers(report)["conditions/usual"] == found["conditions"]["usual"]
+        assert report.score_kept >= report.score_checked
+
+
+def test_centred_ranks():
+    assert centred_ranks([0.2, 0.9, 0.1]) == [0.0, 0.5, -0.5]
+    assert centred_ranks([0.5, 0.5, 0.7, 0.1]) == pytest.approx([0.0, 0.0, 0.5, -0.5])
+    assert centred_ranks([0.5, 0.5]) == [0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"hidden": 1}, r"hidden: expected 0, or at least 2, which a ranking takes \(start best\), got 1"),
+        ({"hidden": 257}, "hidden: expected a whole number from 0 to 256, got 257"),
+        ({"start": "paper"}, "start: expected one of best, none, got 'paper'"),
+        ({"n_generations": 0}, "n_generations: expected a whole number from 1 to 1000000, got 0"),
+        ({"n_pairs": 0}, "n_pairs: expected a whole number from 1"),
+        ({"n_fires": 0}, "n_fires: "),
+        ({"n_steps_max": -1}, "n_steps_max: "),
+        ({"noise": 0.0}, "noise: expected a number > 0, got 0.0"),
+        ({"rate": float("nan")}, "rate: expected a number > 0, got nan"),
+        ({"momentum": 1.0}, "momentum: expected a number from 0, below 1, got 1.0"),
+        ({"check_every": 0}, "check_every: expected a whole number from 1"),
+    ],
+)
+def test_hyperparameters_that_make_no_evolution(changes, message):
+    with pytest.raises(TrainingError, match=f"^method: {message}"):
+        Evolution(**changes)
+    assert Evolution(hidden=1, start="none").hidden == 1
+
+
+@pytest.mark.parametrize(
+    ("broken", "wanted"),
+    [
+        ({"generation": np.array([9])}, "generation: expected a whole number up to 2"),
+        ({"mean": np.zeros(3)}, r"mean: expected 85 numbers, got float64 \(3,\)"),
+        ({"direction": np.full(85, np.nan)}, "direction"),
+        ({"checks": np.zeros(3)}, "checks: expected 2 numbers"),
+    ],
+)
+def test_a_checkpoint_that_makes_no_sense(make, broken, wanted):
+    trainer = make()
+    with pytest.raises(TrainingError, match=f"^t.npz: {wanted}"):
+        trainer.restore(trainer.team(), {**trainer.state(), **broken}, source="t.npz")
+    with pytest.raises(TrainingError, match=r"^t.npz: expected a network of 26-3-1, got"):
+        trainer.restore(make(hidden=4).team(), trainer.state(), source="t.npz")
+    with pytest.raises(TrainingError, match=r"^t.npz: expected a network, got"):
+        trainer.restore(load_team("best"), trainer.state(), source="t.npz")
