@@ -179,6 +179,7 @@ class BrigadeConstants(NamedTuple):
     hydrant_refill: int
     range_square: float
     speed: int
+    free: bool  # a brigade may name targets of any fire site, and belongs to the site of the one it goes for
 
 
 class ObservationConstants(NamedTuple):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Self
 
 import numpy as np
 
-from fireworld.kernels.arrays import Array, PolicyArrays, Seen
+from fireworld.kernels.arrays import Array, BrigadeState, PolicyArrays, Seen
 from fireworld.policy.kernel import noted_decisions
 from fireworld.policy.protocol import Decision
 
@@ -23,6 +23,24 @@ class Reasons(NamedTuple):
     q_values: Array  # (4 b,) float64, or none if nobody has any
     epsilon: float
     target_value: Array  # (b,) float64, or none if nobody has any
+
+
+class Made(NamedTuple):
+    """What the decisions of a step change, copied before them; b brigades."""
+
+    action: Array  # (b,) int32
+    target: Array  # (b,) int32
+    site: Array  # (b,) int32
+
+    @classmethod
+    def of(cls, brigades: BrigadeState) -> Self:
+        """Copy it."""
+        return cls(*(getattr(brigades, name).copy() for name in cls._fields))
+
+    def put_back(self, brigades: BrigadeState) -> None:
+        """Let the brigades have decided nothing since."""
+        for name, array in self._asdict().items():
+            getattr(brigades, name)[:] = array
 
 
 class Choices:
