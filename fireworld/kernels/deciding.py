@@ -83,6 +83,7 @@ def decide(brigade: int, step: int, before: Array, shown: Array, known: Array, e
     action, target, choice = -1, -1, NO_CHOICE
     if len(seen.state) > 0:
         seen.state[brigade] = state_of(brigade, shown, episode, seen.features[brigade])
+        seen.site[brigade] = brigades.site[brigade]
         seen.action_values[brigade] = 0.0
         seen.target_value[brigade] = 0.0
     if learner.learning[0] != 0:

@@ -46,11 +46,13 @@ class Made(NamedTuple):
 class Choices:
     """What the brigades saw and decided in a step."""
 
-    def __init__(self, features: Array, state_index: Array, decisions: Sequence[Decision] = ()) -> None:
+    def __init__(self, features: Array, state_index: Array, site: Array, decisions: Sequence[Decision] = ()) -> None:
         self.features = features
         """(b, 8) int64."""
         self.state_index = state_index
         """(b,) int64, -1 none."""
+        self.site = site
+        """(b,) int32, the number of the fire site that each belonged to before it decided, 0 none."""
         self._decisions = tuple(decisions)
 
     @property
@@ -86,7 +88,7 @@ class NotedChoices(Choices):
     """
 
     def __init__(self, policy: PolicyArrays, seen: Seen, action: Array, target: Array, last_target: Array) -> None:
-        self.features, self.state_index = seen.features, seen.state
+        self.features, self.state_index, self.site = seen.features, seen.state, seen.site
         self._policy, self._seen, self._made = policy, seen, (action, target, last_target)
 
     @cached_property

@@ -187,7 +187,7 @@ class World:
         self.step_number += 1
         before = Made.of(self.state.brigades)
         try:
-            choices = self._decide(complete(policy), before.action, before.target)
+            choices = self._decide(complete(policy), before)
         except BaseException:  # nothing but the choices has changed: the step can be tried again
             self.step_number -= 1
             before.put_back(self.state.brigades)
@@ -246,14 +246,15 @@ class World:
         bound.clock[SEED], bound.clock[STEP] = self.seed, self.step_number
         return bound
 
-    def _decide(self, policy: Policy, before: Array, target_before: Array) -> Choices:
-        """Ask for all decisions; what the brigades did in the last step is (b,) `before` and `target_before`."""
+    def _decide(self, policy: Policy, before: Made) -> Choices:
+        """Ask for all decisions; `before` is what the brigades did in the last step, and where they belong."""
         features = np.zeros((self.n_brigades, 8), dtype=np.int64)
         made = [
-            self.ask(brigade, policy, before, target_before, features[brigade]) for brigade in range(self.n_brigades)
+            self.ask(brigade, policy, before.action, before.target, features[brigade])
+            for brigade in range(self.n_brigades)
         ]
         states = np.array([state for state, _ in made], dtype=np.int64)
-        return Choices(features, states, [decision for _, decision in made])
+        return Choices(features, states, before.site, [decision for _, decision in made])
 
     def ask(
         self, brigade: int, policy: Policy, before: Array, target_before: Array, features: Array

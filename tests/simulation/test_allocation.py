@@ -12,8 +12,10 @@ from fireworld.errors import PolicyError
 from fireworld.kernels.allocation import join_site, may_name, named_range
 from fireworld.policy.kernel import KernelPolicy, from_rankings, given
 from fireworld.policy.protocol import Action, Decision, Policy
+from fireworld.policy.teams.network_layers import FEATURES
 from fireworld.scenario import Scenario
 from fireworld.simulation.built import BuiltScenario, build_scenario
+from fireworld.simulation.observer import Observer
 from fireworld.simulation.state import named_arrays
 from fireworld.simulation.world import World
 from tests.kernels.small import burn, make_city, make_world, site_numbers, square
@@ -24,8 +26,8 @@ THREE_FIRES: dict[str, Any] = {
     "name": "three-fires",
     "city": {"generated": {"columns": 9, "rows": 7, "seed": 5, "hydrant_share": 0.5}},
     "fires": [
-        {"at": [0.1, 0.1], "n_buildings": 3},
-        {"at": [0.9, 0.9], "n_buildings": 2},
+        {"at": [0.1, 0.1], "n_buildings": 7},
+        {"at": [0.9, 0.9], "n_buildings": 5},
         {"at": [0.1, 0.9], "step": 9},
     ],
     "civilians": {"n": 4, "seed": 3},
@@ -40,10 +42,14 @@ def built_with(**values: Any) -> BuiltScenario:
 
 
 def policy_named(name: str) -> KernelPolicy:
-    random = np.random.default_rng(4)
     if name == "network":
         return make_network(own_targets=True).policy()
-    return from_rankings(random.normal(size=(3, 17)), own_targets=True)
+    weights = np.random.default_rng(4).normal(size=(3, 17))
+    weights[:, FEATURES.index("mine")], weights[:, FEATURES.index("beyond_range")] = (
+        -9.0,
+        9.0,
+    )  # it likes to be elsewhere
+    return from_rankings(weights, own_targets=True)
 
 
 class Noted:
@@ -63,7 +69,8 @@ class Noted:
     @property
     def n_moves(self) -> int:
         """How often a brigade changed its site."""
-        return int((np.diff(self.sites, axis=0) != 0).sum())
+        before, after = np.array(self.sites[:-1]), np.array(self.sites[1:])
+        return int(((before != after) & (before > 0) & (after > 0)).sum())
 
 
 def assert_same_state(world: World, other: World) -> None:
@@ -205,5 +212,21 @@ def test_a_recorded_run_is_replayed_and_forked(tmp_path):
     assert fw.verify(path)
     assert fw.fork(path, at=7).digest == run.digest
     assert fw.fork(path, at=7, policy="recorded").digest == run.digest
-    sites = [record.observations.site for record in run if record.step]
-    assert (np.diff(np.array(sites), axis=0) != 0).any()
+    sites = np.array([record.observations.site for record in run if record.step])
+    assert (np.diff(sites, axis=0) != 0).any()
+
+
+@pytest.mark.parametrize("asked", [False, True])
+def test_recorded_is_the_site_that_a_brigade_belonged_to_before_it_chose(asked):
+    world = built_with().world(seed=6)
+    policy = begin(policy_named("ranking"), world)
+    observer, n_moves = Observer(world), 0
+    observer.record()
+    while not (world.terminated or world.truncated):
+        ahead = world.copy()
+        ahead.look()
+        seen = observer.record(world.step(Asked(policy) if asked else policy)).observations.site
+        belonged = ahead.state.brigades.site
+        assert seen.tolist() == np.where(belonged > 0, belonged, -1).tolist()
+        n_moves += int((belonged != world.state.brigades.site).sum())
+    assert n_moves > 5
