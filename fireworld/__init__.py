@@ -55,6 +55,8 @@ if TYPE_CHECKING:
     from fireworld.recording.episode import open_episode as open_episode
     from fireworld.recording.explain import Explanation as Explanation
     from fireworld.recording.explain import explain as explain
+    from fireworld.recording.explanation.preference import Preferences as Preferences
+    from fireworld.recording.explanation.preference import preferences as preferences
     from fireworld.recording.export import export as export
     from fireworld.recording.export import recover as recover
     from fireworld.recording.fork import fork as fork
@@ -96,6 +98,7 @@ _ROOMS = {
     "Observation": "policy.protocol",
     "Outcome": "outcome",
     "Policy": "policy.protocol",
+    "Preferences": "recording.explanation.preference",
     "Reproduction": "reproduction.reproduce",
     "Run": "recording.run",
     "Scenario": "scenario",
@@ -129,6 +132,7 @@ _ROOMS = {
     "open_training": "training.log.reader",
     "play": "recording.pages.play",
     "policies": "policy.names",
+    "preferences": "recording.explanation.preference",
     "recover": "recording.export",
     "replay_episode": "training.log.replay",
     "reproduce": "reproduction.reproduce",

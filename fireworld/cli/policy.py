@@ -58,11 +58,17 @@ def list_policies(*, as_json: bool) -> None:
     "--log",
     metavar="F.mcap",
     type=click.Path(path_type=Path),
-    help="The training log that the team came of: show how the values of the STATEs came about.",
+    help="The training log that the team came of: show how values of STATEs came about; with --step, a run.",
+)
+@click.option(
+    "--step",
+    metavar="N",
+    type=click.IntRange(min=1),
+    help="A step of the run in --log: show why each brigade preferred its target.",
 )
 @SHOWN_OPTION
 @click.option("--json", "as_json", is_flag=True, help="Write JSON.")
-def show(*, team: str, states: tuple[str, ...], log: Path | None, limit: int, as_json: bool) -> None:
+def show(*, team: str, states: tuple[str, ...], log: Path | None, step: int | None, limit: int, as_json: bool) -> None:
     """Show what a team does: how much it has seen, what it prefers, and in each STATE what it does and why.
 
     A STATE is its number in recordings, 0 to 4319, or some of its features; then all states that have them are meant,
@@ -76,15 +82,20 @@ def show(*, team: str, states: tuple[str, ...], log: Path | None, limit: int, as
     fireworld policy show team.npz free_edges=3,volume=high,distance_from_civilian=low
     fireworld policy show paper-cooperative
     fireworld policy show team.npz 1193 --log team.mcap
+    fireworld policy show best --log run.mcap --step 12
 
     With --log, the training log that the team came of: when each brigade was first in the state, its values at the end
-    of every scenario, and the steps that moved them most.
+    of every scenario, and the steps that moved them most. With --log and --step, a run and a step of it: what each
+    brigade went for, what the team values most of all else, and what each feature adds to the difference.
 
-    Exit code: 0 shown, 2 no such team or state, or a log of another team.
+    Exit code: 0 shown, 2 no such team, state or step, or a log of another team.
     """
     from fireworld.policy.teams.team import load_team
 
     loaded = load_team(team)
+    if step is not None:
+        _show_step(loaded, states, log, step, limit=limit, as_json=as_json)
+        return
     if log is not None:
         _show_history(loaded, team, states, log, limit=limit, as_json=as_json)
         return
@@ -157,10 +168,24 @@ def import_network(*, model: Path, output: Path, features: str | None, own_targe
     click.echo(f"{output}: {team.summary}, digest {team.digest[:12]}")
 
 
+def _show_step(team: Team, states: tuple[str, ...], path: Path | None, step: int, *, limit: int, as_json: bool) -> None:
+    """Show why brigades preferred their targets in a step of a run."""
+    if path is None or states:
+        raise click.UsageError("--step needs --log with a run, and no STATE.")
+    announce_compilation()
+    from fireworld.recording.explanation.preference import preferences
+
+    found = preferences(team, path, step=step)
+    if as_json:
+        click.echo(json.dumps(found.as_dict(), indent=2))
+    else:
+        print_blocks(found.describe(limit=limit))
+
+
 def _show_history(team: Team, name: str, states: tuple[str, ...], path: Path, *, limit: int, as_json: bool) -> None:
     """Show how the values of states came about in a training."""
     if not states:
-        raise click.UsageError("--log needs a STATE.")
+        raise click.UsageError("--log needs a STATE, or --step with a run.")
     announce_compilation()
     from fireworld.policy.words import find_states
     from fireworld.training.log.history import state_histories

@@ -13,13 +13,13 @@ from fireworld.envs.actions import checked_action
 from fireworld.envs.autoreset import Autoreset
 from fireworld.envs.many_worlds import Stepped, Worlds, again
 from fireworld.envs.setup import Setup
-from fireworld.kernels.arrays import Array
 from fireworld.kernels.batch import look_again, take_turn
 from fireworld.kernels.deciding import decide_by_policy
 from fireworld.kernels.observation import N_FEATURES
 from fireworld.policy.asking import begin
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.protocol import Policy
+from fireworld.simulation.choices import Made
 from fireworld.training.seeds import Seeds
 
 _WORLD: Final = 0
@@ -89,7 +89,7 @@ class OneWorld(Worlds):
         """
         before = self._choices()
         self.take_turn(brigade, action)
-        others = range(brigade + 1 if self._in_turn else 0, len(before[0]))
+        others = range(brigade + 1 if self._in_turn else 0, len(before.action))
         self._decide([other for other in others if other != brigade], before)
         stepped = self.finish_turns()
         try:
@@ -109,22 +109,22 @@ class OneWorld(Worlds):
             self._decide(range(brigade), self._choices())
             self.look(brigade)
 
-    def _choices(self) -> tuple[Array, Array]:
-        brigades = self._bound.world(_WORLD).state.brigades
-        return brigades.action.copy(), brigades.target.copy()
+    def _choices(self) -> Made:
+        return Made.of(self._bound.world(_WORLD).state.brigades)
 
-    def _decide(self, brigades: Sequence[int], before: tuple[Array, Array]) -> None:
+    def _decide(self, brigades: Sequence[int], before: Made) -> None:
         """Let brigades decide by the policy; if it fails, all have decided what they had `before`."""
         if self._asked is None:
-            decide_by_policy(self._bound.rows[_WORLD], np.array(brigades, dtype=np.int64), *before)
+            chosen = np.array(brigades, dtype=np.int64)
+            decide_by_policy(self._bound.rows[_WORLD], chosen, before.action, before.target)
             return
         world, features = self._bound.world(_WORLD), np.zeros(N_FEATURES, dtype=np.int64)
         world.step_number += 1
         try:
             for brigade in brigades:
-                world.ask(brigade, self._asked, *before, features)
+                world.ask(brigade, self._asked, before.action, before.target, features)
         except BaseException:
-            world.state.brigades.action[:], world.state.brigades.target[:] = before
+            before.put_back(world.state.brigades)
             raise
 
     def __reduce__(self) -> tuple[Any, ...]:

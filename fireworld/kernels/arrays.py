@@ -179,6 +179,7 @@ class BrigadeConstants(NamedTuple):
     hydrant_refill: int
     range_square: float
     speed: int
+    free: bool  # a brigade may name targets of any fire site, and belongs to the site of the one it goes for
 
 
 class ObservationConstants(NamedTuple):
@@ -383,6 +384,7 @@ class Seen(NamedTuple):
 
     features: Int64x2  # (b, 8)
     state: Int64  # (b,), -1 without a site
+    site: Int32  # (b,), number of the fire site that it belonged to
     choice: UInt8  # (b,), how it came to its action: position in fireworld.records.CHOICES
     explored: UInt8  # (b,), 1 where that was a random draw
     action_values: Float64x2  # (b, 4), of the four actions, by the table, ranking or network that chose; else 0

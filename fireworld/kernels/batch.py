@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from fireworld.kernels.addresses import opener
+from fireworld.kernels.allocation import join_site, named_range
 from fireworld.kernels.arrays import (
     BURNING,
     Array,
@@ -45,7 +46,7 @@ class View(NamedTuple):
     mask: UInt8x3  # (n, b, 4 + k): the actions that a brigade may take; 0 alone where it chooses nothing
     alive: UInt8x2  # (n, b)
     chooses: UInt8x2  # (n, b): it acts in the coming step: alive, not refilling, and something burns
-    own: Int32x3  # (n, b, k): the burning buildings of its site, -1 where there are no more
+    own: Int32x3  # (n, b, k): the burning buildings that it may name, -1 where there are no more
     targets: Float32x4  # (n, b, 4, 13): features of the targets that the actions name
     team: Float32x2  # (n, 6), TEAM
     burning: Int32x2  # (n, g): burning buildings, site after site, -1 where there are no more
@@ -158,6 +159,7 @@ def follow(brigade: int, action: int, i: int, episode: Episode, batch: Batch) ->
         where = city.buildings, city.links, world.fire, city.geometry, sites
         target = find_named(brigade, action, brigades, *where, episode.constants.observation)
     brigades.action[brigade], brigades.target[brigade] = action, target
+    join_site(brigade, target, brigades.site, sites, episode.constants.brigades.free)
 
 
 @inner
@@ -203,17 +205,15 @@ def show_brigade(brigade: int, i: int, episode: Episode, batch: Batch) -> None:
     mask[0] = 1
     for action in range(1, N_ACTIONS):
         mask[action] = chooses
-    place = site_place(brigade, brigades.site, sites)
-    first, n_members = 0, 0
-    if place >= 0:
-        first, n_members = sites.start[place], sites.start[place + 1] - sites.start[place]
+    first, end = named_range(brigade, brigades.site, sites, episode.constants.brigades.free)
     for k in range(len(own)):
-        there = chooses and k < n_members
+        there = chooses and first + k < end
         mask[N_ACTIONS + k] = there
         own[k] = sites.member[first + k] if there else -1
     if len(view.targets):
+        has_site = site_place(brigade, brigades.site, sites) >= 0
         for action in range(N_ACTIONS):
-            show_target(action, brigade, place >= 0, i, episode, view)
+            show_target(action, brigade, has_site, i, episode, view)
     if len(view.brigades):
         show_position(brigade, i, episode, view)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fireworld.kernels.allocation import join_site, named_range
 from fireworld.kernels.arrays import BY_RANK, BY_TABLE, Array, Seen
 from fireworld.kernels.choice import GIVEN, RANK_ALL, RANK_NAMED, TABLE, choose, explores, keeps_choice, table_state
 from fireworld.kernels.episode_arrays import LAST_STEP, SEED, STEP, Episode
@@ -82,6 +83,7 @@ def decide(brigade: int, step: int, before: Array, shown: Array, known: Array, e
     action, target, choice = -1, -1, NO_CHOICE
     if len(seen.state) > 0:
         seen.state[brigade] = state_of(brigade, shown, episode, seen.features[brigade])
+        seen.site[brigade] = brigades.site[brigade]
         seen.action_values[brigade] = 0.0
         seen.target_value[brigade] = 0.0
     if learner.learning[0] != 0:
@@ -93,6 +95,7 @@ def decide(brigade: int, step: int, before: Array, shown: Array, known: Array, e
             where = city.buildings, city.links, world.fire, city.geometry, sites
             target = find_named(brigade, action, brigades, *where, observation)
     brigades.action[brigade], brigades.target[brigade] = action, target
+    join_site(brigade, target, brigades.site, sites, episode.constants.brigades.free)
     if len(seen.state) > 0:
         seen.choice[brigade], seen.explored[brigade] = choice, choice == EXPLORED
 
@@ -197,11 +200,11 @@ def explore_and_learn(
 ) -> tuple[int, int]:
     """Let a brigade that learns try another target now and then; learn from its choice before by the value of this one.
 
-    All burning buildings of its site have been valued by it. Returns the target, and how it came to that.
+    All that it may name have been valued by it. Returns the target, and how it came to that.
     """
     policy, scratch, sites, learner = episode.policy, episode.scratch, episode.world.sites, episode.learner
-    site, ranks, epsilon, choice = sites.place[target], scratch.ranks, policy.epsilon[0], GREEDY
-    first, end = np.int64(sites.start[site]), np.int64(sites.start[site + 1])
+    ranks, epsilon, choice = scratch.ranks, policy.epsilon[0], GREEDY
+    first, end = named_range(brigade, episode.world.brigades.site, sites, episode.constants.brigades.free)
     greedy = np.int64(ranks.position[target])
     chosen = explored_place(brigade, first, end, epsilon, episode.clock[SEED], step)
     if chosen >= 0:

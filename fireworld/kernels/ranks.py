@@ -1,13 +1,14 @@
 """Ranks: which burning building a brigade would like to fight most, by weights of what it sees of it or by a network.
 
-All burning buildings of a site are valued at once, along a row of them. What a team sees alike is worked out once a
-step; the sums of every value are in one order, whoever asks.
+All burning buildings that a brigade may name are valued at once, along a row of them. What a team sees alike is worked
+out once a step; the sums of every value are in one order, whoever asks.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from fireworld.kernels.allocation import named_range
 from fireworld.kernels.arrays import Array, GeometryArrays, NetworkArrays, SiteState
 from fireworld.kernels.episode_arrays import Ranks
 from fireworld.kernels.jit import inner, kernel
@@ -234,8 +235,8 @@ def rank_targets(
     """Return the action with the target that a brigade values most, and that target; -1, -1 without a site.
 
     The four targets that the actions name are valued, each with the weight of its action on top; where the brigade may
-    name a target of its own, all burning buildings of its site are instead, and its action is OWN_TARGET. Ties: the
-    lowest action, the lowest building id.
+    name a target of its own, all that it may name are instead, and its action is OWN_TARGET. Ties: the lowest action,
+    the lowest building id.
 
     The team has been lined up in this step, and the brigades before this one been heard. `weights` (17,) are the
     ranking's, by its number; a network with layers values targets instead of them. `known` (b,) is what the brigades
@@ -253,7 +254,7 @@ def rank_targets(
     place = np.int64(-1)
     n_valued = N_ACTIONS if noting or not own else 0
     for action in range(-1 if own else 0, n_valued):
-        first, end = np.int64(sites.start[site]), np.int64(sites.start[site + 1])
+        first, end = named_range(brigade, sight.brigades.site, sites, sight.brigade_constants.free)
         if action >= 0:
             b = find_target(brigade, action, sight.brigades, sight.buildings, sight.fire, sight.geometry, sites)
             first = np.int64(ranks.position[b])

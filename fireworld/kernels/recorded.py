@@ -119,7 +119,7 @@ def most_events(n_buildings: int, n_civilians: int, n_brigades: int) -> int:
 
 
 @kernel
-def record_step(row: Array, seed: int, step: int, features: Array, state: Array) -> None:
+def record_step(row: Array, seed: int, step: int, features: Array, state: Array, site: Array) -> None:
     """Write what is recorded of a world, and remember what the next events follow from.
 
     Args:
@@ -128,6 +128,7 @@ def record_step(row: Array, seed: int, step: int, features: Array, state: Array)
         step: the last one done.
         features: (b, 8) int64, what the brigades saw in it; no rows at the start.
         state: (b,) int64, likewise.
+        site: (b,) int32, likewise: the fire sites that they belonged to.
     """
     watched = opened(row)
     world, buildings, before, out = watched.world, watched.buildings, watched.before, watched.recorded
@@ -140,7 +141,8 @@ def record_step(row: Array, seed: int, step: int, features: Array, state: Array)
     for brigade in range(len(brigades.x)):
         out.x_m[brigade], out.y_m[brigade] = brigades.x[brigade] / MM_PER_M, brigades.y[brigade] / MM_PER_M
         out.driven_m[brigade] = brigades.driven[brigade] / MM_PER_M
-        out.site[brigade] = brigades.site[brigade] if brigades.site[brigade] > 0 else -1
+        number = site[brigade] if len(site) > 0 else brigades.site[brigade]
+        out.site[brigade] = number if number > 0 else -1
     for brigade in range(len(state)):
         out.state_index[brigade] = state[brigade]
         out.free_edges[brigade] = features[brigade, 0]

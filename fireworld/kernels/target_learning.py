@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fireworld.draws import ACTION
+from fireworld.kernels.allocation import may_name
 from fireworld.kernels.arrays import Array, Learner, NetworkArrays, TargetLearner
 from fireworld.kernels.choice import keeps_choice, tries_another
 from fireworld.kernels.draws import below
@@ -139,9 +140,7 @@ def learn_target(brigade: int, next_value: float, network: NetworkArrays, learne
 
 @inner
 def keeps_target(brigade: int, before: int, step: int, site_of: Array, sight: Sight, learner: TargetLearner) -> bool:
-    """Return whether a brigade that learns stays with its target: while that burns, for some steps by a clock."""
+    """Return whether a brigade that learns stays with its target: while it may name it, for some steps by a clock."""
     if not keeps_choice(brigade, before, learner.commit[0], step):
         return False
-    sites = sight.sites
-    place = sites.place[before]
-    return bool(place >= 0 and sites.number[place] == site_of[brigade])
+    return may_name(brigade, before, site_of, sight.sites, sight.brigade_constants.free)

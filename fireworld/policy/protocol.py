@@ -11,8 +11,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from fireworld.kernels.allocation import named_range
 from fireworld.kernels.arrays import CityArrays, Constants, WorldState
-from fireworld.kernels.observation import find_named, site_place
+from fireworld.kernels.observation import find_named
 from fireworld.kernels.ranking import N_OF_BUILDING, N_TARGET_FEATURES, OWN_TARGET, Sight
 from fireworld.kernels.targets import describe_targets
 
@@ -26,7 +27,7 @@ class Action(IntEnum):
     NEAREST_TO_CENTER = 2
     NEAREST_TO_ME = 3
     OWN_TARGET = OWN_TARGET
-    """Not in the paper: the burning building of its fire site that the policy itself names."""
+    """Not in the paper: the burning building that the policy itself names, one of `Observation.burning`."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Decision:
 
     action: int
     target: int | None = None
-    """With Action.OWN_TARGET: the index of a burning building of the brigade's site."""
+    """With Action.OWN_TARGET: the index of a building, one of `Observation.burning`."""
     q_values: Sequence[float] | None = None
     """Values of the four actions, where the policy has them."""
     value: float | None = None
@@ -114,11 +115,14 @@ class Observation:
 
     @cached_property
     def burning(self) -> NDArray[np.uint32]:
-        """(k,) indices of the burning buildings of the brigade's fire site: what it may name as its own target."""
-        sites = self.world.sites
-        place = int(site_place(self.brigade, self.world.brigades.site, sites))
-        here: NDArray[np.uint32] = sites.member[sites.start[place] : sites.start[place + 1]]
-        return here if place >= 0 else here[:0]
+        """(k,) indices of the burning buildings that the brigade may name as its own target.
+
+        They are those of its fire site; with `brigades.allocation: free`, those of all sites.
+        """
+        sites, free = self.world.sites, self.constants.brigades.free
+        first, end = named_range(self.brigade, self.world.brigades.site, sites, free)
+        named: NDArray[np.uint32] = sites.member[first:end]
+        return named
 
     @cached_property
     def temperature(self) -> NDArray[np.float64]:

@@ -117,7 +117,7 @@ class ShadowPolicy(Policy):
 
 
 def is_possible(decision: Decision, observation: Observation) -> bool:
-    """Return whether a decision can be made: a target of its own must burn, in the brigade's fire site."""
+    """Return whether a decision can be made: a target of its own must be one that the brigade may name."""
     return decision.target is None or decision.target in observation.burning
 
 

@@ -103,7 +103,7 @@ def fork(
         policy: the policy that takes over, as for `fireworld.run`, started afresh; "recorded" for the recorded
             decisions, whatever happens; None: the policy of the run, which remembers what it saw.
         decide: by brigade, what it does in the first step: an action, its name, or "own-target:301" with the id of a
-            building that burns in its fire site.
+            building that burns in its fire site, or anywhere with `brigades.allocation: free`.
         swap: by brigade, a recording of the same scenario and seed whose decisions it takes to the end.
         record: the log to write; None: the run stays in memory.
         force: replace an existing log.
@@ -238,7 +238,8 @@ def _check_possible(world: World, brigade: int, decision: Decision, city: CityRe
     if is_possible(decision, seen):
         return
     burns = 1 <= world.state.fire.fieryness[decision.target] <= 3
-    wanted = f"a building that burns in the brigade's fire site in step {seen.step}"
+    where = "" if seen.constants.brigades.free else " in the brigade's fire site"
+    wanted = f"a building that burns{where} in step {seen.step}"
     got = f"{city.building_id[decision.target]}, which {'burns in another one' if burns else 'does not burn'}"
     burning = sorted(city.building_id[seen.burning].tolist())
     more = f" or {len(burning) - BUILDINGS_NAMED_MAX} more" if len(burning) > BUILDINGS_NAMED_MAX else ""

@@ -20,6 +20,7 @@ from fireworld.scenario.observed import Fraction, Metres, Observed
 
 Preset = Literal["official-2011", "official-2013", "paper"]
 Choices = Literal["in-turn", "simultaneous"]
+Allocation = Literal["fixed", "free"]
 Direction = Literal["N", "E", "S", "W"]
 DIRECTIONS: Final[tuple[Direction, ...]] = ("N", "E", "S", "W")
 
@@ -232,6 +233,13 @@ class BrigadeTeam(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
         BuildingIds | None,
         Meta(description="Ids of the buildings and roads where they start, in turn; null: the refuges."),
     ] = None
+    allocation: Annotated[
+        Allocation,
+        Meta(
+            description="`fixed`: a brigade belongs to one fire site until that is out, and names targets of its own "
+            "there only; `free`: it may name those of any site, and belongs to the site of the one that it goes for."
+        ),
+    ] = "fixed"
 
 
 class Document(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -103,6 +103,7 @@ def fresh_seen(n_brigades: int) -> Seen:
     return Seen(
         features=np.zeros((n_brigades, N_FEATURES), dtype=np.int64),
         state=np.zeros(n_brigades, dtype=np.int64),
+        site=np.zeros(n_brigades, dtype=np.int32),
         choice=np.zeros(n_brigades, dtype=np.uint8),
         explored=np.zeros(n_brigades, dtype=np.uint8),
         action_values=np.zeros((n_brigades, N_ACTIONS)),

@@ -47,6 +47,7 @@ class BuiltScenario:
             choices=scenario.choices,
             unit_volume_m3=scenario.unit_volume_m3,
             observed=scenario.observation,
+            allocation=scenario.brigades.allocation,
             arrays=self.city_arrays,
         )
 

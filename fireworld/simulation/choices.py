@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Self
 
 import numpy as np
 
-from fireworld.kernels.arrays import Array, PolicyArrays, Seen
+from fireworld.kernels.arrays import Array, BrigadeState, PolicyArrays, Seen
 from fireworld.policy.kernel import noted_decisions
 from fireworld.policy.protocol import Decision
 
@@ -25,14 +25,34 @@ class Reasons(NamedTuple):
     target_value: Array  # (b,) float64, or none if nobody has any
 
 
+class Made(NamedTuple):
+    """What the decisions of a step change, copied before them; b brigades."""
+
+    action: Array  # (b,) int32
+    target: Array  # (b,) int32
+    site: Array  # (b,) int32
+
+    @classmethod
+    def of(cls, brigades: BrigadeState) -> Self:
+        """Copy it."""
+        return cls(*(getattr(brigades, name).copy() for name in cls._fields))
+
+    def put_back(self, brigades: BrigadeState) -> None:
+        """Let the brigades have decided nothing since."""
+        for name, array in self._asdict().items():
+            getattr(brigades, name)[:] = array
+
+
 class Choices:
     """What the brigades saw and decided in a step."""
 
-    def __init__(self, features: Array, state_index: Array, decisions: Sequence[Decision] = ()) -> None:
+    def __init__(self, features: Array, state_index: Array, site: Array, decisions: Sequence[Decision] = ()) -> None:
         self.features = features
         """(b, 8) int64."""
         self.state_index = state_index
         """(b,) int64, -1 none."""
+        self.site = site
+        """(b,) int32, the number of the fire site that each belonged to before it decided, 0 none."""
         self._decisions = tuple(decisions)
 
     @property
@@ -68,7 +88,7 @@ class NotedChoices(Choices):
     """
 
     def __init__(self, policy: PolicyArrays, seen: Seen, action: Array, target: Array, last_target: Array) -> None:
-        self.features, self.state_index = seen.features, seen.state
+        self.features, self.state_index, self.site = seen.features, seen.state, seen.site
         self._policy, self._seen, self._made = policy, seen, (action, target, last_target)
 
     @cached_property

@@ -250,7 +250,7 @@ def health_constants(health: HealthParameters) -> HealthConstants:
     )
 
 
-def brigade_constants(brigades: BrigadeParameters) -> BrigadeConstants:
+def brigade_constants(brigades: BrigadeParameters, *, free: bool = False) -> BrigadeConstants:
     """Turn metres into millimetres."""
     range_mm = round(brigades.range_m * 1000.0)  # whole, so that a brigade exactly at its range may spray
     return BrigadeConstants(
@@ -260,6 +260,7 @@ def brigade_constants(brigades: BrigadeParameters) -> BrigadeConstants:
         hydrant_refill=brigades.hydrant_refill_litres,
         range_square=float(range_mm * range_mm),
         speed=round(brigades.speed_m * 1000.0),
+        free=free,
     )
 
 

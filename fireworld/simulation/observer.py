@@ -90,7 +90,9 @@ def _in_metres(name: str, points_mm: Array) -> dict[str, Any]:
 NO_BYTES: Final = np.zeros(0, dtype=np.uint8)
 NO_INTS: Final = np.zeros(0, dtype=np.int32)
 NO_NUMBERS: Final = np.zeros(0)
-NO_CHOICES: Final = Choices(np.zeros((0, N_FEATURES), dtype=np.int64), np.zeros(0, dtype=np.int64))
+NO_CHOICES: Final = Choices(
+    np.zeros((0, N_FEATURES), dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int32)
+)
 NOTHING_SEEN: Final = Observations(*[np.zeros(0, DTYPES[item.metadata["wire"]]) for item in fields(Observations)])
 NOTHING_CHOSEN: Final = Decisions(NO_INTS, NO_INTS, NO_BYTES, NO_NUMBERS, 0.0, NO_NUMBERS, NO_NUMBERS)
 NO_EVENTS: Final = Events(NO_BYTES, NO_INTS)
@@ -112,7 +114,7 @@ class Observer:
         """Return the record of the step just done, with what `World.step` returned; without that, of the start."""
         world, made = self.world, self._recorded
         seen = choices if choices is not None else NO_CHOICES
-        record_step(self._row, world.seed, world.step_number, seen.features, seen.state_index)
+        record_step(self._row, world.seed, world.step_number, seen.features, seen.state_index, seen.site)
         n_sites, n_events = made.n_sites.item(), self._happened.n.item()
         key, (burn_rate_sum, health_sum) = made.key.item(), world.state.outcome.draws.tolist()
         snapshot_due = world.step_number % SNAPSHOT_EVERY_STEPS == 0

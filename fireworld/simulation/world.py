@@ -13,6 +13,7 @@ import numpy as np
 
 from fireworld.city.city import City
 from fireworld.kernels.addresses import address_row
+from fireworld.kernels.allocation import join_site, may_name
 from fireworld.kernels.arrays import BURNING, Array, CityArrays, Constants, Learner, PolicyArrays, Seen, WorldState
 from fireworld.kernels.episode_arrays import SEED, STEP
 from fireworld.kernels.fire import ignite
@@ -28,7 +29,7 @@ from fireworld.rewards import Reward, reward_of
 from fireworld.scenario import document
 from fireworld.scenario.observed import Observed
 from fireworld.simulation.bound import NOTHING_SEEN, Bound, bind, fresh_seen
-from fireworld.simulation.choices import Choices, NotedChoices
+from fireworld.simulation.choices import Choices, Made, NotedChoices
 from fireworld.simulation.city_arrays import (
     brigade_constants,
     city_arrays,
@@ -80,6 +81,7 @@ def prepare_start(
     choices: document.Choices = "in-turn",
     unit_volume_m3: float | None = None,
     observed: Observed | None = None,
+    allocation: document.Allocation = "fixed",
     arrays: CityArrays | None = None,
 ) -> Start:
     """Place everybody in a city and set it on fire; arguments are named as in a scenario.
@@ -93,7 +95,7 @@ def prepare_start(
     constants = Constants(
         fire=fire_constants(parameters.fire),
         health=health_constants(parameters.health),
-        brigades=brigade_constants(parameters.brigades),
+        brigades=brigade_constants(parameters.brigades, free=allocation == "free"),
         observation=observation_constants(city, unit_volume_m3, in_turn=choices == "in-turn", observed=observed),
         reward=reward if reward is not None else reward_of("stock"),
     )
@@ -183,12 +185,12 @@ class World:
             return self._step_in_kernel(ready)
         self.look()
         self.step_number += 1
-        before, target_before = self.state.brigades.action.copy(), self.state.brigades.target.copy()
+        before = Made.of(self.state.brigades)
         try:
-            choices = self._decide(complete(policy), before, target_before)
+            choices = self._decide(complete(policy), before)
         except BaseException:  # nothing but the choices has changed: the step can be tried again
             self.step_number -= 1
-            self.state.brigades.action[:], self.state.brigades.target[:] = before, target_before
+            before.put_back(self.state.brigades)
             raise
         finish(self._bind(NOBODY, NO_LEARNER, NOTHING_SEEN).row)
         return choices
@@ -244,14 +246,15 @@ class World:
         bound.clock[SEED], bound.clock[STEP] = self.seed, self.step_number
         return bound
 
-    def _decide(self, policy: Policy, before: Array, target_before: Array) -> Choices:
-        """Ask for all decisions; what the brigades did in the last step is (b,) `before` and `target_before`."""
+    def _decide(self, policy: Policy, before: Made) -> Choices:
+        """Ask for all decisions; `before` is what the brigades did in the last step, and where they belong."""
         features = np.zeros((self.n_brigades, 8), dtype=np.int64)
         made = [
-            self.ask(brigade, policy, before, target_before, features[brigade]) for brigade in range(self.n_brigades)
+            self.ask(brigade, policy, before.action, before.target, features[brigade])
+            for brigade in range(self.n_brigades)
         ]
         states = np.array([state for state, _ in made], dtype=np.int64)
-        return Choices(features, states, [decision for _, decision in made])
+        return Choices(features, states, before.site, [decision for _, decision in made])
 
     def ask(
         self, brigade: int, policy: Policy, before: Array, target_before: Array, features: Array
@@ -280,6 +283,7 @@ class World:
                 decision = ask(policy, self._observation(brigade, features, state, known))
             target = self._target(brigade, decision)
         brigades.action[brigade], brigades.target[brigade] = decision.action, target
+        join_site(brigade, target, brigades.site, sites, self.constants.brigades.free)
         return state, decision
 
     def _see(self, brigade: int, shown: Array, known: Array, features: Array) -> int:
@@ -293,11 +297,11 @@ class World:
         return int(state)
 
     def _can_keep(self, brigade: int, last: Decision) -> bool:
-        """Return whether a choice can be repeated: a target of its own only while it burns in the brigade's site."""
+        """Return whether a choice can be repeated: a target of its own only while the brigade may name it."""
         if last.action != Action.OWN_TARGET:
             return True
-        state, burns = self.state, 1 <= self.state.fire.fieryness[last.target] <= 3
-        return bool(burns and state.sites.label[last.target] == state.brigades.site[brigade])
+        state, free = self.state, self.constants.brigades.free
+        return bool(may_name(brigade, last.target, state.brigades.site, state.sites, free))
 
     def _target(self, brigade: int, decision: Decision) -> int:
         if decision.action == Action.OWN_TARGET and decision.target is not None:

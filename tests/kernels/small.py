@@ -71,10 +71,14 @@ def make_world(
     reward: Reward | None = None,
     unit_volume_m3: float | None = None,
     observed: Observed | None = None,
+    free: bool = False,
     seed: int = 1,
     n_steps_max: int = 100,
 ) -> World:
-    """A world in it; civilians as (building, x_m, y_m), brigades by the building they start from."""
+    """A world in it; civilians as (building, x_m, y_m), brigades by the building they start from.
+
+    `free`: allocation is.
+    """
     placement = Placement(
         ignited=np.array(ignited, dtype=np.int32),
         civilian_building=np.array([b for b, _, _ in civilians], dtype=np.int32),
@@ -82,7 +86,7 @@ def make_world(
         brigade_refuge=np.array(brigades, dtype=np.int32),
     )
     more = {"reward": reward, "unit_volume_m3": unit_volume_m3, "observed": observed}
-    start = prepare_start(city, parameters, placement, **more)
+    start = prepare_start(city, parameters, placement, allocation="free" if free else "fixed", **more)
     return World(start, seed=seed, n_steps_max=n_steps_max)
 
 

@@ -336,6 +336,20 @@ def test_only_the_own_site_is_ranked():
             assert ask(world, hot, own=own)[0][1] == target
 
 
+def test_with_free_allocation_own_targets_are_those_of_all_sites():
+    """The four that actions name stay those of its site."""
+    outlines = [square(0, 0), square(600, 0), square(660, 0)]
+    world = make_world(make_city(*outlines), brigades=[0], free=True)
+    burn(world, 0, 1)
+    for b, degrees in ((0, 100), (1, 900)):
+        heat_up(world, b, degrees)
+    world.state.brigades.site[0] = 1
+    hot = weights(temperature=1.0)
+    assert ask(world, hot, own=True) == ((OWN_TARGET, 1), pytest.approx([0.2, 0.2, 0.2, 0.2, 1.8]))
+    assert ask(world, -hot, own=True)[0] == (OWN_TARGET, 0)
+    assert ask(world, hot, own=False)[0] == (0, 0)
+
+
 @pytest.mark.parametrize("own", [True, False])
 def test_without_a_site_nothing_is_chosen(own):
     world = make_world(make_city(square(0, 0)), brigades=[0])

@@ -281,6 +281,17 @@ def test_targets_that_cannot_be(here, fireworld, words):
     assert not list(here.glob("f.mcap*"))
 
 
+def test_targets_of_other_sites_where_allocation_is_free(here, fireworld, answer):
+    """It is refused where it is fixed, above."""
+    answer("run", "town.yaml", "--policy", "easiest", "--set", "brigades.allocation=free", "--record", "free.mcap")
+    answer("fork", "free.mcap", "--at", 5, "--decide", "1=own-target:112", "--record", "f.mcap")
+    log = open_log("f.mcap")
+    assert log.city.building_id[log.step(6).decisions.target[1]] == 112
+    assert [log.step(step).observations.site[1] for step in (6, 7)] == [2, 1]
+    done = fireworld("fork", "free.mcap", "--at", 5, "--decide", "0=own-target:101")
+    assert "expected a building that burns in step 6, got 101, which does not burn; try 112, 167, 176" in done.err
+
+
 def test_a_decision_of_one_who_has_none(here, fireworld):
     """A brigade that refills is not asked; the error names the step to fork at instead, and that one works."""
     log = open_log("easiest.mcap")

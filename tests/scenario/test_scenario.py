@@ -90,7 +90,7 @@ def test_overrides_replace_the_presets_values():
         ),
         ({"reward": {"burning": 0, "of": "change"}}, "reward: expected a weight other than 0 for one of water_damaged"),
         ({"brigade": {"n": 3}}, "brigade: expected a known key, got 'brigade'; try brigades"),
-        ({"brigades": {"count": 3}}, "brigades.count: expected one of the keys n, at, got 'count'"),
+        ({"brigades": {"count": 3}}, "brigades.count: expected one of the keys n, at, allocation, got 'count'"),
         ({"brigades": 3}, "brigades: expected keys and values, got 3"),
         ({"brigades": {"n": -1}}, "brigades.n: expected a whole number from 1 to 1000, got -1"),
         ({"parameters": {"brigades": {"power_liters": 1}}}, "got 'power_liters'; try power_litres"),
@@ -189,6 +189,17 @@ def test_digest_covers_content_but_not_names():
     assert parse(steps=499).digest != scenario.digest
     same_values = {"brigades": {"tank_litres": PAPER.brigades.tank_litres}}
     assert parse(parameters=same_values).digest == scenario.digest
+
+
+def test_the_allocation_of_brigades_counts_where_it_is_free():
+    scenario, free = parse(), parse(brigades={"allocation": "free"})
+    assert parse(brigades={"allocation": "fixed"}).digest == scenario.digest
+    assert "allocation" not in scenario.to_yaml()
+    assert free.digest != scenario.digest
+    assert parse_scenario(free.to_yaml(), source="again").digest == free.digest
+    assert free.with_settings({"brigades.allocation": "fixed"}).digest == scenario.digest
+    with pytest.raises(ScenarioError, match=r"brigades\.allocation: expected one of fixed, free, got 'loose'"):
+        scenario.with_settings({"brigades.allocation": "loose"})
 
 
 def test_digest_is_stable():

@@ -17,7 +17,7 @@ from fireworld.simulation.placement import Placement
 from tests.kernels.small import assess, burn, make_city, make_world, square
 from tests.simulation.town import begin, policy_named, town, town_world
 
-NO_CHOICES = Choices(np.zeros((0, 8), dtype=np.int64), np.zeros(0, dtype=np.int64))
+NO_CHOICES = Choices(np.zeros((0, 8), dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int32))
 FAR_APART = [square(200.0 * k, 0.0) for k in range(5)]
 
 

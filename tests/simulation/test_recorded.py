@@ -82,7 +82,7 @@ def test_reasons_that_a_kernel_noted_are_those_of_the_decisions(name):
     policy = begin(policy_named(name), world)
     while not (world.terminated or world.truncated):
         choices = world.step(policy)
-        decided = Choices(choices.features, choices.state_index, choices.decisions)
+        decided = Choices(choices.features, choices.state_index, choices.site, choices.decisions)
         for noted, made in zip(choices.reasons, decided.reasons, strict=True):
             np.testing.assert_array_equal(noted, made)
 

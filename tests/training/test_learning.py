@@ -12,6 +12,7 @@ from fireworld.policy.kernel import from_tables
 from fireworld.policy.protocol import Policy
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import build_scenario
+from fireworld.simulation.choices import Made
 from fireworld.simulation.state import fresh_learner
 from fireworld.training.methods.sarsa import RULES
 
@@ -201,8 +202,7 @@ def test_the_compiled_episode_learns_as_the_textbook(seed, n_steps_max, terminat
     else:  # the choices that would come next
         world.look()
         world.step_number += 1
-        brigades = world.state.brigades
-        world._decide(complete(textbook), brigades.action.copy(), brigades.target.copy())
+        world._decide(complete(textbook), Made.of(world.state.brigades))
     np.testing.assert_array_equal(learner.tables, textbook.tables)
     assert learner.visits.sum() > 40
     assert n_refilling > 5

@@ -36,7 +36,7 @@ class Shape:
     Attributes:
         observation: "features" or "targets".
         reward: "score", the change of score / maximal score, or "scenario", the scenario's own.
-        own_targets: k, how many burning buildings of its site a brigade may name as its own target.
+        own_targets: k, how many of the burning buildings that a brigade may name as its own target are shown.
     """
 
     observation: str

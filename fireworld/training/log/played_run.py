@@ -12,6 +12,7 @@ import numpy as np
 from fireworld_recorder.chain import Digest
 
 from fireworld.errors import LogError, expected
+from fireworld.kernels.allocation import may_name
 from fireworld.kernels.arrays import TOTAL
 from fireworld.kernels.choice import GIVEN
 from fireworld.policy.kernel import NO_TABLES, KernelPolicy
@@ -125,12 +126,10 @@ class Again:
         own = np.flatnonzero(action == OWN)
         if len(own):
             world.look()
-            fire, sites, brigades = world.state.fire, world.state.sites, world.state.brigades
-            named = target[own]
-            burns = (fire.fieryness[named] >= 1) & (fire.fieryness[named] <= 3)
-            can = burns & (sites.label[named] == brigades.site[own])
+            where = world.state.brigades.site, world.state.sites, world.constants.brigades.free
+            can = np.array([may_name(brigade, target[brigade], *where) for brigade in own.tolist()], dtype=np.bool_)
             self._given.action[own[~can]] = Action.EASIEST
-            self._given.table_of[own] = named
+            self._given.table_of[own] = target[own]
 
     def step(self) -> None:
         """Run the next step."""
