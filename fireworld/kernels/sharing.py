@@ -35,7 +35,7 @@ def count_shares(brigades: BrigadeState, sites: SiteState, shares: Shares) -> in
 
 
 @inner
-def over(site: int, n_living: int, sites: SiteState, shares: Shares) -> int:
+def over(site: int, n_living: int, sites: SiteState, shares: Shares) -> np.int64:
     """Return by how much a site has more brigades than its share; negative where it has fewer."""
     size = np.int64(sites.start[site + 1] - sites.start[site])
     return np.int64(shares.n_joined[site]) * np.int64(sites.counts[2]) - n_living * size
@@ -117,7 +117,7 @@ def allocate(
     geometry: GeometryArrays,
     sites: SiteState,
     shares: Shares,
-) -> int:
+) -> np.int64:
     """Return the building that a brigade goes for by the rule, -1 without a site.
 
     It is the coolest of the site that no other goes for, else the coolest (ties: the lowest id). `known` (b,) is what
@@ -129,8 +129,8 @@ def allocate(
     if site >= 0 and free:
         site = share_out(brigade, n_living, brigades, geometry, sites, shares)
     if site < 0:
-        return -1
-    best, best_taken, coolest = -1, False, 0.0
+        return np.int64(-1)
+    best, best_taken, coolest = np.int64(-1), False, 0.0
     for k in range(sites.start[site], sites.start[site + 1]):
         b, taken = np.int64(sites.member[k]), False
         for other in range(len(known)):
