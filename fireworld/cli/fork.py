@@ -28,7 +28,7 @@ from fireworld.cli.options import record_options
     metavar="BRIGADE=ACTION",
     multiple=True,
     help="What a brigade does in step STEP+1, unasked: one of the four actions, or own-target:BUILDING, a burning "
-    "building of its fire site; repeatable.",
+    "building that it may name; repeatable.",
 )
 @click.option(
     "--swap",

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from fireworld.executors import AnyExecutor
 
 POLICY_HELP: Final = (
-    "easiest, nearest-to-civilian, nearest-to-center, nearest-to-me, each-another, random, chief, planner; "
+    "easiest, nearest-to-civilian, nearest-to-center, nearest-to-me, each-another, random, chief, allocate, planner; "
     f"{', '.join(team_names())} (teams); a team file (TEAM.npz); FILE.py:CLASS or MODULE:CLASS of your own. With "
     "parameters as in planner:horizon=60,interval=2 or mine.py:Mine:k=3. `fireworld policy list` says what each does."
 )

@@ -133,8 +133,8 @@ class Worlds:
         """Run one step of every world.
 
         Args:
-            actions: (n, n_brigades) whole numbers: 0 to 3 are the paper's actions, 4 + j names the j-th burning
-                building of the brigade's site. Of brigades that choose nothing they are ignored.
+            actions: (n, n_brigades) whole numbers: 0 to 3 are the paper's actions, 4 + j names the j-th building
+                of the brigade's `own`. Of brigades that choose nothing they are ignored.
 
         Raises:
             ArgumentError: another shape, dtype or number; an action that the mask forbids; a world that has ended and

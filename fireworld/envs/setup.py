@@ -30,7 +30,7 @@ class SetupOptions(TypedDict, total=False):
         observation: "features" (as if left out), "targets" or "graph": `fireworld.envs.views.OBSERVATIONS`.
         reward: "score" (as if left out), the change of score / maximal score; "stock" or "change", the scenario's
             terms; or a function of what a step came to: `fireworld.envs.rewards`.
-        own_targets: how many of the burning buildings that a brigade may name as its own target are shown; 0 if left out.
+        own_targets: how many of the burning buildings that a brigade may name are its own targets; 0 if left out.
         n_burning_max: of "graph", how many burning buildings there is room for; 64 if left out.
         steps: the last step; None, as if left out: each scenario's.
         set: keys of the scenarios with other values, as in {"brigades.n": 7}.

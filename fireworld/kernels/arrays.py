@@ -324,7 +324,7 @@ class NetworkArrays(NamedTuple):
 class PolicyArrays(NamedTuple):
     """A policy that the kernels can follow by themselves, per brigade."""
 
-    kind: Int32  # (b,): 0 always one action, 1 random, 2 greedy in a table, 3 and 4 by what targets are worth, 5 given
+    kind: Int32  # (b,), as in `fireworld.kernels.choice`: FIXED, RANDOM, TABLE, RANK_NAMED, RANK_ALL, GIVEN, ALLOCATE
     action: Int32  # (b,), the action of kinds 0 and 5
     table_of: Int32  # (b,), the table of kind 2, the ranking of kinds 3 and 4, the target of kind 5 and OWN_TARGET
     tables: Float64x3  # (tables, states, 4)

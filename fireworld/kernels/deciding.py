@@ -6,7 +6,17 @@ import numpy as np
 
 from fireworld.kernels.allocation import join_site, named_range
 from fireworld.kernels.arrays import BY_RANK, BY_TABLE, Array, Seen
-from fireworld.kernels.choice import GIVEN, RANK_ALL, RANK_NAMED, TABLE, choose, explores, keeps_choice, table_state
+from fireworld.kernels.choice import (
+    ALLOCATE,
+    GIVEN,
+    RANK_ALL,
+    RANK_NAMED,
+    TABLE,
+    choose,
+    explores,
+    keeps_choice,
+    table_state,
+)
 from fireworld.kernels.episode_arrays import LAST_STEP, SEED, STEP, Episode
 from fireworld.kernels.jit import inner, kernel
 from fireworld.kernels.learning import (
@@ -21,6 +31,7 @@ from fireworld.kernels.learning import (
 from fireworld.kernels.observation import BY_ACTION, EASIEST, N_ACTIONS, can_choose, find_named, flag_targets, observe
 from fireworld.kernels.ranking import OWN_TARGET, Sight
 from fireworld.kernels.ranks import hear, line_up, line_up_before, rank_targets
+from fireworld.kernels.sharing import allocate
 from fireworld.kernels.step import opened_episode, sight_of
 from fireworld.kernels.target_learning import compare_targets, explored_place, go_for_and_learn, keeps_target
 
@@ -115,6 +126,11 @@ def decide_by_kind(
         action, choice = policy.action[brigade], GREEDY
         if action == OWN_TARGET:
             target = policy.table_of[brigade]
+    elif kind == ALLOCATE:
+        free, city, fire, sites = episode.constants.brigades.free, episode.city, episode.world.fire, episode.world.sites
+        where = episode.world.brigades, city.buildings, fire, city.geometry, sites
+        action, choice = OWN_TARGET, GREEDY
+        target = allocate(brigade, known, free, *where, episode.scratch.shares)
     elif kind in (RANK_NAMED, RANK_ALL):
         action, target, choice = decide_by_worth(brigade, step, known, episode)
     else:

@@ -82,6 +82,13 @@ have been found since the lists began. Then, steps since they began; 1 + the ste
 to begin anew. Last, how many numbers there are."""
 
 
+class Shares(NamedTuple):
+    """How brigades are shared out among the fire sites; b brigades, n buildings. No rows where nobody asks."""
+
+    joined: Int32  # (b,), place of the site that each is to fight, -1 none
+    n_joined: Int32  # (n,), by site: how many those are
+
+
 class Scratch(NamedTuple):
     """What the steps of an episode write on; b brigades."""
 
@@ -92,6 +99,7 @@ class Scratch(NamedTuple):
     described: Float64x2  # (n, 7); no rows where nobody ranks or sees them
     described_at: Int64  # (n,), -1 at first
     ranks: Ranks  # of n buildings, 0 where nobody ranks
+    shares: Shares
     warmth: Warmth
     seen: Float64  # (30,)
     work: Float64x2  # (2, w), w as `widest` says of the policy's network

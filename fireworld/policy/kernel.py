@@ -10,6 +10,7 @@ import numpy as np
 
 from fireworld.kernels.arrays import Array, CityArrays, NetworkArrays, PolicyArrays, Seen
 from fireworld.kernels.choice import (
+    ALLOCATE,
     FIXED,
     GIVEN,
     RANDOM,
@@ -25,6 +26,7 @@ from fireworld.kernels.learning import EXPLORED, KEPT, NO_CHOICE
 from fireworld.kernels.network import widest
 from fireworld.kernels.ranking import N_WEIGHTS
 from fireworld.kernels.ranks import fresh_ranks, rank
+from fireworld.kernels.sharing import allocate, fresh_shares
 from fireworld.kernels.situation import N_SEEN
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
 from fireworld.records import ACTIONS
@@ -57,7 +59,7 @@ class KernelPolicy(Policy):
 
     def __post_init__(self) -> None:
         """Raise ValueError for what the compiled episode and single steps would not do alike."""
-        if self.commit > 1 and {RANK_NAMED, RANK_ALL} & set(self.kinds):
+        if self.commit > 1 and {RANK_NAMED, RANK_ALL, ALLOCATE} & set(self.kinds):
             raise ValueError("what values targets chooses in every step: commit must be 1")
 
     def for_brigades(self, n_brigades: int) -> PolicyArrays:
@@ -92,6 +94,8 @@ class KernelPolicy(Policy):
         brigade, seed, step = observation.brigade, observation.seed, observation.step
         if ready.kind[brigade] in (RANK_NAMED, RANK_ALL):
             return _by_rank(observation, ready)
+        if ready.kind[brigade] == ALLOCATE:
+            return _by_share(observation)
         action = int(choose(brigade, observation.state_index, ready, seed, step))
         if ready.kind[brigade] != TABLE:
             return Decision(action)
@@ -143,7 +147,7 @@ def noted_decisions(
         elif kind == TABLE:
             values, epsilon = tuple(seen.action_values[brigade].tolist()), float(ready.epsilon[0])
             decisions.append(Decision(act, q_values=values, explored=choice == EXPLORED, epsilon=epsilon))
-        elif kind == GIVEN and act == Action.OWN_TARGET:
+        elif kind in (GIVEN, ALLOCATE) and act == Action.OWN_TARGET:
             decisions.append(Decision(act, target=int(target[brigade])))
         else:
             decisions.append(Decision(act))
@@ -175,6 +179,15 @@ def _by_rank(observation: Observation, ready: PolicyArrays) -> Decision:
     )
 
 
+def _by_share(observation: Observation) -> Decision:
+    """Choose the target of a brigade that is shared out with the others."""
+    city, world, free = observation.city, observation.world, observation.constants.brigades.free
+    where = world.brigades, city.buildings, world.fire, city.geometry, world.sites
+    shares = fresh_shares(len(world.brigades.hp), len(world.fire.energy))
+    target = allocate(observation.brigade, observation.known_targets, free, *where, shares)
+    return Decision(Action.OWN_TARGET, target=int(target))
+
+
 def always(action: int) -> KernelPolicy:
     """Return the policy that always takes one action."""
     return KernelPolicy((FIXED,), (action,), (0,), NO_TABLES)
@@ -189,6 +202,11 @@ def each_another() -> KernelPolicy:
 def at_random() -> KernelPolicy:
     """Return the policy that takes every action with the same probability."""
     return KernelPolicy((RANDOM,), (0,), (0,), NO_TABLES)
+
+
+def allocating() -> KernelPolicy:
+    """Return the policy that shares brigades out among the fire sites; each goes for a building that no other does."""
+    return KernelPolicy((ALLOCATE,), (0,), (0,), NO_TABLES)
 
 
 def from_tables(tables: Array, *, epsilon: float = 0.0, commit: int = 1) -> KernelPolicy:

@@ -19,7 +19,7 @@ from fireworld.policy.asking import complete, name_of, own_digest
 from fireworld.policy.chief import chief
 from fireworld.policy.identity import NOTEBOOK, can_be_imported, covering, digest_of, digest_of_module
 from fireworld.policy.importing import CODE_SUFFIX, find_in, import_source, make_policy
-from fireworld.policy.kernel import KernelPolicy, always, at_random, each_another
+from fireworld.policy.kernel import KernelPolicy, allocating, always, at_random, each_another
 from fireworld.policy.parameter_text import (
     Parameters,
     check_no_parameters,
@@ -39,6 +39,7 @@ BUILT_IN: Final[dict[str, Callable[[], KernelPolicy]]] = {
     "each-another": each_another,
     "random": at_random,
     "chief": chief,
+    "allocate": allocating,
 }
 """Rules by name."""
 RULES: Final = {
@@ -49,6 +50,7 @@ RULES: Final = {
     "each-another": "brigade b always takes action b modulo 4 of these",
     "random": "takes one of these actions at random, every step",
     "chief": "one protects civilians, the others the front",
+    "allocate": "shares brigades out among the fire sites; each goes for the coolest that nobody has",
 }
 """What each rule does."""
 PLANNERS: Final = {"planner": "fireworld.planning.planner:Planner"}

@@ -11,12 +11,13 @@ import numpy as np
 
 from fireworld.kernels.addresses import address_row
 from fireworld.kernels.arrays import Array, FireState, Learner, PolicyArrays, Seen
-from fireworld.kernels.choice import RANK_ALL, RANK_NAMED
+from fireworld.kernels.choice import ALLOCATE, RANK_ALL, RANK_NAMED
 from fireworld.kernels.episode_arrays import LAST_STEP, SEED, STEP, Scratch
 from fireworld.kernels.network import widest
 from fireworld.kernels.observation import N_ACTIONS, N_FEATURES
 from fireworld.kernels.ranking import N_OF_BUILDING
 from fireworld.kernels.ranks import fresh_ranks
+from fireworld.kernels.sharing import fresh_shares
 from fireworld.kernels.situation import N_SEEN
 from fireworld.kernels.warmth import fresh_warmth
 from fireworld.simulation.state import NO_LEARNER
@@ -82,7 +83,7 @@ def bind(
 def fresh_scratch(policy: PolicyArrays, fire: FireState, *, describes: bool) -> Scratch:
     """Return what the steps of a team write on; arguments as of `bind`."""
     n_brigades, ranks = len(policy.kind), bool(np.isin(policy.kind, (RANK_NAMED, RANK_ALL)).any())
-    n_buildings = len(fire.energy)
+    shares, n_buildings = bool((policy.kind == ALLOCATE).any()), len(fire.energy)
     n_described = n_buildings if describes or ranks else 0
     return Scratch(
         features=np.zeros(N_FEATURES, dtype=np.int64),
@@ -92,6 +93,7 @@ def fresh_scratch(policy: PolicyArrays, fire: FireState, *, describes: bool) -> 
         described=np.zeros((n_described, N_OF_BUILDING)),
         described_at=np.full(n_described, -1),
         ranks=fresh_ranks(n_brigades, n_buildings if ranks else 0),
+        shares=fresh_shares(n_brigades if shares else 0, n_buildings if shares else 0),
         warmth=fresh_warmth(n_buildings, fire.air.shape),
         seen=np.zeros(N_SEEN),
         work=np.zeros((2, widest(policy.network))),

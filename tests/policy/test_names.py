@@ -21,7 +21,7 @@ from fireworld.records import ACTIONS
 
 
 def test_the_built_in_policies():
-    assert list(BUILT_IN) == [*ACTIONS, "each-another", "random", "chief"]
+    assert list(BUILT_IN) == [*ACTIONS, "each-another", "random", "chief", "allocate"]
     loaded = {name: find_policy(name) for name in BUILT_IN}
     assert all(named.name == name and isinstance(named.policy, KernelPolicy) for name, named in loaded.items())
     assert len({named.digest for named in loaded.values()}) == len(BUILT_IN), "each does something else"

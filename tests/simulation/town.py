@@ -12,7 +12,15 @@ from fireworld.city.city import City
 from fireworld.city.generator import generate_plan
 from fireworld.kernels.arrays import CityArrays
 from fireworld.parameters import PAPER, Parameters
-from fireworld.policy.kernel import KernelPolicy, always, at_random, each_another, from_rankings, from_tables
+from fireworld.policy.kernel import (
+    KernelPolicy,
+    allocating,
+    always,
+    at_random,
+    each_another,
+    from_rankings,
+    from_tables,
+)
 from fireworld.policy.protocol import Policy
 from fireworld.rewards import Reward
 from fireworld.scenario.document import Choices
@@ -31,6 +39,7 @@ POLICIES = (
     "ranking-of-all",
     "network-of-named",
     "network-of-all",
+    "allocate",
 )
 
 
@@ -64,6 +73,7 @@ def policy_named(name: str) -> KernelPolicy:
         "ranking-of-all": lambda: from_rankings(random.normal(size=(2, 17)), own_targets=True),
         "network-of-named": lambda: make_network().policy(),
         "network-of-all": lambda: make_network(own_targets=True).policy(),
+        "allocate": allocating,
     }[name]()
 
 
