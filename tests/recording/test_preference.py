@@ -90,6 +90,15 @@ def test_a_run_of_another_team_is_looked_at_with_this_ones_eyes(tmp_path):
     assert "<table" in found._repr_html_()
 
 
+def test_a_target_that_the_team_could_not_have_named_has_no_value(tmp_path):
+    run = recorded("best", tmp_path)
+    found = [fw.preferences(named_team(own_targets=False), run, step=step) for step in range(1, 60, 6)]
+    strange = [one for of in found for one in of.brigades if one.chosen_value is None]
+    assert strange
+    assert all(one.text.endswith(f"{one.chosen}, which the team could not have named") for one in strange)
+    assert json.loads(json.dumps([of.as_dict() for of in found], allow_nan=False))
+
+
 def test_the_command_line_prints_the_same(tmp_path, monkeypatch):
     recorded("best", tmp_path)
     monkeypatch.chdir(tmp_path)

@@ -52,7 +52,7 @@ class Preference:
     Attributes:
         brigade: its number.
         chosen: id of the building that it went for.
-        chosen_value: by the team.
+        chosen_value: by the team; None if the team could not have named it.
         other: id of the target that the team values most of all others; None if there was no other.
         other_value: by the team.
         shares: one for each feature that the team reads, the largest part first; the parts add up to the difference.
@@ -60,7 +60,7 @@ class Preference:
 
     brigade: int
     chosen: int
-    chosen_value: float
+    chosen_value: float | None
     other: int | None = None
     other_value: float = 0.0
     shares: tuple[FeatureShare, ...] = ()
@@ -68,7 +68,10 @@ class Preference:
     @property
     def text(self) -> str:
         """The choice in a line."""
-        head = f"brigade {self.brigade} goes for {self.chosen}, worth {self.chosen_value:.3f}"
+        head = f"brigade {self.brigade} goes for {self.chosen}"
+        if self.chosen_value is None:
+            return f"{head}, which the team could not have named"
+        head += f", worth {self.chosen_value:.3f}"
         if self.other is None:
             return f"{head}: there is no other target"
         word = "rather than" if self.chosen_value >= self.other_value else "though the team would go for"
@@ -168,12 +171,9 @@ def _preference(team: RankingTeam | NetworkTeam, observation: Observation, made:
     reads, layers, activations = _as_layers(team, observation.brigade)
     values = _value(seen[:, reads], layers, activations)
     ids = observation.city.buildings.building_id
-    here = [k for k, target in enumerate(targets) if target == chosen]
-    if not team.own_targets and made.target is None:
-        here = [made.action]
-    if not here:  # a target that the team could not have named
-        return Preference(observation.brigade, int(ids[chosen]), float("nan"))
-    place = here[0]
+    if chosen not in targets:
+        return Preference(observation.brigade, int(ids[chosen]), None)
+    place = targets.index(chosen) if team.own_targets or made.target is not None else int(made.action)
     others = [k for k, target in enumerate(targets) if target != chosen]
     value = float(values[place])
     if not others:
