@@ -118,6 +118,14 @@ def add_up(brigade: int, end_brigade: int, first: int, end: int, nearness: Array
 
 
 @inner
+def add_up_others(brigade: int, n_brigades: int, first: int, end: int, ranks: Ranks) -> None:
+    """Write how near the others' targets are to the buildings [first, end) in the row; those before have been heard."""
+    for k in range(np.uint64(first), np.uint64(end)):
+        ranks.near[k] = ranks.near_before[k]
+    add_up(brigade + 1, n_brigades, first, end, ranks.nearness, ranks.near)
+
+
+@inner
 def weigh_alike(first: int, end: int, ranking: int, weights: Array, step: int, sight: Sight, ranks: Ranks) -> None:
     """Weigh what all brigades see alike of the buildings [first, end) in the row, by the weights of a ranking."""
     for k in range(np.uint64(first), np.uint64(end)):
@@ -185,9 +193,7 @@ def value_targets(
     """
     brigades, sites, range_square = sight.brigades, sight.sites, sight.brigade_constants.range_square
     weigh_alike(first, end, ranking, weights, step, sight, ranks)
-    for k in range(np.uint64(first), np.uint64(end)):
-        ranks.near[k] = ranks.near_before[k]
-    add_up(brigade + 1, len(known), first, end, ranks.nearness, ranks.near)
+    add_up_others(brigade, len(known), first, end, ranks)
     count_in(known[brigade], -1.0, sites, ranks)
     if len(network.layer) > 0:
         for other in range(N_ACTIONS):

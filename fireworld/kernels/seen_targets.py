@@ -9,7 +9,7 @@ from fireworld.kernels.arrays import Array
 from fireworld.kernels.episode_arrays import Ranks
 from fireworld.kernels.jit import kernel
 from fireworld.kernels.ranking import Sight, know_building
-from fireworld.kernels.ranks import add_up, count_in, line_up_before, see_place
+from fireworld.kernels.ranks import add_up_others, count_in, line_up_before, see_place
 from fireworld.kernels.situation import place_others, sum_up
 
 
@@ -23,8 +23,7 @@ def see_targets(brigade: int, step: int, known: Array, sight: Sight, ranks: Rank
     first, end = named_range(brigade, sight.brigades.site, sight.sites, sight.brigade_constants.free)
     for k in range(first, end):
         know_building(np.int64(sight.sites.member[k]), step, sight)
-        ranks.near[k] = ranks.near_before[k]
-    add_up(brigade + 1, len(known), first, end, ranks.nearness, ranks.near)
+    add_up_others(brigade, len(known), first, end, ranks)
     sum_up(step, sight, ranks)
     place_others(brigade, known, sight, ranks)
     count_in(known[brigade], -1.0, sight.sites, ranks)
