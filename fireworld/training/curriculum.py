@@ -159,11 +159,6 @@ def curriculum_of(scenario: Scenario) -> Curriculum:
     return Curriculum(name=scenario.name, stages=(stage,))
 
 
-def no_longer(scenario: Scenario, n_steps_max: int) -> Scenario:
-    """Return a scenario of at most so many steps."""
-    return scenario.with_values({"steps": n_steps_max}) if scenario.steps > n_steps_max else scenario
-
-
 def load_curriculum(name_or_path: str | Path) -> Curriculum:
     """Load a shipped curriculum by its name, or a curriculum file by its path.
 

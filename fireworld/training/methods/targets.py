@@ -23,7 +23,7 @@ from fireworld.policy.teams.ranking_words import AROUND, OF_BRIGADE, OF_BUILDING
 from fireworld.policy.teams.team import Team
 from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.simulation.state import fresh_learner, fresh_target_learner
-from fireworld.training.curriculum import Curriculum, no_longer
+from fireworld.training.curriculum import Curriculum
 from fireworld.training.log.records import Lesson
 from fireworld.training.method import Count, Limits, Method, Positive, Report, Share, Trainer
 from fireworld.training.seeds import fight_seed
@@ -226,10 +226,9 @@ class TargetsTrainer(Trainer[Targets, LessonReport]):
         return np.concatenate([np.zeros(hidden), (drawn / math.sqrt(n_in)).ravel(), np.zeros(1 + hidden)])
 
     def _fire(self, number: int) -> BuiltScenario:
-        """Return a fire of the curriculum, no longer than a fight may be."""
+        """Return a fire of the curriculum."""
         if number not in self._fires:
-            scenario = self.curriculum.scenarios[number]
-            self._fires[number] = self._cities.build(no_longer(scenario, self.method.n_steps_max))
+            self._fires[number] = self._cities.build(self.curriculum.scenarios[number])
         return self._fires[number]
 
     def _network(self) -> NetworkArrays:
@@ -258,7 +257,8 @@ class TargetsTrainer(Trainer[Targets, LessonReport]):
         for k, (fire, seed) in enumerate(zip(fires, seeds, strict=True)):
             if workers.stop.is_set():
                 return None
-            world = self._fire(fire).world(seed=seed)
+            built = self._fire(fire)
+            world = built.world(seed=seed, n_steps_max=min(method.n_steps_max, built.scenario.steps))
             if world.n_brigades not in teams:
                 ready = policy.for_brigades(world.n_brigades)
                 ready.epsilon[0] = epsilon
