@@ -46,7 +46,11 @@ if TYPE_CHECKING:
     help="Try the paper's open choices instead, those of fireworld's readings.yaml or of FILE.",
 )
 @click.option(
-    "--design", type=click.Choice(["screen", "full"]), default="screen", show_default=True, help="64 readings, or 128."
+    "--design",
+    type=click.Choice(["screen", "full"]),
+    default="screen",
+    show_default=True,
+    help="64 readings, or 128, and one for each further level.",
 )
 def command(
     *,

@@ -74,7 +74,8 @@ def try_readings(
     Args:
         folder: a free name or an empty folder, for the page and the tables.
         file: the choices, as readings.yaml has them; None: fireworld's own.
-        design: "screen", 64 readings, 8 trainings of each and 10 seeds; or "full", 128, 5 and 20.
+        design: "screen", 64 readings, 8 trainings of each and 10 seeds; or "full", 128, 5 and 20. Beside
+            it each further level of a choice is tried in a reading that is ours in everything else.
         repetitions: trainings of each reading instead.
         seeds: runs of each test instead.
         quick: 8 readings of the first four choices, with small trainings: to see how it looks, not to claim anything.
