@@ -123,6 +123,13 @@ def test_numbers_that_grow_without_end_are_an_error(fires):
         trained(fires, alpha=1e6, n_lessons=40, hidden=0)
 
 
+def test_many_brigades_learn_in_one_network():
+    """At the full rate each, twelve to sixteen would move the network so far that its numbers grow without end."""
+    fires = load_curriculum("conditions").only(["official-like"])
+    trainer = trained(fires, n_lessons=1, n_fights=12, n_steps_max=200, hidden=16)
+    assert np.abs(numbers(trainer)).max() < 10
+
+
 def test_it_is_recorded_and_a_team_file_is_written(fires, tmp_path):
     path = tmp_path / "t.npz"
     train(fires, method="targets", set=SHORT, output=path, record=tmp_path / "t.mcap")

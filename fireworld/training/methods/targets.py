@@ -34,6 +34,10 @@ HIDDEN_MAX: Final = 256
 Hidden = Annotated[int, Limits(f"a whole number from 0 to {HIDDEN_MAX}", 0, HIDDEN_MAX)]
 Steps = Annotated[int, Limits("a whole number from 1 to 1000", 1, 1000)]
 ACTIVATION: Final = "tanh"
+N_LEARNING: Final = 4
+"""Brigades that learn at the full rate; of more, each learns less, since all move the same numbers at once."""
+NUMBER_MAX: Final = 1e6
+"""A network with a greater number does not learn any more; what it needs is below 100."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +59,7 @@ class Targets(Method):
     n_steps_max: Count = 200
     """Steps of a fight at most."""
     alpha: Positive = 0.01
-    """Learning rate of the first lesson; it falls to 0 in even steps."""
+    """Learning rate of the first lesson; it falls to 0 in even steps. Of n > 4 brigades each learns at 4 / n of it."""
     gamma: Share = 0.99
     """Discount of a step."""
     trace_decay: Share = 0.95
@@ -238,7 +242,8 @@ class TargetsTrainer(Trainer[Targets, LessonReport]):
 
     def _learner(self, network: NetworkArrays, state_weights: Array, n_brigades: int, alpha: float) -> Learner:
         method = self.method
-        learner = fresh_learner(NO_TABLES, n_brigades, alpha=alpha, gamma=method.gamma)
+        rate = alpha * min(1.0, N_LEARNING / n_brigades)
+        learner = fresh_learner(NO_TABLES, n_brigades, alpha=rate, gamma=method.gamma)
         of_targets = fresh_target_learner(
             network, state_weights, n_brigades, decay=method.trace_decay, commit=method.commit
         )
@@ -266,7 +271,7 @@ class TargetsTrainer(Trainer[Targets, LessonReport]):
             ready, learner = teams[world.n_brigades]
             lengths[k] = world.run(ready, learner)
             scores[k], errors[k] = world.outcome.score_share, math.fsum(np.abs(learner.td_error)) / world.n_brigades
-        if not np.isfinite(network.number).all():
+        if not (np.abs(network.number) <= NUMBER_MAX).all():  # nor NaN
             raise TrainingError(f"lesson {number + 1}: the network's numbers grow without end; a smaller alpha helps")
         return Lesson(
             lesson=number,
