@@ -79,7 +79,7 @@ def command(
     every episode is on record, too: 13 MB a repetition.
 
     With --readings, what is asked is whether the claim, that cooperation helps, holds in other readings of the paper:
-    a designed sample of them is tried, and DIR gets readings.html and CSV files. It takes one to two hours; with
+    a designed sample of them is tried, and DIR gets readings.html and CSV files. It takes hours; with
     --quick a minute.
 
     Exit code: 0 done, whatever was found; 2 could not be done; 130 interrupted.

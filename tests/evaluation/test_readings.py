@@ -18,7 +18,7 @@ from fireworld.executors.packing import Packer
 from fireworld.executors.receiving import work
 from fireworld.executors.self_test import self_test
 from fireworld.interrupt import Interrupted
-from fireworld.reproduction.readings.choices import SHIPPED, digest_of, load_choices, read_as
+from fireworld.reproduction.readings.choices import SHIPPED, load_choices, read_as
 from fireworld.reproduction.readings.design import N_BASIC, design, designed, further, generators
 from fireworld.reproduction.readings.effects import main_effects, over_trainings, permutation_p, student_95
 from fireworld.reproduction.readings.findings import findings_text
@@ -228,8 +228,38 @@ def test_a_study_is_resumed_and_comes_out_the_same(small, tmp_path):
         fw.try_readings(tmp_path / "b", quick=True, repetitions=2, curriculum=small, resume=True)
     other = tmp_path / "other.yaml"
     other.write_text(SHIPPED.read_text().replace("epsilon_schedule: compounding", "epsilon_schedule: training"))
-    with pytest.raises(TrainingError, match="choices"):
+    with pytest.raises(
+        TrainingError, match=f"{RUNS}: line [0-9]+: expected a reading that is to be tried, got another"
+    ):
         fw.try_readings(tmp_path / "b", file=other, quick=True, curriculum=small, resume=True)
+
+
+FOUR = """\
+choices:
+  - {number: 1, name: a, sentence: s, ours: one, screen: [one, two], levels: {one: {}, two: {method: {alpha: 0.1}}MORE}}
+  - {number: 2, name: b, sentence: s, ours: one, screen: [one, two], levels: {one: {}, two: {method: {gamma: 0.1}}}}
+"""
+
+
+@pytest.mark.slow
+def test_a_study_is_continued_with_a_further_level(small, tmp_path, monkeypatch):
+    """What was tried is not tried again, whatever its number is now."""
+    monkeypatch.setattr(try_readings_module, "QUICK", ReadingsSize("quick", 1, 2, METHOD))
+    before, after = tmp_path / "before.yaml", tmp_path / "after.yaml"
+    before.write_text(FOUR.replace("MORE", ""))
+    after.write_text(FOUR.replace("MORE", ", three: {method: {alpha: 0.3}}"))
+    words = {"quick": True, "curriculum": small}
+    fw.try_readings(tmp_path / "a", file=before, **words)
+    study = fw.try_readings(tmp_path / "a", file=after, resume=True, **words).study
+    assert len(study.timing.parts[0]) == 1, "the further reading alone"
+    fw.try_readings(tmp_path / "b", file=after, **words)
+    kept = {
+        (row["setting"], row["training"]) for row in csv.DictReader((tmp_path / "a" / RUNS).read_text().splitlines())
+    }
+    anew = {
+        (row["setting"], row["training"]) for row in csv.DictReader((tmp_path / "b" / RUNS).read_text().splitlines())
+    }
+    assert anew <= kept, "the best of before may have been confirmed as well"
 
 
 @pytest.mark.slow
@@ -298,9 +328,12 @@ def test_a_map_is_a_level_of_the_city(small, tmp_path):
     choices = load_choices(with_map("town", tmp_path))
     (tmp_path / "elsewhere").mkdir()
     fw.export_city("quick", tmp_path / "elsewhere" / "town")
-    assert digest_of(choices) == digest_of(load_choices(with_map("town", tmp_path / "elsewhere")))
-    assert digest_of(choices) != digest_of(load_choices())
-    setting = setting_of(read_as(choices, {"city": "kobe"}), load_curriculum(small), METHOD)
+    moved = load_choices(with_map("town", tmp_path / "elsewhere"))
+    setting, same, other = (
+        setting_of(read_as(found, {"city": level}), load_curriculum(small), METHOD)
+        for found, level in ((choices, "kobe"), (moved, "kobe"), (choices, "dense"))
+    )
+    assert setting.digest == same.digest != other.digest
     scenarios = [*setting.curriculum.scenarios, *setting.tests]
     assert all(scenario.city.official == str(tmp_path / "town") for scenario in scenarios)
     assert len(setting.files) == 1

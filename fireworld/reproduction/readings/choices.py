@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -102,14 +101,6 @@ def load_choices(path: Path | str = SHIPPED) -> tuple[OpenChoice, ...]:
         _check_names(choice, names, source=source)
         names |= {choice.name, str(choice.number)}
     return tuple(_with_cities(choice, source=source, folder=Path(path).parent) for choice in found.choices)
-
-
-def digest_of(choices: Sequence[OpenChoice]) -> str:
-    """Return the SHA-256 of all that choices say; of cities from files what is in these, not where they are."""
-    plain = msgspec.to_builtins([*choices])
-    for level in (level for choice in plain for level in choice["levels"].values()):
-        level["scenario"] = {key: value for key, value in level["scenario"].items() if key not in CITY_PATHS}
-    return hashlib.sha256(msgspec.json.encode(plain, order="sorted")).hexdigest()
 
 
 def read_as(choices: Sequence[OpenChoice], levels: Mapping[str, str]) -> Reading:

@@ -14,19 +14,31 @@ from fireworld.training.training import check_same
 
 RUNS: Final = "readings-runs.csv"
 SETTINGS: Final = "readings-settings.json"
-HEADS: Final = ("reading", "training", "seed", "cooperative", "non_cooperative")
+HEADS: Final = ("reading", "setting", "training", "seed", "cooperative", "non_cooperative")
+SHOWN: Final = 12
+"""Digits of the digest of a reading's setting in the file; by them its lines are known, wherever it stands now."""
 Key = tuple[int, int]  # a reading and the seed of its training
 
 
 class Runs:
     """The runs of a study: a CSV file that a trial's lines are appended to once it is done.
 
+    A study is continued with further readings, too: those that were tried are known by their settings.
+
     Attributes:
         found: by reading and training, the shares with and without cooperation of every seed.
     """
 
-    def __init__(self, folder: Path, identity: dict[str, Any]) -> None:
+    def __init__(self, folder: Path, identity: dict[str, Any], settings: Sequence[str]) -> None:
+        """Make them.
+
+        Args:
+            folder: where they are kept.
+            identity: what all readings have in common.
+            settings: the digest of the setting of each reading.
+        """
         self._folder, self._identity = folder, identity
+        self._settings = [digest[:SHOWN] for digest in settings]
         self._seeds = [int(seed) for seed in identity["seeds"]]
         self.found: dict[Key, list[tuple[float, float]]] = {}
 
@@ -54,9 +66,7 @@ class Runs:
     def add(self, key: Key, seeds: Sequence[int], shares: list[tuple[float, float]]) -> None:
         """Append a trial's lines."""
         self.found[key] = shares
-        lines = [
-            f"{key[0]},{key[1]},{seed},{one!r},{other!r}\n" for seed, (one, other) in zip(seeds, shares, strict=True)
-        ]
+        lines = [self._line(key, seed, one, other) + "\n" for seed, (one, other) in zip(seeds, shares, strict=True)]
         try:
             with (self._folder / RUNS).open("a", encoding="utf-8") as file:
                 file.write("".join(lines))
@@ -66,22 +76,36 @@ class Runs:
     def sort(self) -> None:
         """Write all trials in their order: equal studies give equal bytes."""
         lines = [",".join(HEADS)]
-        for (n, training), shares in sorted(self.found.items()):
-            lines += [f"{n},{training},{seed},{a!r},{b!r}" for seed, (a, b) in zip(self._seeds, shares, strict=True)]
+        for key, shares in sorted(self.found.items()):
+            lines += [self._line(key, seed, one, other) for seed, (one, other) in zip(self._seeds, shares, strict=True)]
         write_file(self._folder / RUNS, "\n".join(lines) + "\n")
 
+    def _line(self, key: Key, seed: int, one: float, other: float) -> str:
+        n, training = key
+        return f"{n},{self._settings[n]},{training},{seed},{one!r},{other!r}"
+
     def _read(self, path: Path) -> None:
-        rows: dict[Key, dict[int, tuple[float, float]]] = {}
+        rows: dict[tuple[str, int], dict[int, tuple[float, float]]] = {}
         text = path.read_text(encoding="utf-8")
         whole = text[: text.rfind("\n") + 1]  # a kill may leave a part of the last line
         for number, row in enumerate(csv.reader(whole.splitlines()), 1):
             if number == 1 and tuple(row) == HEADS:
                 continue
             try:
-                n, training, seed, one, other = int(row[0]), int(row[1]), int(row[2]), float(row[3]), float(row[4])
-            except (ValueError, IndexError):
+                _, setting, training, seed, one, other = row
+                read = int(training), int(seed), float(one), float(other)
+            except ValueError:
                 wanted = ",".join(HEADS)
                 raise TrainingError(expected(str(path), f"line {number}", wanted, ",".join(row))) from None
-            rows.setdefault((n, training), {})[seed] = one, other
-        wanted_seeds = self._seeds
-        self.found = {key: [of[seed] for seed in wanted_seeds] for key, of in rows.items() if [*of] == wanted_seeds}
+            if setting not in self._settings:
+                wanted = "a reading that is to be tried"
+                hint = "name the readings and levels that it was begun with, or begin again with --force"
+                raise TrainingError(expected(str(path), f"line {number}", wanted, f"another one, {setting}", hint))
+            rows.setdefault((setting, read[0]), {})[read[1]] = read[2:]
+        self.found = {
+            (n, training): [*of.values()]
+            for (setting, training), of in rows.items()
+            if [*of] == self._seeds
+            for n, one in enumerate(self._settings)
+            if one == setting
+        }

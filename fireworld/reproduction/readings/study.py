@@ -14,7 +14,7 @@ import numpy as np
 from fireworld.executors import AnyExecutor, Workers, workers_for
 from fireworld.interrupt import Interrupted, gentle_interrupt
 from fireworld.kernels.arrays import Array
-from fireworld.reproduction.readings.choices import OpenChoice, Reading, digest_of
+from fireworld.reproduction.readings.choices import OpenChoice, Reading
 from fireworld.reproduction.readings.design import designed, further
 from fireworld.reproduction.readings.effects import Effect, main_effects, over_trainings, permutation_p
 from fireworld.reproduction.readings.runs import Key, Runs
@@ -167,12 +167,10 @@ def measure_readings(
             "seeds": [*seeds],
             "method": size.method.as_dict(),
             "curriculum": {"digest": trained_in.digest},
-            "choices": {"digest": digest_of(choices)},
-            "readings": [dict(reading.levels) for reading in readings],
             "fireworld": __version__,
         }
         settings = [setting_of(reading, trained_in, size.method) for reading in readings]
-        runs = Runs(folder, identity)
+        runs = Runs(folder, identity, [setting.digest for setting in settings])
         runs.open(resume=resume, force=force)
         trials = Trials(settings, seeds, runs, workers, on_progress)
         try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -60,6 +61,17 @@ class Setting:
     method: Sarsa
     study: StudySettings
     files: Mapping[str, bytes]
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of all that decides what comes of a trial, but for the version and the seeds."""
+        said = [
+            self.curriculum.digest,
+            [test.digest for test in self.tests],
+            self.method.as_dict(),
+            msgspec.to_builtins(self.study),
+        ]
+        return hashlib.sha256(msgspec.json.encode(said, order="sorted")).hexdigest()
 
 
 def setting_of(reading: Reading, curriculum: Curriculum, method: Sarsa) -> Setting:
