@@ -44,7 +44,7 @@ def test_commands_are_real(words):
     if not rest or {"--help", "--version"} & set(rest):
         return  # a command is only named, or its help
     try:
-        given = command.make_context(words[0], rest).params
+        given = command.make_context(words[0], rest, parent=click.Context(root, **root.context_settings)).params
     except (click.BadOptionUsage, click.MissingParameter):  # named with an option or two, nothing to be called
         known = {name for option in command.params for name in option.opts}
         assert {word for word in rest if word.startswith("-")} <= known
