@@ -53,7 +53,7 @@ class Evolution(GenerationMethod):
     """Pairs of candidates of a generation: the mean plus and minus the same noise."""
     n_fires: Count = 45
     """Fires that each candidate fights in a generation, spread evenly over the stages of the curriculum."""
-    n_steps_max: Count = 200
+    n_steps_max: Count = 400
     """Steps of a fight at most; those of the checks are as long as the scenarios."""
     noise: Positive = 0.1
     """Standard deviation of the noise, of every number of the network."""
