@@ -10,22 +10,26 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
 
-from fireworld.evaluation.runs import evaluate
+from fireworld.evaluation.runs import evaluate_each
 from fireworld.executors import On, workers_for
+from fireworld.markdown import markdown_table
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.names import find_policy
 from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.training.curriculum import load_curriculum
 
 
-def mean_share(builts: Sequence[BuiltScenario], policy: KernelPolicy, seeds: Sequence[int]) -> float:
-    """Return the mean share of the greatest score over the runs of each fire."""
-    shares = [share for built in builts for share in evaluate(built, policy, seeds).score_share]
-    return math.fsum(shares) / len(shares)
+def mean_shares(
+    stages: Mapping[str, Sequence[BuiltScenario]], policy: KernelPolicy, seeds: Sequence[int]
+) -> Iterator[float]:
+    """Yield the mean share of the greatest score in each stage, over all runs of its fires."""
+    workers = workers_for(On("threads"))
+    for fires in stages.values():
+        outcomes = evaluate_each([(built, policy) for built in fires], seeds, workers=workers)
+        shares = [share for of_fire in outcomes for share in of_fire.score_share.tolist()]
+        yield math.fsum(shares) / len(shares)
 
 
 def main() -> None:
@@ -45,17 +49,14 @@ def main() -> None:
         ]
         for stage in load_curriculum(given.curriculum).stages
     }
-    print("| team | " + " | ".join([*stages, "mean"]) + " |\n" + "|---" * (len(stages) + 2) + "|")
-    workers = workers_for(On("threads"))
+    rows = []
     for name in given.teams:
         policy = find_policy(name).policy
         if not isinstance(policy, KernelPolicy):
             parser.error(f"{name}: not a policy that kernels follow")
-        tasks = [partial(mean_share, builts, replace(policy), seeds) for builts in stages.values()]
-        means = workers.run(tasks, lambda *_: None)
-        assert means is not None, "nobody asks them to stop"
-        cells = [*(f"{mean:.2f}" for mean in means), f"{math.fsum(means) / len(means):.3f}"]
-        print(f"| {name} | " + " | ".join(cells) + " |", flush=True)
+        means = [*mean_shares(stages, policy, seeds)]
+        rows.append([name, *(f"{mean:.2f}" for mean in means), f"{math.fsum(means) / len(means):.3f}"])
+    print(markdown_table(["team", *stages, "mean"], rows))
 
 
 if __name__ == "__main__":
