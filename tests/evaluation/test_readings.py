@@ -234,7 +234,7 @@ def test_a_study_is_resumed_and_comes_out_the_same(small, tmp_path):
         fw.try_readings(tmp_path / "b", file=other, quick=True, curriculum=small, resume=True)
 
 
-FOUR = """\
+OF_TWO = """\
 choices:
   - {number: 1, name: a, sentence: s, ours: one, screen: [one, two], levels: {one: {}, two: {method: {alpha: 0.1}}MORE}}
   - {number: 2, name: b, sentence: s, ours: one, screen: [one, two], levels: {one: {}, two: {method: {gamma: 0.1}}}}
@@ -246,20 +246,18 @@ def test_a_study_is_continued_with_a_further_level(small, tmp_path, monkeypatch)
     """What was tried is not tried again, whatever its number is now."""
     monkeypatch.setattr(try_readings_module, "QUICK", ReadingsSize("quick", 1, 2, METHOD))
     before, after = tmp_path / "before.yaml", tmp_path / "after.yaml"
-    before.write_text(FOUR.replace("MORE", ""))
-    after.write_text(FOUR.replace("MORE", ", three: {method: {alpha: 0.3}}"))
+    before.write_text(OF_TWO.replace("MORE", ""))
+    after.write_text(OF_TWO.replace("MORE", ", three: {method: {alpha: 0.3}}"))
     words = {"quick": True, "curriculum": small}
     fw.try_readings(tmp_path / "a", file=before, **words)
     study = fw.try_readings(tmp_path / "a", file=after, resume=True, **words).study
     assert len(study.timing.parts[0]) == 1, "the further reading alone"
     fw.try_readings(tmp_path / "b", file=after, **words)
-    kept = {
-        (row["setting"], row["training"]) for row in csv.DictReader((tmp_path / "a" / RUNS).read_text().splitlines())
-    }
-    anew = {
-        (row["setting"], row["training"]) for row in csv.DictReader((tmp_path / "b" / RUNS).read_text().splitlines())
-    }
-    assert anew <= kept, "the best of before may have been confirmed as well"
+    continued, anew = (
+        {(row["setting"], row["training"]) for row in csv.DictReader((tmp_path / name / RUNS).read_text().splitlines())}
+        for name in ("a", "b")
+    )
+    assert anew <= continued, "the best of before may have been confirmed as well"
 
 
 @pytest.mark.slow

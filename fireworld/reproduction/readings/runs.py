@@ -63,26 +63,24 @@ class Runs:
         write_file(settings, json.dumps(self._identity) + "\n")
         self.sort()
 
-    def add(self, key: Key, seeds: Sequence[int], shares: list[tuple[float, float]]) -> None:
-        """Append a trial's lines."""
+    def add(self, key: Key, shares: list[tuple[float, float]]) -> None:
+        """Append a trial's lines; its shares are those of the study's seeds, in their order."""
         self.found[key] = shares
-        lines = [self._line(key, seed, one, other) + "\n" for seed, (one, other) in zip(seeds, shares, strict=True)]
         try:
             with (self._folder / RUNS).open("a", encoding="utf-8") as file:
-                file.write("".join(lines))
+                file.write(self._text(key))
         except OSError as error:
             raise OutputError(f"{self._folder / RUNS}: cannot be written: {error.strerror}") from None
 
     def sort(self) -> None:
         """Write all trials in their order: equal studies give equal bytes."""
-        lines = [",".join(HEADS)]
-        for key, shares in sorted(self.found.items()):
-            lines += [self._line(key, seed, one, other) for seed, (one, other) in zip(self._seeds, shares, strict=True)]
-        write_file(self._folder / RUNS, "\n".join(lines) + "\n")
+        write_file(self._folder / RUNS, ",".join(HEADS) + "\n" + "".join(map(self._text, sorted(self.found))))
 
-    def _line(self, key: Key, seed: int, one: float, other: float) -> str:
+    def _text(self, key: Key) -> str:
+        """Return the lines of a trial."""
         n, training = key
-        return f"{n},{self._settings[n]},{training},{seed},{one!r},{other!r}"
+        seeds = zip(self._seeds, self.found[key], strict=True)
+        return "".join(f"{n},{self._settings[n]},{training},{seed},{one!r},{other!r}\n" for seed, (one, other) in seeds)
 
     def _read(self, path: Path) -> None:
         rows: dict[tuple[str, int], dict[int, tuple[float, float]]] = {}

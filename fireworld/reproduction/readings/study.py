@@ -224,7 +224,7 @@ class Trials:
         self._on_progress(what, len(keys) - len(left), len(keys))
 
         def on_result(place: int, tried: Tried) -> None:
-            runs.add(left[place], self._seeds, tried.shares)
+            runs.add(left[place], tried.shares)
             made.append(tried)
             self._on_progress(what, sum(key in runs.found for key in keys), len(keys))
 
