@@ -55,8 +55,8 @@ def main() -> None:
         if not isinstance(policy, KernelPolicy):
             parser.error(f"{name}: not a policy that kernels follow")
         means = [*mean_shares(stages, policy, seeds)]
-        rows.append([name, *(f"{mean:.2f}" for mean in means), f"{math.fsum(means) / len(means):.3f}"])
-    print(markdown_table(["team", *stages, "mean"], rows))
+        rows.append([name, f"{math.fsum(means) / len(means):.3f}", *(f"{mean:.2f}" for mean in means)])
+    print(markdown_table(["team", "mean", *stages], rows))
 
 
 if __name__ == "__main__":
