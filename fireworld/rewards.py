@@ -84,6 +84,20 @@ def rewarded(kind: int, now: float, before: float) -> float:
     return now - before if kind == CHANGE else now
 
 
+def worth_of_building(code: int, weights: tuple[float, float, float, float]) -> float:
+    """Return what a building adds to the weighted sum; compiled by `fireworld.kernels.own_reward`.
+
+    Args:
+        code: its fieryness.
+        weights: one of each term.
+    """
+    if code == 0:
+        return 0.0
+    if code <= 3:
+        return weights[1]
+    return weights[0] if code <= 7 else weights[2]
+
+
 def share_gained(score: Values, score_max: Values, before: Values) -> Values:
     """Return what a step is worth to learners in environments, if nothing else is asked for.
 

@@ -1,13 +1,13 @@
-"""Allocation: which targets a brigade may name by itself, and to which fire site it belongs by the one it goes for.
+"""Which targets a brigade may name by itself, to which site it belongs by the one it goes for, and if it keeps that.
 
-Every loop, mask and check asks here. `free` is `BrigadeConstants.free`. MODEL 4.1.
+Every loop, mask and check asks here. `free` is `BrigadeConstants.free`. MODEL 4.1 and 4.2.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from fireworld.kernels.arrays import Array, SiteState
+from fireworld.kernels.arrays import Array, BrigadeConstants, BrigadeState, SiteState
 from fireworld.kernels.jit import kernel
 from fireworld.kernels.observation import site_place
 
@@ -32,6 +32,17 @@ def may_name(brigade: int, target: int, site_of: Array, sites: SiteState, free: 
     if target < 0 or sites.place[target] < 0:
         return False
     return bool(free or sites.number[sites.place[target]] == site_of[brigade])
+
+
+@kernel
+def stays(brigade: int, brigades: BrigadeState, sites: SiteState, constants: BrigadeConstants) -> bool:
+    """Return whether a brigade stays with what it did, before it decides: where targets are kept, while that burns.
+
+    A target of another fire site is let go of, unless allocation is free; so is what it had before it refilled.
+    """
+    if not constants.keeps or brigades.action[brigade] < 0:
+        return False
+    return may_name(brigade, brigades.target[brigade], brigades.site, sites, constants.free)
 
 
 @kernel

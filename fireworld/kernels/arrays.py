@@ -180,6 +180,7 @@ class BrigadeConstants(NamedTuple):
     range_square: float
     speed: int
     free: bool  # a brigade may name targets of any fire site, and belongs to the site of the one it goes for
+    keeps: bool  # a brigade stays with its target while that burns, and chooses nothing meanwhile
 
 
 class ObservationConstants(NamedTuple):
@@ -340,7 +341,7 @@ class Trace(NamedTuple):
     state: Int32x2  # (b, k + 1), what a brigade saw: 0..4319, -1 where it did not look
     action: UInt8x2  # (b, k + 1), what it did; 0 where it did nothing
     choice: UInt8x2  # (b, k + 1), how it came to that: position in fireworld.records.CHOICES
-    reward: Float64x2  # (terms, k), of each step
+    reward: Float64x2  # (terms, k), of each step; where brigades learn from their own doing, (terms + b, k)
 
 
 class TargetLearner(NamedTuple):
@@ -374,6 +375,7 @@ class Learner(NamedTuple):
     action: Int64  # (b,)
     reward: Float64  # (b,), discounted reward since
     discount: Float64  # (b,), discount since
+    own: Float64  # (b,), what each gets for its own doing in the step; no rows: all get the team's reward
     td_error: Float64  # (b,), error of the last update
     of_targets: TargetLearner
     trace: Trace

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from fireworld.kernels.addresses import opener
-from fireworld.kernels.allocation import join_site, named_range
+from fireworld.kernels.allocation import join_site, named_range, stays
 from fireworld.kernels.arrays import (
     BURNING,
     Array,
@@ -153,6 +153,8 @@ def follow(brigade: int, action: int, i: int, episode: Episode, batch: Batch) ->
     target = -1
     if not can_choose(brigade, brigades.hp, brigades.refilling, sites.counts):
         action = -1
+    elif stays(brigade, brigades, sites, episode.constants.brigades):
+        action, target = brigades.action[brigade], brigades.target[brigade]
     elif action >= N_ACTIONS:
         target, action = batch.shown.own[i, brigade, action - N_ACTIONS], OWN_TARGET
     else:
@@ -200,6 +202,7 @@ def show_brigade(brigade: int, i: int, episode: Episode, batch: Batch) -> None:
     brigades, sites = world.brigades, world.sites
     view.state[i, brigade] = state_of(brigade, brigades.action, episode, view.features[i, brigade])
     chooses = can_choose(brigade, brigades.hp, brigades.refilling, sites.counts)
+    chooses = chooses and not stays(brigade, brigades, sites, episode.constants.brigades)
     view.alive[i, brigade], view.chooses[i, brigade] = brigades.hp[brigade] > 0, chooses
     mask, own = view.mask[i, brigade], view.own[i, brigade]
     mask[0] = 1

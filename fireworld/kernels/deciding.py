@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fireworld.kernels.allocation import join_site, named_range
+from fireworld.kernels.allocation import join_site, named_range, stays
 from fireworld.kernels.arrays import BY_RANK, BY_TABLE, Array, Seen
 from fireworld.kernels.choice import (
     ALLOCATE,
@@ -100,11 +100,18 @@ def decide(brigade: int, step: int, before: Array, shown: Array, known: Array, e
     if learner.learning[0] != 0:
         note_choice(brigade, step - 1, -1, 0, NO_CHOICE, learner)
     if can_choose(brigade, brigades.hp, brigades.refilling, sites.counts):
-        action, target, choice = decide_by_kind(brigade, step, before, shown, known, episode)
-        observation = episode.constants.observation
-        if target < 0 or (action == EASIEST and observation.heated):
-            where = city.buildings, city.links, world.fire, city.geometry, sites
-            target = find_named(brigade, action, brigades, *where, observation)
+        by_targets = len(learner.of_targets.trace) > 0
+        learns_the_end = by_targets and step > episode.clock[LAST_STEP]
+        if stays(brigade, brigades, sites, episode.constants.brigades) and not learns_the_end:
+            action, target, choice = brigades.action[brigade], brigades.target[brigade], KEPT
+            if learner.learning[0] != 0 and not by_targets:
+                learn_from_kept(brigade, action, step, shown, episode)
+        else:
+            action, target, choice = decide_by_kind(brigade, step, before, shown, known, episode)
+            observation = episode.constants.observation
+            if target < 0 or (action == EASIEST and observation.heated):
+                where = city.buildings, city.links, world.fire, city.geometry, sites
+                target = find_named(brigade, action, brigades, *where, observation)
     brigades.action[brigade], brigades.target[brigade] = action, target
     join_site(brigade, target, brigades.site, sites, episode.constants.brigades.free)
     if len(seen.state) > 0:
@@ -184,8 +191,8 @@ def decide_by_worth(brigade: int, step: int, known: Array, episode: Episode) -> 
     sight = sight_of(episode.city, episode.world, episode.constants, scratch)
     choice, noting, ranking = GREEDY, len(seen.state) > 0, policy.table_of[brigade]
     learning, before = len(of_targets.trace) > 0, scratch.target_before[brigade]
-    goes_on = learning and step <= episode.clock[LAST_STEP]
-    if goes_on and keeps_target(brigade, before, step, episode.world.brigades.site, sight, of_targets):
+    stays = learning and step <= episode.clock[LAST_STEP]
+    if stays and keeps_target(brigade, before, step, episode.world.brigades.site, sight, of_targets):
         return OWN_TARGET, before, KEPT
     action, target = rank_targets(
         brigade,

@@ -9,6 +9,7 @@ from fireworld.kernels.fire import is_over
 from fireworld.kernels.jit import inner, kernel
 from fireworld.kernels.learning import forget, note_reward, take_reward, update
 from fireworld.kernels.outcome import score
+from fireworld.kernels.own_reward import note_worth, own_rewards
 from fireworld.kernels.step import begin_step, finish_step, opened_episode
 from fireworld.kernels.target_learning import learn_target
 from fireworld.kernels.warmth import begin
@@ -35,6 +36,7 @@ def run_episode(row: Array) -> None:
     learning, last_step = learner.learning[0] != 0, clock[LAST_STEP]
     episode.scratch.described_at[:] = -1
     by_score = len(learner.of_targets.trace) > 0
+    doing = world.brigades, world.fire.fieryness, constants.reward.weights
     if learning:
         forget(learner)
     if by_score:
@@ -48,8 +50,10 @@ def run_episode(row: Array) -> None:
         if step > last_step:
             break
         clock[STEP] = step
+        note_worth(*doing, learner.own)
         finish_step(city, world, constants, warmth, clock[SEED], step)
         if learning:
+            own_rewards(*doing, learner.own)
             take_reward(change_of_score(episode) if by_score else outcome.reward[TOTAL], learner)
             note_reward(step - 1, outcome.reward, learner)
         if is_over(outcome.counts[BURNING], city.buildings.later_step, step):

@@ -82,10 +82,11 @@ def go_on_and_learn(brigade: int, table: int, state: int, action: int, learner: 
 
 @kernel
 def take_reward(reward: float, learner: Learner) -> None:
-    """Give the step's reward to every brigade that waits for what comes of its choice."""
+    """Give the step's reward, or each its own, to every brigade that waits for what comes of its choice."""
     for brigade in range(len(learner.state)):
         if learner.state[brigade] >= 0:
-            learner.reward[brigade] += learner.discount[brigade] * reward
+            its = learner.own[brigade] if len(learner.own) > 0 else reward
+            learner.reward[brigade] += learner.discount[brigade] * its
             learner.discount[brigade] *= learner.gamma[0]
 
 
@@ -112,6 +113,15 @@ def note_reward(row: int, reward: Array, learner: Learner) -> None:
     if row < trace.reward.shape[1]:
         for term in range(TOTAL):
             trace.reward[term, row] = reward[term]
+        for brigade in range(len(learner.own)):
+            trace.reward[TOTAL + brigade, row] = learner.own[brigade]
+
+
+@inner
+def read_own(row: int, learner: Learner) -> None:
+    """Read what brigades got for their own doing out of the trace, where they learn from that."""
+    for brigade in range(len(learner.own)):
+        learner.own[brigade] = learner.trace.reward[TOTAL + brigade, row]
 
 
 @kernel
@@ -153,6 +163,7 @@ def learn_again(
                 updates[0, brigade, row], updates[1, brigade, row] = value, learner.td_error[brigade]
                 updates[2, brigade, row] = learner.tables[table, row_before, action_before]
         if not over:
+            read_own(row, learner)
             total = 0.0
             for term in range(TOTAL):
                 total += trace.reward[term, row]

@@ -225,8 +225,12 @@ class _Observing(Policy):
 def _check_decides(world: World, brigade: int, run: StoredRun, asked: Mapping[int, Observation]) -> None:
     """Check that a brigade is asked for the decision; otherwise it would change nothing."""
     if brigade not in asked:
-        got = "one that is dead" if world.state.brigades.hp[brigade] <= 0 else "one that refills"
-        wanted = f"a brigade that decides in step {world.step_number + 1}"
+        brigades, wanted = world.state.brigades, f"a brigade that decides in step {world.step_number + 1}"
+        if world.constants.brigades.keeps and brigades.target[brigade] >= 0 and not brigades.refilling[brigade]:
+            target = run.city.building_id[brigades.target[brigade]]
+            got = f"one that stays with building {target} while that burns"
+            raise LogError(expected("decide", str(brigade), wanted, got, "brigades.targets is kept"))
+        got = "one that is dead" if brigades.hp[brigade] <= 0 else "one that refills"
         actions = zip(run.steps.tolist(), run.ragged("/decisions", "action"), strict=True)
         later = [step for step, made in actions if step > world.step_number and made[brigade] >= 0]
         hint = f"it decides again in step {later[0]}: fork at {later[0] - 1}" if later else ""

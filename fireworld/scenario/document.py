@@ -21,6 +21,7 @@ from fireworld.scenario.observed import Fraction, Metres, Observed
 Preset = Literal["official-2011", "official-2013", "paper"]
 Choices = Literal["in-turn", "simultaneous"]
 Allocation = Literal["fixed", "free"]
+Targets = Literal["anew", "kept"]
 Direction = Literal["N", "E", "S", "W"]
 DIRECTIONS: Final[tuple[Direction, ...]] = ("N", "E", "S", "W")
 
@@ -240,6 +241,13 @@ class BrigadeTeam(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
             "there only; `free`: it may name those of any site, and belongs to the site of the one that it goes for."
         ),
     ] = "fixed"
+    targets: Annotated[
+        Targets,
+        Meta(
+            description="`anew`: a brigade chooses in every step; `kept`: it stays with what it chose while its "
+            "target burns and is of its fire site, and is not asked meanwhile."
+        ),
+    ] = "anew"
 
 
 class Document(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

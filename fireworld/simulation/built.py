@@ -48,6 +48,7 @@ class BuiltScenario:
             unit_volume_m3=scenario.unit_volume_m3,
             observed=scenario.observation,
             allocation=scenario.brigades.allocation,
+            targets=scenario.brigades.targets,
             arrays=self.city_arrays,
         )
 

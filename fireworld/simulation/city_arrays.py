@@ -250,7 +250,7 @@ def health_constants(health: HealthParameters) -> HealthConstants:
     )
 
 
-def brigade_constants(brigades: BrigadeParameters, *, free: bool = False) -> BrigadeConstants:
+def brigade_constants(brigades: BrigadeParameters, *, free: bool = False, keeps: bool = False) -> BrigadeConstants:
     """Turn metres into millimetres."""
     range_mm = round(brigades.range_m * 1000.0)  # whole, so that a brigade exactly at its range may spray
     return BrigadeConstants(
@@ -261,6 +261,7 @@ def brigade_constants(brigades: BrigadeParameters, *, free: bool = False) -> Bri
         range_square=float(range_mm * range_mm),
         speed=round(brigades.speed_m * 1000.0),
         free=free,
+        keeps=keeps,
     )
 
 

@@ -170,9 +170,19 @@ NO_TARGETS: Final = fresh_target_learner(
 
 
 def fresh_learner(
-    tables: Array, n_brigades: int, *, rule: int = 0, alpha: float = 0.7, alpha_decay: float = 0.0, gamma: float = 0.5
+    tables: Array,
+    n_brigades: int,
+    *,
+    rule: int = 0,
+    alpha: float = 0.7,
+    alpha_decay: float = 0.0,
+    gamma: float = 0.5,
+    own: bool = False,
 ) -> Learner:
-    """Return the memory of a team that learns into `tables`, (tables, states, 4); the rates are the paper's."""
+    """Return the memory of a team that learns into `tables`, (tables, states, 4); the rates are the paper's.
+
+    `own`: brigades learn from their own doing, not from the team's reward.
+    """
     return Learner(
         learning=np.ones(1, dtype=np.uint8),
         rule=np.array([rule], dtype=np.int64),
@@ -185,20 +195,24 @@ def fresh_learner(
         action=np.zeros(n_brigades, dtype=np.int64),
         reward=np.zeros(n_brigades),
         discount=np.ones(n_brigades),
+        own=np.zeros(n_brigades if own else 0),
         td_error=np.zeros(n_brigades),
         of_targets=NO_TARGETS,
         trace=fresh_trace(n_brigades, 0),
     )
 
 
-def fresh_trace(n_brigades: int, n_steps_max: int) -> Trace:
-    """Return room for what a team leaves behind of an episode; 0 steps: no room, and nothing is left."""
+def fresh_trace(n_brigades: int, n_steps_max: int, *, own: bool = False) -> Trace:
+    """Return room for what a team leaves behind of an episode; 0 steps: no room, and nothing is left.
+
+    `own`: also for what each brigade gets for its own doing.
+    """
     n_rows = n_steps_max + 1 if n_steps_max else 0
     return Trace(
         state=np.full((n_brigades, n_rows), -1, dtype=np.int32),
         action=np.zeros((n_brigades, n_rows), dtype=np.uint8),
         choice=np.zeros((n_brigades, n_rows), dtype=np.uint8),
-        reward=np.zeros((TOTAL, n_steps_max)),
+        reward=np.zeros((TOTAL + (n_brigades if own else 0), n_steps_max)),
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from fireworld.city.city import City
 from fireworld.kernels.addresses import address_row
-from fireworld.kernels.allocation import join_site, may_name
+from fireworld.kernels.allocation import join_site, may_name, stays
 from fireworld.kernels.arrays import BURNING, Array, CityArrays, Constants, Learner, PolicyArrays, Seen, WorldState
 from fireworld.kernels.episode_arrays import SEED, STEP
 from fireworld.kernels.fire import ignite
@@ -82,6 +82,7 @@ def prepare_start(
     unit_volume_m3: float | None = None,
     observed: Observed | None = None,
     allocation: document.Allocation = "fixed",
+    targets: document.Targets = "anew",
     arrays: CityArrays | None = None,
 ) -> Start:
     """Place everybody in a city and set it on fire; arguments are named as in a scenario.
@@ -95,7 +96,7 @@ def prepare_start(
     constants = Constants(
         fire=fire_constants(parameters.fire),
         health=health_constants(parameters.health),
-        brigades=brigade_constants(parameters.brigades, free=allocation == "free"),
+        brigades=brigade_constants(parameters.brigades, free=allocation == "free", keeps=targets == "kept"),
         observation=observation_constants(city, unit_volume_m3, in_turn=choices == "in-turn", observed=observed),
         reward=reward if reward is not None else reward_of("stock"),
     )
@@ -171,6 +172,7 @@ class World:
         for brigade in range(self.n_brigades):
             state = ahead._see(brigade, brigades.action, known, features)  # noqa: SLF001
             decides = can_choose(brigade, brigades.hp, brigades.refilling, sites.counts)
+            decides = decides and not stays(brigade, brigades, sites, self.constants.brigades)
             seen.append(ahead._observation(brigade, features, state, known) if decides else None)  # noqa: SLF001
         return tuple(seen)
 
@@ -277,11 +279,14 @@ class World:
         decision, target = NO_DECISION, -1
         if can_choose(brigade, brigades.hp, brigades.refilling, sites.counts):
             last = Decision(int(before[brigade]), target=int(target_before[brigade]))
-            if self._can_keep(brigade, last) and keeps(policy, brigade, last.action, self.step_number):
-                decision = last
+            if stays(brigade, brigades, sites, self.constants.brigades):
+                decision, target = last, int(target_before[brigade])
             else:
-                decision = ask(policy, self._observation(brigade, features, state, known))
-            target = self._target(brigade, decision)
+                if self._can_keep(brigade, last) and keeps(policy, brigade, last.action, self.step_number):
+                    decision = last
+                else:
+                    decision = ask(policy, self._observation(brigade, features, state, known))
+                target = self._target(brigade, decision)
         brigades.action[brigade], brigades.target[brigade] = decision.action, target
         join_site(brigade, target, brigades.site, sites, self.constants.brigades.free)
         return state, decision

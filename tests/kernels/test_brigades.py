@@ -190,7 +190,7 @@ def test_a_refuge_shelters_only_those_who_refill():
 
 def test_presets_in_millimetres():
     constants = brigade_constants(OFFICIAL_2013.brigades)
-    assert constants == (15_000, 3000, 1500, 400, 2.5e9, 40_000, False)
+    assert constants == (15_000, 3000, 1500, 400, 2.5e9, 40_000, False, False)
 
 
 def test_a_hydrant_fills_in_passing_but_the_refuge_is_where_a_dry_brigade_goes():

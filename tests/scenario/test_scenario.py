@@ -90,7 +90,10 @@ def test_overrides_replace_the_presets_values():
         ),
         ({"reward": {"burning": 0, "of": "change"}}, "reward: expected a weight other than 0 for one of water_damaged"),
         ({"brigade": {"n": 3}}, "brigade: expected a known key, got 'brigade'; try brigades"),
-        ({"brigades": {"count": 3}}, "brigades.count: expected one of the keys n, at, allocation, got 'count'"),
+        (
+            {"brigades": {"count": 3}},
+            "brigades.count: expected one of the keys n, at, allocation, targets, got 'count'",
+        ),
         ({"brigades": 3}, "brigades: expected keys and values, got 3"),
         ({"brigades": {"n": -1}}, "brigades.n: expected a whole number from 1 to 1000, got -1"),
         ({"parameters": {"brigades": {"power_liters": 1}}}, "got 'power_liters'; try power_litres"),

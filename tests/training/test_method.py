@@ -38,7 +38,7 @@ def test_other_hyperparameters():
         ("n_episodes_max", "0", "a whole number from 1"),
         ("shared_table", "yes", "true or false, got 'yes'"),
         ("rule", "dqn", "one of sarsa, expected-sarsa, q-learning, got 'dqn'"),
-        ("reward", "flow", "one of stock, change, got 'flow'"),
+        ("reward", "flow", "one of stock, change, own, got 'flow'"),
         ("choices", "", "one of in-turn, simultaneous, got ''"),
     ],
 )

@@ -34,6 +34,7 @@ OF_THE_METHOD = (
     {"epsilon_schedule": "compounding"},
     {"epsilon_schedule": "training"},
     {"draw_last": True},
+    {"reward": "own"},
 )
 OF_THE_SCENARIO = (
     {"flags": "target"},

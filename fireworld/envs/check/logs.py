@@ -209,10 +209,12 @@ def _with_city(header: RunHeader, folder: Path) -> Scenario:
 
 
 def _action(decisions: Decisions, brigade: int, own: Array) -> int:
-    """Return the action of a brigade's recorded decision; `own` (k,) are the buildings that it may name."""
+    """Return the action of a brigade's recorded decision; `own` (k,): the buildings that it may name, -1 none."""
     action = int(decisions.action[brigade])
     if action != Action.OWN_TARGET:
         return max(action, 0)
+    if own.max() < 0:  # it stays with the target that it keeps
+        return 0
     places = np.flatnonzero(own == decisions.target[brigade])
     assert len(places) == 1, f"brigade {brigade} cannot name building {decisions.target[brigade]}"
     return int(Action.OWN_TARGET + places[0])

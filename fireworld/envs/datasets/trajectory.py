@@ -189,6 +189,8 @@ class _Player:
         action, target = (int(one[row, brigade]) for one in self._episode.decided)
         if action != OWN:
             return max(action, 0)
+        if not self._bound.shown.chooses[_WORLD, brigade]:  # it stays with the target that it keeps
+            return 0
         places = np.flatnonzero(self._bound.shown.own[_WORLD, brigade] == target)
         if not len(places):
             where = f"step {row + 1}, brigade {brigade}"

@@ -18,6 +18,7 @@ from fireworld.policy.words import N_FLAG_VALUES
 from fireworld.reproduction.paper import TESTS
 from fireworld.reproduction.readings.choices import Reading, StudySettings
 from fireworld.scenario import Scenario, load_scenario
+from fireworld.scenario.document import with_kind
 from fireworld.scenario.scenario import read_city_file
 from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.simulation.state import NO_LEARNER, fresh_learner
@@ -88,6 +89,8 @@ def setting_of(reading: Reading, curriculum: Curriculum, method: Sarsa) -> Setti
     ]
     in_tests = {"choices": varied.choices}
     tests = [_varied(load_scenario(row.scenario), reading, in_tests) for row in TESTS.table_2]
+    if reading.study.learn_in_tests:
+        tests = [with_kind(test, varied.team_reward) for test in tests]
     files = dict[str, bytes]()
     for scenario in (*(one for stage in stages for one in stage.scenarios), *tests):
         if scenario.city_sha256 is not None and scenario.city_sha256 not in files:
@@ -180,7 +183,8 @@ class Trial:
         policy = from_tables(tables.copy(), commit=method.commit).for_brigades(built.n_brigades)
         if study.learn_in_tests:
             rates = {name: getattr(method, name) for name in ("alpha", "alpha_decay", "gamma")}
-            learner = fresh_learner(policy.tables, built.n_brigades, rule=RULES.index(method.rule), **rates)
+            rule, own = RULES.index(method.rule), method.learns_from_own
+            learner = fresh_learner(policy.tables, built.n_brigades, rule=rule, own=own, **rates)
         world.run(policy, learner)
         if self.stop.is_set():
             raise Interrupted("interrupted")

@@ -16,6 +16,7 @@ from fireworld.errors import LogError, TrainingError, expected
 from fireworld.kernels.arrays import TOTAL, Array, Learner, Trace
 from fireworld.kernels.choice import table_state
 from fireworld.kernels.learning import EXPLORED, GREEDY, choose_and_learn, take_reward
+from fireworld.kernels.own_reward import note_worth, own_rewards
 from fireworld.policy.kernel import KernelPolicy, from_tables
 from fireworld.policy.names import TEAM_ATTACHMENT
 from fireworld.policy.protocol import Decision, Observation, Policy
@@ -25,6 +26,7 @@ from fireworld.records import CityRecord, RunHeader, StepRecord, Steps
 from fireworld.simulation.built import BuiltScenario
 from fireworld.simulation.observer import Observer
 from fireworld.simulation.state import fresh_learner
+from fireworld.simulation.world import World
 from fireworld.training.log.records import TERM_NAMES, Episode
 from fireworld.training.method import Trainer
 from fireworld.training.methods.sarsa import RULES, Sarsa, SarsaTrainer
@@ -33,7 +35,7 @@ LEARNING_ATTACHMENT: Final = "learning.json"
 POLICY_NAME: Final = "learning"
 
 
-class Learning(msgspec.Struct, frozen=True, kw_only=True):
+class Learning(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """How a team learns in an episode; recorded with its run, beside the tables before it."""
 
     method: str
@@ -45,6 +47,8 @@ class Learning(msgspec.Struct, frozen=True, kw_only=True):
     alpha_decay: float
     gamma: float
     commit: int
+    own: bool = False
+    """Brigades learn from their own doing."""
 
 
 class LearningPolicy(Policy):
@@ -63,6 +67,7 @@ class LearningPolicy(Policy):
             alpha=learning.alpha,
             alpha_decay=learning.alpha_decay,
             gamma=learning.gamma,
+            own=learning.own,
         )._replace(visits=team.visits.copy())
         self._epsilon = learning.epsilon
         self._chooser: KernelPolicy = from_tables(tables, epsilon=learning.epsilon, commit=learning.commit)
@@ -81,9 +86,12 @@ class LearningPolicy(Policy):
         """Return whether a brigade repeats what it chose before."""
         return self._chooser.keeps(brigade, last_action, step)
 
-    def take(self, reward: float) -> None:
-        """Take the reward of a step."""
-        take_reward(reward, self.learner)
+    def take(self, world: World, codes_before: Array) -> None:
+        """Take the reward of a step that is done; (n,) codes of the buildings when it was decided."""
+        state, learner, weights = world.state, self.learner, world.constants.reward.weights
+        note_worth(state.brigades, codes_before, weights, learner.own)
+        own_rewards(state.brigades, state.fire.fieryness, weights, learner.own)
+        take_reward(float(state.outcome.reward[TOTAL]), learner)
 
 
 class LearningRun:
@@ -111,9 +119,11 @@ class LearningRun:
         observer = Observer(world)
         yield observer.record()
         while not (world.terminated or world.truncated):
+            world.look()
+            codes = world.state.fire.fieryness.copy()
             choices = world.step(policy)
             errors = policy.learner.td_error.copy()
-            policy.take(float(world.state.outcome.reward[TOTAL]))
+            policy.take(world, codes)
             record = observer.record(choices)
             yield replace(record, decisions=replace(record.decisions, td_error=errors))
 
@@ -151,6 +161,7 @@ def episode_run(trainer: SarsaTrainer, episode: Episode, tables: Array, visits: 
         episode=episode.episode,
         epsilon=episode.epsilon,
         **{name: getattr(method, name) for name in ("rule", "alpha", "alpha_decay", "gamma", "commit")},
+        own=method.learns_from_own,
     )
     provenance = {**trainer.identity, "scenarios_done": episode.scenario}
     team = TableTeam(tables=tables, visits=visits, provenance=provenance)
@@ -227,7 +238,7 @@ def _check_step(record: StepRecord, trace: Trace, episode: Episode, *, source: s
         "states": (trace.state[looked, row], record.observations.state_index[looked]),
         "actions": (np.where(chose > 0, trace.action[:, row].astype(np.int64), -1), decisions.action),
         "explored": (chose == EXPLORED, decisions.explored.astype(bool)),
-        "rewards": (trace.reward[:, row], np.array([getattr(record.rewards, name) for name in TERM_NAMES])),
+        "rewards": (trace.reward[:TOTAL, row], np.array([getattr(record.rewards, name) for name in TERM_NAMES])),
     }
     for name, (wanted, got) in pairs.items():
         if not np.array_equal(wanted, got):

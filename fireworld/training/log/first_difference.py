@@ -229,9 +229,23 @@ def _first_in_steps(x: LearnedEpisode, y: LearnedEpisode) -> dict[str, Any] | No
             u, v = x.reward[term, row], y.reward[term, row]
             what = f"reward {TERM_NAMES[term].replace('_', ' ')}"
             return {"step": row + 1, "phase": "reward", "what": what, "a": f"{u:.12g}", "b": f"{v:.12g}"}
+        found = _of_own_reward(x, y, row)
+        if found is not None:
+            return found
     n_steps = x.record.n_steps, y.record.n_steps
     if n_steps[0] != n_steps[1]:
         return {"phase": "end", "what": "", "a": f"{n_steps[0]} steps", "b": f"{n_steps[1]} steps"}
+    return None
+
+
+def _of_own_reward(x: LearnedEpisode, y: LearnedEpisode, row: int) -> dict[str, Any] | None:
+    """Return how what a brigade got for its own doing differs, where both teams learn from that."""
+    if row < min(x.own_reward.shape[1], y.own_reward.shape[1]):
+        for brigade in range(min(len(x.own_reward), len(y.own_reward))):
+            u, v = x.own_reward[brigade, row], y.own_reward[brigade, row]
+            if u != v:
+                both = {"a": f"{u:.12g}", "b": f"{v:.12g}"}
+                return {"step": row + 1, "brigade": brigade, "phase": "reward", "what": "own reward", **both}
     return None
 
 

@@ -266,5 +266,5 @@ def _moves(found: LearnedEpisode, state: int) -> Iterator[Move]:
                     value_before=float(found.value_before[brigade, update]),
                     value_after=float(found.value_after[brigade, update]),
                     td_error=float(found.td_error[brigade, update]),
-                    reward=float(found.reward[:, row].sum()) if row < found.record.n_steps else 0.0,
+                    reward=found.learned_reward(brigade, row),
                 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from fireworld.kernels.arrays import TOTAL
 from fireworld.records import Array
 from fireworld.scenario import Scenario
 from fireworld.training.log.records import Episode
@@ -25,6 +26,7 @@ class LearnedEpisode:
         action: (b, k) what it did.
         choice: (b, k) how it came to that, a position in `fireworld.records.CHOICES`.
         reward: (terms, steps) of the team, by term.
+        own_reward: (b, steps) what each brigade got, if they learn from their own doing; else (0, steps).
         value_before: (b, steps + 1) the value that was updated in each step: that of the choice before; nan where there
             was no update. The last column has the updates that end the episode.
         td_error: (b, steps + 1) the error of the update.
@@ -40,10 +42,17 @@ class LearnedEpisode:
     action: Array
     choice: Array
     reward: Array
+    own_reward: Array
     value_before: Array
     td_error: Array
     value_after: Array
     tables_after: Array
+
+    def learned_reward(self, brigade: int, row: int) -> float:
+        """Return what a brigade learned from in a step, `row` from 0; 0 after the last one."""
+        if row >= self.record.n_steps:
+            return 0.0
+        return float(self.own_reward[brigade, row] if len(self.own_reward) else self.reward[:, row].sum())
 
 
 def learned(trainer: SarsaTrainer, record: Episode, scenario: Scenario) -> LearnedEpisode:
@@ -64,7 +73,8 @@ def learned(trainer: SarsaTrainer, record: Episode, scenario: Scenario) -> Learn
         state=trace.state[:, :n_choices],
         action=trace.action[:, :n_choices],
         choice=trace.choice[:, :n_choices],
-        reward=trace.reward,
+        reward=trace.reward[:TOTAL],
+        own_reward=trace.reward[TOTAL:],
         value_before=updates[0],
         td_error=updates[1],
         value_after=updates[2],

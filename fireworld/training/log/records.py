@@ -95,7 +95,11 @@ class Episode:
         21, "uint8", "how it came to that: 0 none, 1 greedy, 2 explored, 3 kept", per="choice", names=CHOICES
     )
     reward: Array = column(
-        22, "double", f"the team's reward, term by term through all steps: {', '.join(TERM_NAMES)}", per="step"
+        22,
+        "double",
+        f"the team's reward, term by term through all steps: {', '.join(TERM_NAMES)}; then, where brigades learn from "
+        "their own doing, what each of them got",
+        per="step",
     )
 
     @property
@@ -110,7 +114,8 @@ class Episode:
             LogError: they are not of that many brigades and of this number of steps.
         """
         n, n_rows = self.n_steps, self.n_choices
-        fits = n >= 1 and len(self.reward) == n * len(TERM_NAMES)
+        own = n >= 1 and len(self.reward) == n * (len(TERM_NAMES) + n_brigades)
+        fits = own or (n >= 1 and len(self.reward) == n * len(TERM_NAMES))
         if not fits or any(len(one) != n_brigades * n_rows for one in (self.state, self.action, self.choice)):
             raise LogError(f"episode {self.episode}: its columns are not those of {n_brigades} brigades and {n} steps")
         if max(self.action, default=0) >= len(ACTIONS) or max(self.choice, default=0) >= len(CHOICES):
@@ -118,12 +123,12 @@ class Episode:
         looked = self.state[(self.choice == GREEDY) | (self.choice == EXPLORED)]
         if len(looked) and not 0 <= looked.min() <= looked.max() < N_STATES:
             raise LogError(f"episode {self.episode}: a choice in a state that there is not")
-        trace = fresh_trace(n_brigades, n)
+        trace = fresh_trace(n_brigades, n, own=own)
         for name in ("state", "action", "choice"):
             getattr(trace, name)[:, :n_rows] = getattr(self, name).reshape(n_brigades, n_rows)
         if ((trace.choice[:, -1] == KEPT) & ~((trace.state[:, -1] >= 0) & (trace.state[:, -1] < N_STATES))).any():
             raise LogError(f"episode {self.episode}: a choice in a state that there is not")
-        trace.reward[:] = self.reward.reshape(len(TERM_NAMES), n)
+        trace.reward[:] = self.reward.reshape(-1, n)
         return trace
 
 

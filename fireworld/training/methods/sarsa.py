@@ -13,7 +13,7 @@ import numpy as np
 from fireworld.draws import TABLE, below
 from fireworld.errors import LogError, TrainingError, expected
 from fireworld.executors import Workers
-from fireworld.kernels.arrays import Array, Learner, PolicyArrays, Trace
+from fireworld.kernels.arrays import TOTAL, Array, Learner, PolicyArrays, Trace
 from fireworld.kernels.learning import UNTRIED, learn_again
 from fireworld.policy.kernel import from_tables
 from fireworld.policy.teams.table_team import COMMIT_MAX, TableTeam, agreement, tables_digest
@@ -76,14 +76,25 @@ class Sarsa(Method):
     """All brigades learn into one table."""
     fixed_noise: bool = False
     """Every episode of a scenario has the same random draws."""
-    reward: Kind = "stock"
-    """The weighted terms at every step, as in the paper; or how their sum changed. The weights are the scenario's."""
+    reward: Literal["stock", "change", "own"] = "stock"
+    """The weighted terms at every step, as in the paper; how their sum changed; or, for each brigade its own, how what
+    the building that it sprayed counts in that sum changed. The weights are the scenario's."""
     choices: Literal["in-turn", "simultaneous"] = "in-turn"
     """Whether brigades see what those before them chose in this step."""
     commit: Commit = 1
     """Steps that a choice is kept for."""
     draw_last: bool = False
     """After the last scenario, too, one table is drawn for all: brigades are tested with the same one."""
+
+    @property
+    def learns_from_own(self) -> bool:
+        """Whether each brigade learns from a reward of its own."""
+        return self.reward == "own"
+
+    @property
+    def team_reward(self) -> Kind:
+        """What the team's reward is meanwhile."""
+        return "change" if self.reward == "own" else self.reward
 
     def epsilon(self, episode: int, *, before: int) -> float:
         """Return the probability of exploring.
@@ -298,7 +309,10 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
             LogError: the columns of the episode are not those of an episode of its scenario.
         """
         built = self._built(episode.scenario)
-        policy, learner = self._learning(built.n_brigades, episode.epsilon, trace=episode.trace(built.n_brigades))
+        trace = episode.trace(built.n_brigades)
+        if (len(trace.reward) > TOTAL) != self.method.learns_from_own:
+            raise LogError(f"episode {episode.episode}: rewards that are not those of reward {self.method.reward}")
+        policy, learner = self._learning(built.n_brigades, episode.epsilon, trace=trace)
         updates = np.empty((3, built.n_brigades, episode.n_steps + 1))
         learn_again(policy.table_of, episode.epsilon, learner, episode.n_steps, episode.terminated, updates)
         self.progress.tables = policy.tables
@@ -352,7 +366,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
     def build(self, scenario: Scenario) -> BuiltScenario:
         """Build a scenario as it is learned in: with the choices and the reward of the method."""
         varied = msgspec.structs.replace(scenario, choices=self.method.choices)
-        return self._cities.build(with_kind(varied, self.method.reward))
+        return self._cities.build(with_kind(varied, self.method.team_reward))
 
     def _built(self, number: int) -> BuiltScenario:
         """Build a scenario of the curriculum, unless it is the one that was built last."""
@@ -371,6 +385,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
             alpha=method.alpha,
             alpha_decay=method.alpha_decay,
             gamma=method.gamma,
+            own=method.learns_from_own,
         )
         return policy, learner._replace(visits=progress.visits, trace=trace)
 
@@ -381,7 +396,7 @@ class SarsaTrainer(Trainer[Sarsa, EpisodeReport]):
         seed = episode_seed(self.seed, number, 0 if method.fixed_noise else episode)
         world = built.world(seed=seed)
         traced = self.recording or self.watched
-        trace = fresh_trace(built.n_brigades, world.n_steps_max if traced else 0)
+        trace = fresh_trace(built.n_brigades, world.n_steps_max if traced else 0, own=method.learns_from_own)
         policy, learner = self._learning(built.n_brigades, epsilon, trace=trace)
         before = progress.tables.argmax(axis=2)
         keeps = self.watched or self.detailed or (self.full_every > 0 and episode % self.full_every == 0)

@@ -74,8 +74,8 @@ def test_whole_episodes_are_written_at_once_as_replay_writes_them(curriculum, ma
 
 def test_an_episode_that_comes_out_otherwise_is_not_written(make_log, tmp_path, monkeypatch):
     log = open_training(make_log())
-    take = episode_run.LearningPolicy.take
-    monkeypatch.setattr(episode_run.LearningPolicy, "take", lambda self, reward: take(self, 2 * reward))
+    take = episode_run.take_reward
+    monkeypatch.setattr(episode_run, "take_reward", lambda reward, learner: take(2 * reward, learner))
     n_refused = 0
     for number, line in enumerate(log.lines):
         path = tmp_path / f"{number}.mcap"
