@@ -39,6 +39,14 @@ BEGINNING: Final = 14
 """Purpose: the first weights of a network that evolves. Entity: weight."""
 CHECK: Final = 15
 """Purpose: the seed of a fight by which it is decided which team of a training is kept. Entity: scenario."""
+MOMENT: Final = 16
+"""Purpose: whether options are tried out in a step of a training. Entity: 0."""
+OPTION: Final = 17
+"""Purpose: whose options are tried out in a step, and which. Entity: brigade, or brigades + building."""
+ROLLOUT: Final = 18
+"""Purpose: the seeds by which options are tried out in a step. Entity: rollout."""
+SHUFFLE: Final = 19
+"""Purpose: the order in which a network learns from decisions. Entity: decision; step: epoch of all."""
 
 MASK: Final = (1 << 64) - 1
 INCREMENT: Final = 0x9E3779B97F4A7C15

@@ -13,10 +13,8 @@ from fireworld.errors import LogError, TrainingError, expected
 from fireworld.kernels.arrays import Array
 from fireworld.kernels.observation import find_target
 from fireworld.kernels.ranking import N_TARGET_FEATURES
-from fireworld.kernels.ranks import fresh_ranks
-from fireworld.kernels.seen_targets import see_targets
-from fireworld.kernels.situation import N_SEEN
 from fireworld.policy.protocol import Decision, Observation, Policy
+from fireworld.policy.seen_targets import seen_targets
 from fireworld.policy.teams.network_layers import SEEN, Layer
 from fireworld.policy.teams.network_team import NetworkTeam
 from fireworld.policy.teams.ranking_team import RankingTeam
@@ -197,10 +195,8 @@ def _preference(team: RankingTeam | NetworkTeam, observation: Observation, made:
 
 def _options(observation: Observation, *, own_targets: bool) -> tuple[list[int], Array]:
     """Return the targets among which a team chooses, and what the brigade sees of each, (k, 30)."""
-    city, world, burning = observation.city, observation.world, observation.burning.tolist()
-    seen = np.zeros((len(burning), N_SEEN))
-    ranks = fresh_ranks(len(observation.known_targets), len(world.fire.energy))
-    see_targets(observation.brigade, observation.step, observation.known_targets, observation.sight, ranks, seen)
+    city, world = observation.city, observation.world
+    burning, seen = seen_targets(observation)
     if own_targets:
         return burning, seen
     where = world.brigades, city.buildings, world.fire, city.geometry, world.sites

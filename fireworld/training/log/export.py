@@ -21,7 +21,7 @@ from fireworld.rewards import TERMS
 from fireworld.training.log.learned import LearnedEpisode
 from fireworld.training.log.played import Played
 from fireworld.training.log.reader import Part, TrainingLog
-from fireworld.training.log.records import Episode, Evolved, Lesson, Tables, Tried
+from fireworld.training.log.records import Episode, Evolved, Improved, Lesson, Tables, Tried
 from fireworld.training.log.rows_file import SUFFIX, Rows, RowsFile, check_pyarrow
 
 TABLES: Final[Mapping[str, str]] = {
@@ -35,6 +35,8 @@ TABLES: Final[Mapping[str, str]] = {
     "lesson_fights": "a fight of a lesson",
     "evolved": "a generation of an evolution: how its candidates fared, and what the checks said",
     "evolved_fights": "a candidate on a fire of its generation",
+    "improved": "a generation of improvement by rollouts: its fights, what it learned from, and what the checks said",
+    "improved_fights": "a fight in which options were tried",
     "played": "an episode that a learner played: how it went",
     "actions": "a brigade in a step of an episode that a learner played: what it did, as far as it is known",
 }
@@ -44,6 +46,7 @@ OF_KIND: Final[Mapping[type[Any], tuple[str, ...]]] = {
     Tried: ("generations", "candidates", "fights"),
     Lesson: ("lessons", "lesson_fights"),
     Evolved: ("evolved", "evolved_fights"),
+    Improved: ("improved", "improved_fights"),
     Played: ("played", "actions"),
 }
 
@@ -83,6 +86,8 @@ def rows_of(log: TrainingLog, names: Collection[str]) -> Iterator[tuple[str, Row
             yield from _lesson_rows(part[Lesson], scenarios, names)
         elif Evolved in part:
             yield from _evolved_rows(part[Evolved], scenarios, names)
+        elif Improved in part:
+            yield from _improved_rows(part[Improved], scenarios, names)
 
 
 def table_arrays(log: TrainingLog, name: str) -> Rows:
@@ -189,6 +194,17 @@ def _evolved_rows(evolved: Evolved, scenarios: list[str], names: Collection[str]
     if "evolved_fights" in names:
         scores = evolved.scores.reshape(-1, len(evolved.fire))
         yield "evolved_fights", _fight_rows(evolved, scores, scenarios)
+
+
+def _improved_rows(improved: Improved, scenarios: list[str], names: Collection[str]) -> Iterator[tuple[str, Rows]]:
+    if "improved" in names:
+        values = {item.name: getattr(improved, item.name) for item in fields(improved) if "per" not in item.metadata}
+        yield "improved", {name: np.array([one]) for name, one in values.items()}
+    if "improved_fights" in names:
+        place = {"generation": np.full(len(improved.fire), improved.generation)}
+        fires = np.array([scenarios[k] for k in improved.fire], dtype=object)
+        columns = {name: getattr(improved, name) for name in ("seed", "score", "n_tried")}
+        yield "improved_fights", {**place, "scenario": fires, **columns}
 
 
 def _lesson_rows(lesson: Lesson, scenarios: list[str], names: Collection[str]) -> Iterator[tuple[str, Rows]]:

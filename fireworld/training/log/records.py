@@ -273,6 +273,32 @@ class Evolved:
 
 
 @dataclass(frozen=True)
+class Improved:
+    """A generation in which a network learned from rollouts: the fights in which options were tried, and what came.
+
+    The options that were tried follow from the seeds and the network before it.
+    """
+
+    topic: ClassVar[str] = "/improved"
+    generation: int = value(1, "sfixed32", "its number, from 0")
+    score_mean: float = value(2, "double", "of its fights, as a share of the maximum; all conditions count equally")
+    n_decisions: int = value(3, "sfixed32", "decisions whose options were tried")
+    gain: float = value(
+        4,
+        "double",
+        "how much more, on the mean, rollouts came to after what the network after it prefers than after what was done",
+    )
+    score_checked: float = value(5, "double", "of the network after it on all fires")
+    score_kept: float = value(6, "double", "the best of those: that of the team")
+    fire: Array = column(7, "sfixed32", "the scenario of each fight, a position in /plan", per="fire")
+    seed: Array = column(8, "fixed64", "of its random draws", per="fire")
+    score: Array = column(9, "double", "at its end, as a share of the maximum", per="fire")
+    n_tried: Array = column(10, "sfixed32", "decisions of it whose options were tried", per="fire")
+    numbers: Array = column(11, "double", "biases and weights of the network after it, layer by layer", per="weight")
+    kept: Array = column(12, "double", "biases and weights of the team", per="weight")
+
+
+@dataclass(frozen=True)
 class PartCommit:
     """The end of a part, an episode or a generation: without it the part does not count."""
 
@@ -301,7 +327,7 @@ def check_places(record: Any, n_brigades: Sequence[int]) -> None:
     """
     fights = ("fire", "seed")
     places = {Episode: ("scenario", "seed"), Played: ("scenario", "seed"), Tried: fights}
-    places |= {Lesson: fights, Evolved: fights}
+    places |= {Lesson: fights, Evolved: fights, Improved: fights}
     fires = places.get(type(record))
     if fires is None:
         return
@@ -314,6 +340,8 @@ def check_places(record: Any, n_brigades: Sequence[int]) -> None:
         check_played(record, n_brigades[record.scenario])
     if isinstance(record, Lesson) and len({*map(len, (record.fire, record.seed, record.score, record.n_steps))}) > 1:
         raise LogError(f"{record.topic}: its columns are not of the same fights")
+    if isinstance(record, Improved) and not _fits_improved(record):
+        raise LogError(f"{record.topic}: its columns are not of the same fights, or of the same networks")
     if isinstance(record, Tried) and not _fits(record):
         raise LogError(f"{record.topic}: its columns are not of the same rankings, weights and fires")
     if isinstance(record, Evolved) and not _fits_evolved(record):
@@ -338,13 +366,19 @@ def _fits_evolved(evolved: Evolved) -> bool:
     return n_fires > 0 and len(evolved.scores) % (2 * n_fires) == 0
 
 
+def _fits_improved(improved: Improved) -> bool:
+    """Return whether the columns of a generation are of the same fights and networks."""
+    of_fights = {*map(len, (improved.fire, improved.seed, improved.score, improved.n_tried))}
+    return len(of_fights) == 1 and len(improved.numbers) == len(improved.kept)
+
+
 TRAINING: Final = LogKind(
     format=FORMAT,
     metadata_name="fireworld.training",
     header_type=TrainingHeader,
     commit_type=PartCommit,
     first_type=Plan,
-    topics=(Plan, Episode, Tables, Updates, Tried, Lesson, Evolved, Played, PartCommit),
+    topics=(Plan, Episode, Tables, Updates, Tried, Lesson, Evolved, Improved, Played, PartCommit),
     unchained=frozenset({Tables.topic, Updates.topic}),
     unit="part",
     rescue="--resume to continue, or --force to begin again",

@@ -10,7 +10,7 @@ from typing import Any, Final
 from fireworld.shown import SHOWN_MAX, Block, TextTable
 from fireworld.training.log.played import Played
 from fireworld.training.log.reader import TrainingLog
-from fireworld.training.log.records import FORMAT, Episode, Evolved, Lesson, Tried
+from fireworld.training.log.records import FORMAT, Episode, Evolved, Improved, Lesson, Tried
 from fireworld.training.log.spread import LAST
 from fireworld.version import simulator_version
 
@@ -109,6 +109,14 @@ COLUMNS: Final[Mapping[type[Any], Mapping[str, tuple[str, str]]]] = {
         "generation": ("generation", "d"),
         "score": ("score_mean", ".3f"),
         "of the best": ("score_best", ".3f"),
+        "on all fires": ("score_checked", ".3f"),
+        "of the team": ("score_kept", ".3f"),
+    },
+    Improved: {
+        "generation": ("generation", "d"),
+        "score": ("score_mean", ".3f"),
+        "decisions": ("n_decisions", ",d"),
+        "gain": ("gain", ".5f"),
         "on all fires": ("score_checked", ".3f"),
         "of the team": ("score_kept", ".3f"),
     },

@@ -11,34 +11,22 @@ from typing import Annotated, Any, ClassVar, Final, Literal
 
 import numpy as np
 
-from fireworld.draws import BEGINNING, WEIGHT
-from fireworld.errors import LogError, TrainingError, expected
+from fireworld.draws import WEIGHT
+from fireworld.errors import LogError
 from fireworld.kernels.arrays import Array
 from fireworld.kernels.draws import fill_normals
-from fireworld.kernels.ranking import N_TARGET_FEATURES
-from fireworld.policy.kernel import KernelPolicy, from_network
-from fireworld.policy.teams.network_layers import OWN_SEEN, Layer, pack, unpack
-from fireworld.policy.teams.network_team import NetworkTeam
-from fireworld.policy.teams.npz import check_arrays, check_finite
-from fireworld.policy.teams.ranking_team import RankingTeam
-from fireworld.policy.teams.team import Team, load_team
+from fireworld.policy.teams.team import Team
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import Curriculum
-from fireworld.training.generations import GenerationMethod, GenerationTrainer
 from fireworld.training.log.records import Evolved
 from fireworld.training.method import Count, Limits, Positive, Report
-from fireworld.training.seeds import check_seed
+from fireworld.training.networks import Hidden, NetworkMethod, NetworkTrainer
 
-HIDDEN_MAX: Final = 256
-Hidden = Annotated[int, Limits(f"a whole number from 0 to {HIDDEN_MAX}", 0, HIDDEN_MAX)]
 Momentum = Annotated[float, Limits("a number from 0, below 1", 0.0, math.nextafter(1.0, 0.0))]
-ACTIVATION: Final = "relu"
-N_OF_RANKING: Final = 2
-"""Hidden units that compute a ranking: one its values above 0, one those below."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Evolution(GenerationMethod):
+class Evolution(NetworkMethod):
     """Evolution of a network that values targets."""
 
     name: ClassVar[str] = "evolution"
@@ -63,13 +51,6 @@ class Evolution(GenerationMethod):
     """Share of the direction that is left from generation to generation."""
     check_every: Count = 5
     """Generations from one check of the mean on all fires to the next; the best mean that was checked is the team."""
-
-    def __post_init__(self) -> None:
-        """Raise TrainingError if a hyperparameter is not what it may be."""
-        super().__post_init__()
-        if self.start == "best" and 0 < self.hidden < N_OF_RANKING:
-            wanted = f"0, or at least {N_OF_RANKING}, which a ranking takes (start best)"
-            raise TrainingError(expected("method", "hidden", wanted, self.hidden))
 
     def trainer(self, curriculum: Curriculum, *, seed: int, cities: CityCache | None = None) -> EvolutionTrainer:
         """Return what trains one team; see `Method.trainer`."""
@@ -121,7 +102,7 @@ class Progress:
     score_kept: float = 0.0
 
 
-class EvolutionTrainer(GenerationTrainer[Evolution, Generation]):
+class EvolutionTrainer(NetworkTrainer[Evolution, Generation]):
     """Evolves one network, a report after every generation; arguments as for `Method.trainer`.
 
     The stages of the curriculum are the conditions; all of them count equally.
@@ -139,29 +120,18 @@ class EvolutionTrainer(GenerationTrainer[Evolution, Generation]):
         self, curriculum: Curriculum, method: Evolution, *, seed: int, cities: CityCache | None = None
     ) -> None:
         super().__init__(curriculum, method, seed=seed, cities=cities)
-        self._widths = [len(OWN_SEEN), *([method.hidden] if method.hidden else []), 1]
-        self._conditions = _conditions(curriculum)
-        self._start = load_team("best") if method.start == "best" else None
-        first = _first_numbers(self._widths, self._start, seed)
-        self._packed = pack(unpack(first, self._widths), self._activations, OWN_SEEN)
         self._evolved: Evolved | None = None
-        self.progress = Progress(0, first, np.zeros(len(first)), first)
-
-    @property
-    def identity(self) -> dict[str, Any]:
-        """What decides what comes of a training; of the team that it starts with the digest."""
-        return {**super().identity, **({} if self._start is None else {"start": self._start.digest})}
+        self.progress = Progress(0, self._first, np.zeros(len(self._first)), self._first)
 
     @property
     def generation(self) -> int:
         """How many generations are done."""
         return self.progress.generation
 
-    def team(self) -> NetworkTeam:
-        """Return the best mean that was checked so far; before the first generation what it starts with."""
-        provenance = {**self.identity, "generations_done": self.generation}
-        layers = unpack(self.progress.kept, self._widths)
-        return NetworkTeam(layers, self._activations, OWN_SEEN, own_targets=True, provenance=provenance)
+    @property
+    def kept(self) -> Array:
+        """The numbers of the best mean that was checked."""
+        return self.progress.kept
 
     def state(self) -> dict[str, Array]:
         """Return the generation, the mean, the direction of its moves, and the scores of the checks."""
@@ -175,20 +145,9 @@ class EvolutionTrainer(GenerationTrainer[Evolution, Generation]):
 
     def restore(self, team: Team, state: Mapping[str, Array], *, source: str) -> None:
         """Continue where another trainer stood; see `Trainer.restore`."""
-        check_arrays(state, "generation", "mean", "direction", "checks", source=source)
         n = len(self.progress.mean)
-        for name, wanted in (("mean", n), ("direction", n), ("checks", 2)):
-            array = state[name]
-            if array.shape != (wanted,) or array.dtype != np.float64:
-                raise TrainingError(expected(source, name, f"{wanted} numbers", f"{array.dtype} {array.shape}"))
-            check_finite(array, name, source=source)
+        kept = self._check_state(team, state, ("mean", n), ("direction", n), ("checks", 2), source=source)
         generation = self._generation_of(state, source=source)
-        if not isinstance(team, NetworkTeam):
-            raise TrainingError(expected(source, "", NetworkTeam.what, team.what))
-        if list(team.widths) != self._widths or team.features != OWN_SEEN or team.activations != self._activations:
-            wanted_team = f"a network of {'-'.join(map(str, self._widths))}"
-            raise TrainingError(expected(source, "", wanted_team, team.summary))
-        kept = pack(team.layers, team.activations, team.features).number
         checked, best = state["checks"].tolist()
         self.progress = Progress(generation, state["mean"].copy(), state["direction"].copy(), kept, checked, best)
 
@@ -204,10 +163,6 @@ class EvolutionTrainer(GenerationTrainer[Evolution, Generation]):
             raise LogError(f"a part holds no generation of networks of {n} numbers")
         return self._end_generation(evolved)
 
-    def own_plots(self) -> Mapping[str, str]:
-        """Return the plot of the conditions, if there are several."""
-        return {"conditions": "Score by condition"} if len(self._conditions) > 1 else {}
-
     def points(self, report: Generation) -> Mapping[str, Mapping[str, float]]:
         """Return what is drawn of the last generation."""
         conditions = {"conditions": self._score_by_condition()} if len(self._conditions) > 1 else {}
@@ -216,10 +171,6 @@ class EvolutionTrainer(GenerationTrainer[Evolution, Generation]):
             "check": {"last": report.score_checked, "of the team": report.score_kept},
             **conditions,
         }
-
-    def policy_of(self, numbers: Array) -> KernelPolicy:
-        """Return the policy of a team whose brigades all follow the network of these numbers, (k,) float64."""
-        return from_network(self._packed._replace(number=numbers), own_targets=True)
 
     def candidates(self) -> tuple[Array, Array]:
         """Return the noise of each pair in this generation, (pairs, k), and its candidates, (2 pairs, k) float64.
@@ -231,10 +182,6 @@ class EvolutionTrainer(GenerationTrainer[Evolution, Generation]):
         fill_normals(self.seed, WEIGHT, self.generation, noise)
         noise[:, -1 - self._widths[-2]] = 0.0  # the last bias, which all targets get alike
         return noise, np.concatenate([mean + method.noise * noise, mean - method.noise * noise])
-
-    @property
-    def _activations(self) -> tuple[str, ...]:
-        return (ACTIVATION,) * (len(self._widths) - 2)
 
     def _generation(self, pool: Executor, stop: Event) -> Generation | None:
         """Let all candidates fight, move the mean, and check it if it is time."""
@@ -302,13 +249,6 @@ class EvolutionTrainer(GenerationTrainer[Evolution, Generation]):
                 found = replace(found, score_kept=score, kept=numbers)
         return found
 
-    def _score_on_all(self, pool: Executor, stop: Event, numbers: Array) -> float | None:
-        """Return the score of a network on all fires, one whole fight with each; None if the work is to stop."""
-        fires = [*range(self.curriculum.n_scenarios)]
-        seeds = [check_seed(self.seed, fire) for fire in fires]
-        scores = self._scores(pool, stop, numbers[np.newaxis], fires, seeds, whole=True)
-        return None if scores is None else self._mean(scores[0].tolist(), fires)
-
     def _fires_of_generation(self) -> list[int]:
         """Draw as many fires of each condition; those that are left over go to one condition after another in turn."""
         n = len(self._conditions)
@@ -318,20 +258,6 @@ class EvolutionTrainer(GenerationTrainer[Evolution, Generation]):
             turn = (place - self.generation * left) % n
             fires += self._draw_fires(among, each + (1 if turn < left else 0))
         return fires
-
-    def _by_condition(self, scores: Sequence[float], fires: Sequence[int]) -> dict[str, float]:
-        """Return the mean score of each condition that has some of the fires; a score for each fire."""
-        found = dict[str, float]()
-        for name, among in self._conditions.items():
-            mine = [score for fire, score in zip(fires, scores, strict=True) if fire in among]
-            if mine:
-                found[name] = math.fsum(mine) / len(mine)
-        return found
-
-    def _mean(self, scores: Sequence[float], fires: Sequence[int]) -> float:
-        """Return the mean score, all conditions that were fought in counting equally."""
-        conditions = self._by_condition(scores, fires)
-        return math.fsum(conditions.values()) / len(conditions)
 
     def _score_by_condition(self) -> dict[str, float]:
         """Return the mean score of all candidates of the last generation in each condition that they fought in."""
@@ -362,34 +288,3 @@ def _moved(progress: Progress, noise: Array, ranks: Sequence[float], method: Evo
     direction = method.momentum * progress.direction + (1.0 - method.momentum) * new
     mean = progress.mean + method.rate * direction
     return replace(progress, generation=progress.generation + 1, mean=mean, direction=direction)
-
-
-def _conditions(curriculum: Curriculum) -> dict[str, range]:
-    """Return the numbers of the scenarios of each stage, by its name."""
-    found, first = dict[str, range](), 0
-    for stage in curriculum.stages:
-        found[stage.name] = range(first, first + len(stage.scenarios))
-        first += len(stage.scenarios)
-    return found
-
-
-def _first_numbers(widths: Sequence[int], start: Team | None, seed: int) -> Array:
-    """Return a network before the first generation: it values targets as a ranking does, or all of them 0.
-
-    Weights of hidden units that do not compute the ranking are drawn; what they say counts 0.
-    """
-    ranking = np.zeros(len(OWN_SEEN))
-    if start is not None:
-        if not isinstance(start, RankingTeam) or not start.own_targets or len(start.weights) != 1:
-            raise TrainingError(expected("method", "start", "best to be one ranking of own targets", start.summary))
-        ranking[:N_TARGET_FEATURES] = start.weights[0, :N_TARGET_FEATURES]
-    if len(widths) == N_OF_RANKING:
-        return pack([Layer(ranking[:, np.newaxis], np.zeros(1))], (), OWN_SEEN).number
-    n_in, hidden, _ = widths
-    weights, values = np.zeros((n_in, hidden)), np.zeros((hidden, 1))
-    fill_normals(seed, BEGINNING, 0, weights)
-    weights /= math.sqrt(n_in)
-    if start is not None:
-        weights[:, 0], weights[:, 1], values[0], values[1] = ranking, -ranking, 1.0, -1.0
-    layers = [Layer(weights, np.zeros(hidden)), Layer(values, np.zeros(1))]
-    return pack(layers, (ACTIVATION,), OWN_SEEN).number

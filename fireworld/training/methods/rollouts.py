@@ -1,0 +1,284 @@
+"""Rollouts: improve a network that values targets by what the options of its own decisions come to. MODEL 11."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from threading import Event
+from typing import Any, ClassVar, Final, Literal
+
+import numpy as np
+
+from fireworld.draws import FIRE, SHUFFLE, hash_key
+from fireworld.errors import LogError
+from fireworld.kernels.arrays import Array
+from fireworld.kernels.fitting import Fitting, fit_once, gain
+from fireworld.kernels.network import widest
+from fireworld.kernels.situation import N_SEEN
+from fireworld.policy.teams.team import Team
+from fireworld.simulation.built import CityCache
+from fireworld.simulation.state import fresh_target_learner
+from fireworld.training.curriculum import Curriculum
+from fireworld.training.log.records import Improved
+from fireworld.training.method import Count, Positive, PositiveShare, Report
+from fireworld.training.networks import Hidden, NetworkMethod, NetworkTrainer
+from fireworld.training.options import Trial, TriedDecision, try_options
+from fireworld.training.seeds import fight_seed
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rollouts(NetworkMethod):
+    """Improvement of a network that values targets by rollouts of its own decisions."""
+
+    name: ClassVar[str] = "rollouts"
+    curriculum: ClassVar[str] = "conditions"
+
+    hidden: Hidden = 24
+    """Numbers of the layer between the 26 features and the value, relu; 0: the value is one weighted sum."""
+    start: Literal["best", "none"] = "best"
+    """The network before the first generation: it values targets as the shipped ranking `best`, or all of them 0."""
+    n_generations: Count = 8
+    n_fights: Count = 2000
+    """Fights of a generation, the conditions in turn."""
+    n_steps_max: Count = 200
+    """Steps of such a fight at most; those of the checks are as long as the scenarios."""
+    share: PositiveShare = 0.25
+    """Of the first 12 steps of a fight in which options are tried out; then 12 / step of it."""
+    n_brigades: Count = 2
+    """Brigades whose options are tried out in such a step."""
+    n_options: Count = 7
+    """Targets that are tried out of each, its own choice among them."""
+    n_rollouts: Count = 2
+    """Rollouts of each target; the same random draws for all."""
+    commit: Count = 6
+    """Steps for which the brigade goes for the target, while that burns; then it decides as the team."""
+    horizon: Count = 50
+    """Steps of a rollout."""
+    n_epochs: Count = 60
+    """How often the network goes through the decisions of a generation."""
+    n_batch: Count = 512
+    """Decisions between two moves of the network."""
+    rate: Positive = 0.002
+    """Length of a move, of every number (Adam)."""
+    temperature: Positive = 0.1
+    """Differences of values that decide, while the network learns, how probable an option is."""
+    n_checks: Count = 2
+    """Fights with every fire after each generation; the best network so checked is the team."""
+
+    def trainer(self, curriculum: Curriculum, *, seed: int, cities: CityCache | None = None) -> RolloutsTrainer:
+        """Return what trains one team; see `Method.trainer`."""
+        return RolloutsTrainer(curriculum, self, seed=seed, cities=cities)
+
+    @property
+    def trial(self) -> Trial:
+        """How options are tried out."""
+        return Trial(self.share, self.n_brigades, self.n_options, self.n_rollouts, self.commit, self.horizon)
+
+
+METHOD: Final = Rollouts()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Generation(Report):
+    """What came of one generation."""
+
+    milestone: bool = True
+    generation: int
+    """From 0."""
+    n_generations: int
+    """In all."""
+    score_mean: float
+    """Of its fights, as a share of the maximum; all conditions count equally."""
+    n_decisions: int
+    """Whose options were tried."""
+    gain: float
+    """How much more rollouts came to after what the network prefers now, on the mean of these decisions."""
+    score_checked: float
+    """Of the network on all fires."""
+    score_kept: float
+    """The best of those: that of the team."""
+
+    @property
+    def text(self) -> str:
+        """The generation in one line."""
+        return (
+            f"generation {self.generation + 1} of {self.n_generations}, score {self.score_mean:.3f}, "
+            f"{self.n_decisions:,} decisions, gain {self.gain:.5f}, on all fires {self.score_checked:.3f}, "
+            f"of the team {self.score_kept:.3f}"
+        )
+
+
+@dataclass
+class Progress:
+    """How far a training has come: all that it needs to continue. Networks are (k,) float64."""
+
+    generation: int
+    numbers: Array
+    """The network whose fights come next."""
+    kept: Array
+    """The best one that was checked: the team."""
+    score_checked: float = 0.0
+    score_kept: float = 0.0
+
+
+class RolloutsTrainer(NetworkTrainer[Rollouts, Generation]):
+    """Improves one network, a report after every generation; arguments as for `Method.trainer`."""
+
+    report_type: ClassVar[type[Report]] = Generation
+    plots: ClassVar[Mapping[str, str]] = {
+        "score": "Score of the fights, as a share of the maximum",
+        "gain": "What the network gains on its decisions",
+        "check": "Score on all fires",
+    }
+    topics: ClassVar[tuple[type[Any], ...]] = (Improved,)
+    whole: ClassVar[type[Any] | None] = Improved
+
+    def __init__(self, curriculum: Curriculum, method: Rollouts, *, seed: int, cities: CityCache | None = None) -> None:
+        super().__init__(curriculum, method, seed=seed, cities=cities)
+        self._improved: Improved | None = None
+        self.progress = Progress(0, self._first, self._first)
+
+    @property
+    def generation(self) -> int:
+        """How many generations are done."""
+        return self.progress.generation
+
+    @property
+    def kept(self) -> Array:
+        """The numbers of the best network that was checked."""
+        return self.progress.kept
+
+    def state(self) -> dict[str, Array]:
+        """Return the generation, the network, and the scores of the checks."""
+        progress = self.progress
+        return {
+            "generation": np.array([progress.generation], dtype=np.int64),
+            "numbers": progress.numbers,
+            "checks": np.array([progress.score_checked, progress.score_kept]),
+        }
+
+    def restore(self, team: Team, state: Mapping[str, Array], *, source: str) -> None:
+        """Continue where another trainer stood; see `Trainer.restore`."""
+        n = len(self.progress.numbers)
+        kept = self._check_state(team, state, ("numbers", n), ("checks", 2), source=source)
+        generation, (checked, best) = self._generation_of(state, source=source), state["checks"].tolist()
+        self.progress = Progress(generation, state["numbers"].copy(), kept, checked, best)
+
+    def records(self) -> list[Any]:
+        """Return the last generation."""
+        return [self._improved]
+
+    def follow(self, part: Mapping[type[Any], Any]) -> Generation:
+        """Go through a generation that a training log holds; see `Trainer.follow`."""
+        improved: Improved | None = part.get(Improved)
+        n = len(self.progress.numbers)
+        if improved is None or {len(improved.numbers), len(improved.kept)} != {n}:
+            raise LogError(f"a part holds no generation of networks of {n} numbers")
+        return self._end_generation(improved)
+
+    def points(self, report: Generation) -> Mapping[str, Mapping[str, float]]:
+        """Return what is drawn of the last generation."""
+        improved = self._improved
+        conditions = {} if improved is None else self._by_condition(improved.score.tolist(), improved.fire.tolist())
+        return {
+            "score": {"": report.score_mean},
+            "gain": {"": report.gain},
+            "check": {"last": report.score_checked, "of the team": report.score_kept},
+            **({"conditions": conditions} if len(self._conditions) > 1 else {}),
+        }
+
+    def _generation(self, pool: Executor, stop: Event) -> Generation | None:
+        """Fight and try options out, learn from that, and check what was learned."""
+        method, before = self.method, self.progress
+        fires = [self._fire(fight) for fight in range(method.n_fights)]
+        seeds = [fight_seed(self.seed, fight, before.generation) for fight in range(method.n_fights)]
+        fights = [*pool.map(lambda one: self._try_out(one[0], one[1], stop), zip(fires, seeds, strict=True))]
+        if stop.is_set():
+            return None
+        decisions = [decision for _, tried in fights for decision in tried]
+        numbers, gained = self._learned(before.numbers, decisions)
+        checked = self._checked(pool, stop, before, numbers)
+        if checked is None:
+            return None
+        scores = [score for score, _ in fights]
+        improved = Improved(
+            generation=before.generation,
+            score_mean=self._mean(scores, fires),
+            n_decisions=len(decisions),
+            gain=gained,
+            score_checked=checked.score_checked,
+            score_kept=checked.score_kept,
+            fire=np.array(fires),
+            seed=np.array(seeds, dtype=np.uint64),
+            score=np.array(scores),
+            n_tried=np.array([len(tried) for _, tried in fights]),
+            numbers=numbers,
+            kept=checked.kept,
+        )
+        return self._end_generation(improved)
+
+    def _end_generation(self, improved: Improved) -> Generation:
+        """Continue with the next generation; return the report of this one."""
+        self._improved = improved
+        self.progress = Progress(
+            improved.generation + 1,
+            improved.numbers.copy(),
+            improved.kept.copy(),
+            improved.score_checked,
+            improved.score_kept,
+        )
+        named = ("generation", "score_mean", "n_decisions", "gain", "score_checked", "score_kept")
+        return Generation(n_generations=self.method.n_generations, **{name: getattr(improved, name) for name in named})
+
+    def _fire(self, fight: int) -> int:
+        """Draw the fire of a fight: the conditions come in turn."""
+        among = [*self._conditions.values()][fight % len(self._conditions)]
+        return among[hash_key(self.seed, FIRE, fight, self.generation) % len(among)]
+
+    def _try_out(self, fire: int, seed: int, stop: Event) -> tuple[float, list[TriedDecision]]:
+        """Fight a fire and try options out on the way; return the score, as a share of the maximum, and these."""
+        built = self._fires[fire]
+        world = built.world(seed=seed, n_steps_max=min(self.method.n_steps_max, built.scenario.steps))
+        tried = try_options(world, self.policy_of(self.progress.numbers), self.method.trial, stop)
+        return world.outcome.score_share, tried
+
+    def _learned(self, numbers: Array, decisions: Sequence[TriedDecision]) -> tuple[Array, float]:
+        """Return the numbers of a network that has learned from decisions, and what it gains on them."""
+        method, network = self.method, self._packed._replace(number=numbers.copy())
+        d, c = len(decisions), method.n_options
+        seen, worth = np.zeros((d, c, N_SEEN)), np.zeros((d, c))
+        n_options = np.array([len(one.worth) for one in decisions], dtype=np.int64)
+        for place, one in enumerate(decisions):
+            seen[place, : n_options[place]], worth[place, : n_options[place]] = one.seen, one.worth
+        k, work = len(numbers), np.zeros((2, widest(network)))
+        fitting = Fitting(
+            gradient=np.zeros(k),
+            mean=np.zeros(k),
+            square=np.zeros(k),
+            left=np.ones(2),
+            share=np.zeros(c),
+            work=work,
+            learner=fresh_target_learner(network, np.zeros(0), 0, decay=0.0, commit=1),
+        )
+        for epoch in range(method.n_epochs):
+            number = self.generation * method.n_epochs + epoch
+            keys = [hash_key(self.seed, SHUFFLE, place, number) for place in range(d)]
+            order = np.argsort(np.array(keys, dtype=np.uint64), kind="stable")
+            fit_once(network, seen, worth, n_options, order, method.n_batch, method.temperature, method.rate, fitting)
+        return network.number, gain(network, seen, worth, n_options, work)
+
+    def _checked(self, pool: Executor, stop: Event, before: Progress, numbers: Array) -> Progress | None:
+        """Return the progress with what the check says; before the first generation its start is checked, too."""
+        kept, score_kept = before.kept, before.score_kept
+        if before.generation == 0:
+            first = self._score_on_all(pool, stop, before.numbers)
+            if first is None:
+                return None
+            score_kept = first
+        score = self._score_on_all(pool, stop, numbers)
+        if score is None:
+            return None
+        if score > score_kept:
+            kept, score_kept = numbers, score
+        return Progress(before.generation + 1, numbers, kept, score, score_kept)

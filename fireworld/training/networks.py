@@ -1,0 +1,181 @@
+"""What methods share that improve a network that values targets, generation by generation, under many conditions."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from threading import Event
+from typing import Annotated, Any, Final, TypeVar
+
+import numpy as np
+
+from fireworld.draws import BEGINNING
+from fireworld.errors import TrainingError, expected
+from fireworld.kernels.arrays import Array
+from fireworld.kernels.draws import fill_normals
+from fireworld.kernels.ranking import N_TARGET_FEATURES
+from fireworld.policy.kernel import KernelPolicy, from_network
+from fireworld.policy.teams.network_layers import OWN_SEEN, Layer, pack, unpack
+from fireworld.policy.teams.network_team import NetworkTeam
+from fireworld.policy.teams.npz import check_arrays, check_finite
+from fireworld.policy.teams.ranking_team import RankingTeam
+from fireworld.policy.teams.team import Team, load_team
+from fireworld.simulation.built import CityCache
+from fireworld.training.curriculum import Curriculum
+from fireworld.training.generations import GenerationMethod, GenerationTrainer
+from fireworld.training.method import Limits, Report
+from fireworld.training.seeds import check_seed
+
+HIDDEN_MAX: Final = 256
+Hidden = Annotated[int, Limits(f"a whole number from 0 to {HIDDEN_MAX}", 0, HIDDEN_MAX)]
+ACTIVATION: Final = "relu"
+N_OF_RANKING: Final = 2
+"""Hidden units that compute a ranking: one its values above 0, one those below."""
+
+
+class NetworkMethod(GenerationMethod):
+    """A method that improves a network of one hidden layer, or of none."""
+
+    @property
+    @abstractmethod
+    def hidden(self) -> int:
+        """Numbers of the layer between the 26 features and the value, relu; 0: the value is one weighted sum."""
+
+    @property
+    @abstractmethod
+    def start(self) -> str:
+        """The network before the first generation: `best` values targets as that ranking, `none` all of them 0."""
+
+    @property
+    def n_checks(self) -> int:
+        """Fights of a check with each fire."""
+        return 1
+
+    def __post_init__(self) -> None:
+        """Raise TrainingError if a hyperparameter is not what it may be."""
+        super().__post_init__()
+        if self.start == "best" and 0 < self.hidden < N_OF_RANKING:
+            wanted = f"0, or at least {N_OF_RANKING}, which a ranking takes (start best)"
+            raise TrainingError(expected("method", "hidden", wanted, self.hidden))
+
+
+AMethod = TypeVar("AMethod", bound=NetworkMethod)
+AReport = TypeVar("AReport", bound=Report)
+
+
+class NetworkTrainer(GenerationTrainer[AMethod, AReport]):
+    """Improves one network; arguments as for `Method.trainer`.
+
+    The stages of the curriculum are the conditions; all of them count equally. Networks are (k,) float64 numbers as
+    `pack` puts them.
+    """
+
+    def __init__(self, curriculum: Curriculum, method: AMethod, *, seed: int, cities: CityCache | None = None) -> None:
+        super().__init__(curriculum, method, seed=seed, cities=cities)
+        self._widths = [len(OWN_SEEN), *([method.hidden] if method.hidden else []), 1]
+        self._conditions = _conditions(curriculum)
+        self._start = load_team("best") if method.start == "best" else None
+        self._first = _first_numbers(self._widths, self._start, seed)
+        self._packed = pack(unpack(self._first, self._widths), self._activations, OWN_SEEN)
+
+    @property
+    @abstractmethod
+    def kept(self) -> Array:
+        """The numbers of the team."""
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What decides what comes of a training; of the team that it starts with the digest."""
+        return {**super().identity, **({} if self._start is None else {"start": self._start.digest})}
+
+    def team(self) -> NetworkTeam:
+        """Return the best network that was checked so far; before the first generation what it starts with."""
+        provenance = {**self.identity, "generations_done": self.generation}
+        layers = unpack(self.kept, self._widths)
+        return NetworkTeam(layers, self._activations, OWN_SEEN, own_targets=True, provenance=provenance)
+
+    def own_plots(self) -> Mapping[str, str]:
+        """Return the plot of the conditions, if there are several."""
+        return {"conditions": "Score by condition"} if len(self._conditions) > 1 else {}
+
+    def policy_of(self, numbers: Array) -> KernelPolicy:
+        """Return the policy of a team whose brigades all follow the network of these numbers."""
+        return from_network(self._packed._replace(number=numbers), own_targets=True)
+
+    @property
+    def _activations(self) -> tuple[str, ...]:
+        return (ACTIVATION,) * (len(self._widths) - 2)
+
+    def _check_state(self, team: Team, state: Mapping[str, Array], *lengths: tuple[str, int], source: str) -> Array:
+        """Return the kept network of a checkpoint, whose state has arrays of these lengths by name.
+
+        Raises:
+            TrainingError: it is of no such network.
+        """
+        check_arrays(state, "generation", *(name for name, _ in lengths), source=source)
+        for name, wanted in lengths:
+            array = state[name]
+            if array.shape != (wanted,) or array.dtype != np.float64:
+                raise TrainingError(expected(source, name, f"{wanted} numbers", f"{array.dtype} {array.shape}"))
+            check_finite(array, name, source=source)
+        if not isinstance(team, NetworkTeam):
+            raise TrainingError(expected(source, "", NetworkTeam.what, team.what))
+        if list(team.widths) != self._widths or team.features != OWN_SEEN or team.activations != self._activations:
+            wanted_team = f"a network of {'-'.join(map(str, self._widths))}"
+            raise TrainingError(expected(source, "", wanted_team, team.summary))
+        return pack(team.layers, team.activations, team.features).number
+
+    def _score_on_all(self, pool: Executor, stop: Event, numbers: Array) -> float | None:
+        """Return the score of a network on all fires, in whole fights; None if the work is to stop."""
+        n = self.curriculum.n_scenarios
+        fires = [*range(n)] * self.method.n_checks
+        seeds = [check_seed(self.seed, place) for place in range(len(fires))]
+        scores = self._scores(pool, stop, numbers[np.newaxis], fires, seeds, whole=True)
+        return None if scores is None else self._mean(scores[0].tolist(), fires)
+
+    def _by_condition(self, scores: Sequence[float], fires: Sequence[int]) -> dict[str, float]:
+        """Return the mean score of each condition that has some of the fires; a score for each fire."""
+        found = dict[str, float]()
+        for name, among in self._conditions.items():
+            mine = [score for fire, score in zip(fires, scores, strict=True) if fire in among]
+            if mine:
+                found[name] = math.fsum(mine) / len(mine)
+        return found
+
+    def _mean(self, scores: Sequence[float], fires: Sequence[int]) -> float:
+        """Return the mean score, all conditions that were fought in counting equally."""
+        conditions = self._by_condition(scores, fires)
+        return math.fsum(conditions.values()) / len(conditions)
+
+
+def _conditions(curriculum: Curriculum) -> dict[str, range]:
+    """Return the numbers of the scenarios of each stage, by its name."""
+    found, first = dict[str, range](), 0
+    for stage in curriculum.stages:
+        found[stage.name] = range(first, first + len(stage.scenarios))
+        first += len(stage.scenarios)
+    return found
+
+
+def _first_numbers(widths: Sequence[int], start: Team | None, seed: int) -> Array:
+    """Return a network before the first generation: it values targets as a ranking does, or all of them 0.
+
+    Weights of hidden units that do not compute the ranking are drawn; what they say counts 0.
+    """
+    ranking = np.zeros(len(OWN_SEEN))
+    if start is not None:
+        if not isinstance(start, RankingTeam) or not start.own_targets or len(start.weights) != 1:
+            raise TrainingError(expected("method", "start", "best to be one ranking of own targets", start.summary))
+        ranking[:N_TARGET_FEATURES] = start.weights[0, :N_TARGET_FEATURES]
+    if len(widths) == N_OF_RANKING:
+        return pack([Layer(ranking[:, np.newaxis], np.zeros(1))], (), OWN_SEEN).number
+    n_in, hidden, _ = widths
+    weights, values = np.zeros((n_in, hidden)), np.zeros((hidden, 1))
+    fill_normals(seed, BEGINNING, 0, weights)
+    weights /= math.sqrt(n_in)
+    if start is not None:
+        weights[:, 0], weights[:, 1], values[0], values[1] = ranking, -ranking, 1.0, -1.0
+    layers = [Layer(weights, np.zeros(hidden)), Layer(values, np.zeros(1))]
+    return pack(layers, (ACTIVATION,), OWN_SEEN).number
