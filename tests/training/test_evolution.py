@@ -119,7 +119,7 @@ def test_without_a_start_all_targets_are_worth_the_same(make):
 
 def test_a_start_that_is_no_ranking(make, monkeypatch):
     network = make().team()
-    monkeypatch.setattr("fireworld.training.methods.evolution.load_team", lambda _: network)
+    monkeypatch.setattr("fireworld.training.networks.load_team", lambda _: network)
     with pytest.raises(
         TrainingError, match=r"^method: start: expected best to be one ranking of own targets, got a net"
     ):

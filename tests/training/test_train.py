@@ -24,7 +24,8 @@ FEW = {"n_episodes_max": 6, "n_episodes_unchanged": 3}
 SEARCH = {"n_generations": 3, "n_candidates": 4, "n_best": 2, "n_fires": 2, "n_steps_max": 10}
 TARGETS = {"n_lessons": 3, "n_fights": 3, "n_steps_max": 10, "hidden": 3}
 EVOLUTION = {"n_generations": 3, "n_pairs": 2, "n_fires": 2, "n_steps_max": 10, "hidden": 2}
-SETTINGS = {"paper": FEW, "search": SEARCH, "targets": TARGETS, "evolution": EVOLUTION}
+ROLLOUTS = {"n_generations": 3, "n_fights": 2, "n_steps_max": 10, "hidden": 3, "horizon": 5, "n_epochs": 2}
+SETTINGS = {"paper": FEW, "search": SEARCH, "targets": TARGETS, "evolution": EVOLUTION, "rollouts": ROLLOUTS}
 
 
 @pytest.fixture
@@ -171,7 +172,10 @@ def test_a_callback_that_fails_is_the_callers_matter(here, files):
             {"curriculum": 3},
             "^curriculum: expected a curriculum or a scenario: an object, a name or a path, got 'int'$",
         ),
-        ({"method": "magic"}, "^--method: expected one of paper, evolution, sarsa, search, targets, got 'magic'$"),
+        (
+            {"method": "magic"},
+            "^--method: expected one of paper, evolution, rollouts, sarsa, search, targets, got 'magic'$",
+        ),
         ({"method": 3}, "^--method: expected a name or a Method, got 'int'$"),
         ({"seed": -1}, "^seed: expected a whole number from 0 to 4294967295, got -1$"),
         ({"seed": 1.0}, "^seed: expected a whole number from 0 to 4294967295, got 1.0$"),

@@ -12,7 +12,7 @@ import numpy as np
 
 from fireworld.draws import FIRE, SHUFFLE, hash_key
 from fireworld.errors import LogError
-from fireworld.kernels.arrays import Array
+from fireworld.kernels.arrays import Array, NetworkArrays
 from fireworld.kernels.fitting import Fitting, fit_once, gain
 from fireworld.kernels.network import widest
 from fireworld.kernels.situation import N_SEEN
@@ -77,6 +77,20 @@ class Rollouts(NetworkMethod):
 
 
 METHOD: Final = Rollouts()
+
+
+def fresh_fitting(network: NetworkArrays, n_options: int) -> Fitting:
+    """Return what the fitting of a network begins with, for decisions of so many options at most."""
+    k = len(network.number)
+    return Fitting(
+        gradient=np.zeros(k),
+        mean=np.zeros(k),
+        square=np.zeros(k),
+        left=np.ones(2),
+        share=np.zeros(n_options),
+        work=np.zeros((2, widest(network))),
+        learner=fresh_target_learner(network, np.zeros(0), 0, decay=0.0, commit=1),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -251,22 +265,13 @@ class RolloutsTrainer(NetworkTrainer[Rollouts, Generation]):
         n_options = np.array([len(one.worth) for one in decisions], dtype=np.int64)
         for place, one in enumerate(decisions):
             seen[place, : n_options[place]], worth[place, : n_options[place]] = one.seen, one.worth
-        k, work = len(numbers), np.zeros((2, widest(network)))
-        fitting = Fitting(
-            gradient=np.zeros(k),
-            mean=np.zeros(k),
-            square=np.zeros(k),
-            left=np.ones(2),
-            share=np.zeros(c),
-            work=work,
-            learner=fresh_target_learner(network, np.zeros(0), 0, decay=0.0, commit=1),
-        )
+        fitting = fresh_fitting(network, c)
         for epoch in range(method.n_epochs):
             number = self.generation * method.n_epochs + epoch
             keys = [hash_key(self.seed, SHUFFLE, place, number) for place in range(d)]
             order = np.argsort(np.array(keys, dtype=np.uint64), kind="stable")
             fit_once(network, seen, worth, n_options, order, method.n_batch, method.temperature, method.rate, fitting)
-        return network.number, gain(network, seen, worth, n_options, work)
+        return network.number, gain(network, seen, worth, n_options, fitting.work)
 
     def _checked(self, pool: Executor, stop: Event, before: Progress, numbers: Array) -> Progress | None:
         """Return the progress with what the check says; before the first generation its start is checked, too."""

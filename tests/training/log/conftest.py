@@ -15,7 +15,14 @@ SHORT = {"n_episodes_max": 6, "n_episodes_unchanged": 3}
 SHORT_TARGETS = {"n_lessons": 3, "n_fights": 5, "n_steps_max": 10, "hidden": 4}
 SHORT_EVOLUTION = {"n_generations": 3, "n_pairs": 2, "n_fires": 2, "n_steps_max": 10, "hidden": 2, "check_every": 2}
 SHORT_SEARCH = {"n_generations": 3, "n_candidates": 4, "n_best": 2, "n_fires": 2, "n_steps_max": 10}
-SHORT_OF = {"paper": SHORT, "search": SHORT_SEARCH, "targets": SHORT_TARGETS, "evolution": SHORT_EVOLUTION}
+SHORT_ROLLOUTS = {"n_generations": 3, "n_fights": 2, "n_steps_max": 10, "hidden": 2, "horizon": 5, "n_epochs": 2}
+SHORT_OF = {
+    "paper": SHORT,
+    "search": SHORT_SEARCH,
+    "targets": SHORT_TARGETS,
+    "evolution": SHORT_EVOLUTION,
+    "rollouts": SHORT_ROLLOUTS,
+}
 
 
 @pytest.fixture(scope="session")

@@ -157,22 +157,30 @@ def test_generations_whose_columns_do_not_fit_are_refused(make_log, tmp_path, na
         export_training(open_training(path), tmp_path / "tables")
 
 
-@pytest.mark.parametrize("name", ["scores", "fire", "seed", "mean", "direction", "kept"])
-def test_generations_of_networks_whose_columns_do_not_fit_are_refused(make_log, tmp_path, name):
+EVOLVED = ("evolution", "/evolved", "networks and fires")
+IMPROVED = ("rollouts", "/improved", "fights, or of the same networks")
+
+
+@pytest.mark.parametrize(
+    ("method", "topic", "same", "name"),
+    [(*EVOLVED, name) for name in ("scores", "fire", "seed", "mean", "direction", "kept")]
+    + [(*IMPROVED, name) for name in ("fire", "seed", "score", "n_tried", "numbers", "kept")],
+)
+def test_generations_of_networks_whose_columns_do_not_fit_are_refused(make_log, tmp_path, method, topic, same, name):
     from dataclasses import replace
 
     from fireworld_recorder.codec import decode, encode
 
-    from fireworld.training.log.records import Evolved
+    from fireworld.training.log.records import Evolved, Improved
 
-    log = open_training(make_log("evolution"))
+    log = open_training(make_log(method))
 
     def change(_, messages):
-        evolved = decode(Evolved, dict(messages)["/evolved"])
-        return [("/evolved", encode(replace(evolved, **{name: getattr(evolved, name)[:-1]})))]
+        found = decode({"/evolved": Evolved, "/improved": Improved}[topic], dict(messages)[topic])
+        return [(topic, encode(replace(found, **{name: getattr(found, name)[:-1]})))]
 
     path = rewrite(log, tmp_path / "a.mcap", change=change)
-    with pytest.raises(LogError, match="part 0: /evolved: its columns are not of the same networks and fires"):
+    with pytest.raises(LogError, match=f"part 0: {topic}: its columns are not of the same {same}"):
         export_training(open_training(path), tmp_path / "tables")
 
 

@@ -168,7 +168,7 @@ def test_another_simulator_that_learns_otherwise_is_noticed(curriculum, make_log
     monkeypatch.setattr(TrainingLog, "trainer_before", lambda log, number: before(log, number - 1))
     monkeypatch.setattr(verify, "simulator_digest", lambda: "ab" * 32)
     last = len(open_training(partial, partial=True)) - 1
-    unit = {"paper": "episode", "search": "generation", "targets": "lesson", "evolution": "generation"}[method]
+    unit = {"paper": "episode", "targets": "lesson"}.get(method, "generation")
     wanted = rf"t\.mcap\.partial: simulator: expected .*\+[0-9a-f]{{12}}, got .* with which {unit} {last} comes out"
     with pytest.raises(TrainingError, match=f"{wanted} otherwise; begin again with --force"):
         train(curriculum, method=method, set=short, record=path, resume=True)
