@@ -19,6 +19,7 @@ def test_rows_are_those_of_the_log(here, fireworld, make_log, method):
     log = open_training(path)
     assert fireworld("export", path, "--csv", "tables").code == 0
     done = fireworld("export", path, "--jsonl", "tables.jsonl", "--json")
+    assert done.code == 0, done.err
     first, *lines = [json.loads(line) for line in (here / "tables.jsonl").read_text().splitlines()]
     assert first["facts"]["fireworld.digest"] == log.digest
     for name in tables_of(log):
