@@ -22,6 +22,8 @@ from fireworld.simulation.world import World
 
 FIRST_STEPS: Final = 12
 """So long after the start options are tried out most often: what is lost then is lost for good."""
+LATER_SHARE: Final = 1 / 3
+"""How often they are later, as a share of that."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,7 @@ class Trial:
     """How options are tried out.
 
     Attributes:
-        share: of the first 12 steps in which some are; it falls with the step from there, as 12 / step.
+        share: of the first 12 steps in which some are; of later steps a third of it.
         n_brigades: that are asked in such a step.
         n_options: targets of a brigade that are tried, its own choice among them.
         n_rollouts: of each.
@@ -72,7 +74,7 @@ def try_options(world: World, policy: KernelPolicy, trial: Trial, stop: Event) -
     policy.begin(world.city_arrays, world.n_brigades, world.seed)
     while not (world.terminated or world.truncated or stop.is_set()):
         step = world.step_number + 1
-        if uniform(world.seed, MOMENT, 0, step) >= trial.share * FIRST_STEPS / max(step, FIRST_STEPS):
+        if uniform(world.seed, MOMENT, 0, step) >= trial.share * (1.0 if step <= FIRST_STEPS else LATER_SHARE):
             world.step(policy)
             continue
         order = sorted(range(world.n_brigades), key=lambda brigade: hash_key(world.seed, OPTION, brigade, step))

@@ -149,7 +149,6 @@ def test_the_conditions_come_in_turn(make):
 def tried_in(make, *, share=1.0, **changes):
     """What is tried out in one fight of the team that a training begins with."""
     trainer = make(share=share, **changes)
-    list(trainer._fires)
     built = trainer._cities.build(trainer.curriculum.scenarios[-1])
     world = built.world(seed=5, n_steps_max=20)
     return world, try_options(world, trainer.policy_of(trainer.progress.numbers), trainer.method.trial, Event())

@@ -38,13 +38,13 @@ class Rollouts(NetworkMethod):
     """Numbers of the layer between the 26 features and the value, relu; 0: the value is one weighted sum."""
     start: Literal["best", "none"] = "best"
     """The network before the first generation: it values targets as the shipped ranking `best`, or all of them 0."""
-    n_generations: Count = 8
-    n_fights: Count = 2000
+    n_generations: Count = 12
+    n_fights: Count = 2500
     """Fights of a generation, the conditions in turn."""
     n_steps_max: Count = 200
     """Steps of such a fight at most; those of the checks are as long as the scenarios."""
-    share: PositiveShare = 0.25
-    """Of the first 12 steps of a fight in which options are tried out; then 12 / step of it."""
+    share: PositiveShare = 0.27
+    """Of the first 12 steps of a fight in which options are tried out; of later ones a third of it."""
     n_brigades: Count = 2
     """Brigades whose options are tried out in such a step."""
     n_options: Count = 7
@@ -55,7 +55,7 @@ class Rollouts(NetworkMethod):
     """Steps for which the brigade goes for the target, while that burns; then it decides as the team."""
     horizon: Count = 50
     """Steps of a rollout."""
-    n_epochs: Count = 60
+    n_epochs: Count = 40
     """How often the network goes through the decisions of a generation."""
     n_batch: Count = 512
     """Decisions between two moves of the network."""
