@@ -9,52 +9,27 @@ import numpy as np
 import pytest
 
 from fireworld.draws import WEIGHT
-from fireworld.errors import LogError, TrainingError
+from fireworld.errors import TrainingError
 from fireworld.executors import threads
 from fireworld.kernels.draws import normal
 from fireworld.policy.teams.network_layers import OWN_SEEN, pack
 from fireworld.policy.teams.network_team import NetworkTeam
 from fireworld.policy.teams.team import load_team
 from fireworld.scenario import load_scenario
-from fireworld.simulation.built import CityCache, build_scenario
-from fireworld.training.curriculum import load_curriculum
-from fireworld.training.log.reader import open_training
-from fireworld.training.log.records import Evolved
-from fireworld.training.methods.evolution import Evolution, EvolutionTrainer, centred_ranks
-from fireworld.training.train import train
-from fireworld.training.training import StopTraining
+from fireworld.simulation.built import build_scenario
+from fireworld.training.methods.evolution import Evolution, centred_ranks
+from tests.training.generations import CONDITIONS, SHORT_EVOLUTION, maker, read
 from tests.training.test_search import SetAfter
-
-FIRES = """
-stages:
-  - name: usual
-    cooperation: true
-    base: quick
-    each: [{fires.0.n_buildings: 4}, {fires.0.n_buildings: 6}, {fires.0.n_buildings: 7}]
-  - name: many
-    cooperation: true
-    base: quick
-    set: {brigades.n: 4}
-    each: [{fires.0.n_buildings: 8}, {fires.0.n_buildings: 9}]
-"""
-SHORT = {"n_generations": 2, "n_pairs": 2, "n_fires": 3, "n_steps_max": 25, "hidden": 3, "check_every": 1}
 
 
 @pytest.fixture(scope="module")
 def fires(tmp_path_factory):
-    path = tmp_path_factory.mktemp("evolution") / "fires.yaml"
-    path.write_text(FIRES)
-    return load_curriculum(path)
+    return read(CONDITIONS, tmp_path_factory.mktemp("evolution"))
 
 
 @pytest.fixture(scope="module")
 def make(fires):
-    cities = CityCache()
-
-    def make(*, seed=1, **changes):
-        return EvolutionTrainer(fires, Evolution(**{**SHORT, **changes}), seed=seed, cities=cities)
-
-    return make
+    return maker(fires, Evolution(**SHORT_EVOLUTION))
 
 
 def evolved(trainer, *, n_threads=1):
@@ -64,15 +39,6 @@ def evolved(trainer, *, n_threads=1):
     return tuple(
         array.tobytes() for array in (trainer.progress.mean, trainer.progress.direction, trainer.progress.kept)
     )
-
-
-def test_the_same_whatever_the_number_of_threads(make):
-    one, two = make(), make()
-    reports = [list(trainer.run(threads(n))) for trainer, n in ((one, 1), (two, 2))]
-    assert reports[0] == reports[1]
-    assert [report.generation for report in reports[0]] == [0, 1]
-    assert one.team().to_bytes() == two.team().to_bytes()
-    assert evolved(one) == evolved(two)
 
 
 def test_other_seeds_and_hyperparameters_another_evolution(make):
@@ -138,40 +104,6 @@ def test_stopped_within_a_generation_and_resumed(make, n_looks, n_done, n_thread
     assert list(second.run(threads(n_threads))) == reports[n_done:]
     assert second.team().to_bytes() == whole.team().to_bytes()
     assert evolved(second) == evolved(whole)
-
-
-def test_resumed_from_a_checkpoint_and_from_a_log_it_ends_with_the_same_bytes(fires, tmp_path):
-    def stop(training, report):
-        if training.n_reports == 1:
-            raise StopTraining
-
-    def bytes_of(name, *, record, **options):
-        names = {"output": tmp_path / f"{name}.npz", **({"record": tmp_path / f"{name}.mcap"} if record else {})}
-        train(fires, method="evolution", set=SHORT, **names, **options)
-        return [path.read_bytes() for path in names.values() if path.exists()]
-
-    for record in (True, False):
-        whole = bytes_of(f"whole-{record}", record=record, jobs=2)
-        name = f"parted-{record}"
-        assert len(bytes_of(name, record=record, jobs=1, callbacks=[stop])) == 0
-        assert bytes_of(name, record=record, jobs=1, resume=True) == whole
-
-
-def test_a_log_is_followed_to_the_same_state(fires, make, tmp_path):
-    path = tmp_path / "t.mcap"
-    train(fires, method="evolution", set=SHORT, record=path)
-    log, trained, followed = open_training(path), make(), make()
-    reports = list(trained)
-    assert [followed.follow(part) for part in log.parts()] == reports == [report for _, report in log.reports()]
-    assert evolved(followed) == evolved(trained)
-    assert followed.points(reports[-1]) == trained.points(reports[-1])
-    assert log.team().digest == trained.team().digest
-    for part in log.parts():
-        assert len(part[Evolved].scores) == 2 * 2 * 3
-    with pytest.raises(LogError, match=r"^a part holds no generation of networks of 85 numbers$"):
-        make(start="none").follow({})
-    with pytest.raises(LogError, match=r"^a part holds no generation of networks of 57 numbers$"):
-        make(hidden=2).follow(next(iter(log.parts())))
 
 
 def test_one_generation_by_hand(make, monkeypatch):
@@ -306,7 +238,3 @@ def test_a_checkpoint_that_makes_no_sense(make, broken, wanted):
     trainer = make()
     with pytest.raises(TrainingError, match=f"^t.npz: {wanted}"):
         trainer.restore(trainer.team(), {**trainer.state(), **broken}, source="t.npz")
-    with pytest.raises(TrainingError, match=r"^t.npz: expected a network of 26-3-1, got"):
-        trainer.restore(make(hidden=4).team(), trainer.state(), source="t.npz")
-    with pytest.raises(TrainingError, match=r"^t.npz: expected a network, got"):
-        trainer.restore(load_team("best"), trainer.state(), source="t.npz")

@@ -4,57 +4,25 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import replace
 from threading import Event
 
 import numpy as np
 import pytest
 
-from fireworld.errors import LogError, TrainingError
+from fireworld.errors import TrainingError
 from fireworld.executors import threads
 from fireworld.kernels.fitting import fit_once, gain
 from fireworld.policy.teams.network_layers import OWN_SEEN
 from fireworld.policy.teams.team import load_team
-from fireworld.simulation.built import CityCache
-from fireworld.training.curriculum import load_curriculum
-from fireworld.training.log.reader import open_training
-from fireworld.training.log.verify import verify_training
-from fireworld.training.methods.rollouts import Rollouts, RolloutsTrainer
+from fireworld.training.methods.rollouts import Rollouts
 from fireworld.training.options import TriedDecision, try_options
-from fireworld.training.train import train
-from fireworld.training.training import StopTraining
-from tests.training.test_evolution import FIRES
+from tests.training.generations import CONDITIONS, SHORT_ROLLOUTS, maker, read
 from tests.training.test_search import SetAfter
 
-SHORT = {
-    "n_generations": 2,
-    "n_fights": 6,
-    "n_steps_max": 25,
-    "hidden": 3,
-    "horizon": 8,
-    "commit": 3,
-    "n_options": 4,
-    "n_epochs": 3,
-    "n_batch": 5,
-    "n_checks": 1,
-}
-
 
 @pytest.fixture(scope="module")
-def fires(tmp_path_factory):
-    path = tmp_path_factory.mktemp("rollouts") / "fires.yaml"
-    path.write_text(FIRES)
-    return load_curriculum(path)
-
-
-@pytest.fixture(scope="module")
-def make(fires):
-    cities = CityCache()
-
-    def make(*, seed=1, **changes):
-        return RolloutsTrainer(fires, Rollouts(**{**SHORT, **changes}), seed=seed, cities=cities)
-
-    return make
+def make(tmp_path_factory):
+    return maker(read(CONDITIONS, tmp_path_factory.mktemp("rollouts")), Rollouts(**SHORT_ROLLOUTS))
 
 
 def improved(trainer, *, n_threads=1):
@@ -62,16 +30,6 @@ def improved(trainer, *, n_threads=1):
     list(trainer.run(threads(n_threads)))
     assert trainer.done
     return trainer.progress.numbers.tobytes(), trainer.progress.kept.tobytes()
-
-
-def test_the_same_whatever_the_number_of_threads(make):
-    one, two = make(), make()
-    reports = [list(trainer.run(threads(n))) for trainer, n in ((one, 1), (two, 2))]
-    assert reports[0] == reports[1]
-    assert [report.generation for report in reports[0]] == [0, 1]
-    assert one.team().to_bytes() == two.team().to_bytes()
-    assert improved(one) == improved(two)
-    assert all(report.n_decisions > 5 for report in reports[0])
 
 
 def test_other_seeds_and_hyperparameters_another_network(make):
@@ -92,39 +50,6 @@ def test_stopped_and_resumed(make, n_looks, n_done):
     assert list(second.run(threads(1))) == reports[len(done) :]
     assert second.team().to_bytes() == whole.team().to_bytes()
     assert improved(second) == improved(whole)
-
-
-def test_resumed_from_a_checkpoint_and_from_a_log_it_ends_with_the_same_bytes(fires, tmp_path):
-    def stop(training, report):
-        if training.n_reports == 1:
-            raise StopTraining
-
-    def bytes_of(name, *, record, **options):
-        names = {"output": tmp_path / f"{name}.npz", **({"record": tmp_path / f"{name}.mcap"} if record else {})}
-        train(fires, method="rollouts", set=SHORT, **names, **options)
-        return [path.read_bytes() for path in names.values() if path.exists()]
-
-    for record in (True, False):
-        whole = bytes_of(f"whole-{record}", record=record, jobs=2)
-        name = f"parted-{record}"
-        assert len(bytes_of(name, record=record, jobs=1, callbacks=[stop])) == 0
-        assert bytes_of(name, record=record, jobs=1, resume=True) == whole
-    assert verify_training(open_training(tmp_path / "whole-True.mcap")).same
-
-
-def test_a_log_is_followed_to_the_same_state(fires, make, tmp_path):
-    path = tmp_path / "t.mcap"
-    train(fires, method="rollouts", set=SHORT, record=path)
-    log, trained, followed = open_training(path), make(), make()
-    reports = list(trained)
-    assert [followed.follow(part) for part in log.parts()] == reports == [report for _, report in log.reports()]
-    assert improved(followed) == improved(trained)
-    assert followed.points(reports[-1]) == trained.points(reports[-1])
-    assert log.team().digest == trained.team().digest
-    with pytest.raises(LogError, match=r"^a part holds no generation of networks of 85 numbers$"):
-        make().follow({})
-    with pytest.raises(LogError, match=r"^a part holds no generation of networks of 57 numbers$"):
-        make(hidden=2).follow(next(iter(log.parts())))
 
 
 def test_curves(make):
@@ -307,6 +232,3 @@ def test_a_checkpoint_that_makes_no_sense(make, broken, wanted):
     trainer = make()
     with pytest.raises(TrainingError, match=f"^t.npz: {wanted}"):
         trainer.restore(trainer.team(), {**trainer.state(), **broken}, source="t.npz")
-    with pytest.raises(TrainingError, match=r"^t.npz: expected a network of 26-3-1, got"):
-        trainer.restore(make(hidden=4).team(), trainer.state(), source="t.npz")
-    assert replace(trainer.progress).generation == 0

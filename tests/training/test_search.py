@@ -12,9 +12,9 @@ from fireworld.executors import threads
 from fireworld.kernels.ranking import N_OF_TEAM, N_TARGET_FEATURES, N_WEIGHTS
 from fireworld.policy.kernel import from_rankings
 from fireworld.policy.teams.ranking_words import WEIGHTS
-from fireworld.simulation.built import CityCache, build_scenario
-from fireworld.training.curriculum import load_curriculum
-from fireworld.training.methods.search import Search, SearchTrainer
+from fireworld.simulation.built import build_scenario
+from fireworld.training.methods.search import Search
+from tests.training.generations import maker, read
 
 FIRES = """
 stages:
@@ -34,19 +34,12 @@ ACTIONS = [False] * N_TARGET_FEATURES + [True] * 4
 @pytest.fixture(scope="module")
 def fires(tmp_path_factory):
     """Three fires that six rules cannot all hold, with a town that is built once."""
-    path = tmp_path_factory.mktemp("search") / "fires.yaml"
-    path.write_text(FIRES)
-    return load_curriculum(path)
+    return read(FIRES, tmp_path_factory.mktemp("search"))
 
 
 @pytest.fixture(scope="module")
 def make(fires):
-    cities = CityCache()
-
-    def make(*, seed=1, **changes):
-        return SearchTrainer(fires, Search(**{**SHORT, **changes}), seed=seed, cities=cities)
-
-    return make
+    return maker(fires, Search(**SHORT))
 
 
 def found(searcher, *, n_threads=1):
