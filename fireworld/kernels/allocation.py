@@ -9,7 +9,7 @@ import numpy as np
 
 from fireworld.kernels.arrays import Array, BrigadeConstants, BrigadeState, SiteState
 from fireworld.kernels.jit import kernel
-from fireworld.kernels.observation import site_place
+from fireworld.kernels.observation import can_choose, site_place
 
 
 @kernel
@@ -43,6 +43,13 @@ def stays(brigade: int, brigades: BrigadeState, sites: SiteState, constants: Bri
     if not constants.keeps or brigades.action[brigade] < 0:
         return False
     return may_name(brigade, brigades.target[brigade], brigades.site, sites, constants.free)
+
+
+@kernel
+def is_asked(brigade: int, brigades: BrigadeState, sites: SiteState, constants: BrigadeConstants) -> bool:
+    """Return whether a brigade chooses in a step that has begun: it can, and does not stay with what it did."""
+    chooses = can_choose(brigade, brigades.hp, brigades.refilling, sites.counts)
+    return chooses and not stays(brigade, brigades, sites, constants)
 
 
 @kernel

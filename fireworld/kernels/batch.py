@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from fireworld.kernels.addresses import opener
-from fireworld.kernels.allocation import join_site, named_range, stays
+from fireworld.kernels.allocation import is_asked, join_site, named_range, stays
 from fireworld.kernels.arrays import (
     BURNING,
     Array,
@@ -201,8 +201,7 @@ def show_brigade(brigade: int, i: int, episode: Episode, batch: Batch) -> None:
     world, view = episode.world, batch.shown
     brigades, sites = world.brigades, world.sites
     view.state[i, brigade] = state_of(brigade, brigades.action, episode, view.features[i, brigade])
-    chooses = can_choose(brigade, brigades.hp, brigades.refilling, sites.counts)
-    chooses = chooses and not stays(brigade, brigades, sites, episode.constants.brigades)
+    chooses = is_asked(brigade, brigades, sites, episode.constants.brigades)
     view.alive[i, brigade], view.chooses[i, brigade] = brigades.hp[brigade] > 0, chooses
     mask, own = view.mask[i, brigade], view.own[i, brigade]
     mask[0] = 1

@@ -82,11 +82,7 @@ class Forecast:
         self._values: dict[Assignment, float] = {}
 
     def value(self, assignment: Assignment) -> float:
-        """Return the value of an assignment that all brigades follow until the horizon: a mean over the rollouts.
-
-        score / maximal score - 0.005 * burning buildings, at the end of the rollout. The second term stands for the
-        further cost of the fire that is left.
-        """
+        """Return the value of an assignment that all brigades follow until the horizon: the mean of `worth_of`."""
         held = self._values.get(assignment)
         if held is None:
             self._assign(assignment)
@@ -108,8 +104,16 @@ class Forecast:
         copy_into(copy, moment.world)
         seed, last_step = FIRST_SEED + number, moment.step + self._options.horizon - 1
         self._bound.run(seed, moment.step - 1, last_step)
-        score = score_of(copy)
-        return score.score / score.score_max - BURNING_COST * score.n_burning
+        return worth_of(copy)
+
+
+def worth_of(world: WorldState) -> float:
+    """Return what a rollout has come to: score / maximal score - 0.005 * burning buildings.
+
+    The second term stands for the further cost of the fire that is left.
+    """
+    score = score_of(world)
+    return score.score / score.score_max - BURNING_COST * score.n_burning
 
 
 def with_option(assignment: Assignment, brigade: int, option: int) -> Assignment:

@@ -91,8 +91,8 @@ class Scenario(Document, frozen=True, kw_only=True):
         if self.city.generated is None:  # an official map is recorded as the city file that it makes
             content["city"] |= {"file": self.city.named_file.name, "sha256": self.city_sha256}
             content["city"] |= {"official": None, "scenario": None}
-        for key, usual in (("allocation", "fixed"), ("targets", "anew")):  # left out: scenarios from before there were
-            if content["brigades"][key] == usual:  # others keep their digests
+        for key, usual in (("allocation", "fixed"), ("targets", "anew")):
+            if content["brigades"][key] == usual:  # left out: scenarios from before the key keep their digests
                 content["brigades"][key] = None
         resolved: dict[str, Any] = _without_nulls(content)
         return resolved

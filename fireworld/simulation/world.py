@@ -13,7 +13,7 @@ import numpy as np
 
 from fireworld.city.city import City
 from fireworld.kernels.addresses import address_row
-from fireworld.kernels.allocation import join_site, may_name, stays
+from fireworld.kernels.allocation import is_asked, join_site, may_name, stays
 from fireworld.kernels.arrays import BURNING, Array, CityArrays, Constants, Learner, PolicyArrays, Seen, WorldState
 from fireworld.kernels.episode_arrays import SEED, STEP
 from fireworld.kernels.fire import ignite
@@ -171,8 +171,7 @@ class World:
         known, seen = brigades.target.copy(), list[Observation | None]()
         for brigade in range(self.n_brigades):
             state = ahead._see(brigade, brigades.action, known, features)  # noqa: SLF001
-            decides = can_choose(brigade, brigades.hp, brigades.refilling, sites.counts)
-            decides = decides and not stays(brigade, brigades, sites, self.constants.brigades)
+            decides = is_asked(brigade, brigades, sites, self.constants.brigades)
             seen.append(ahead._observation(brigade, features, state, known) if decides else None)  # noqa: SLF001
         return tuple(seen)
 

@@ -108,7 +108,7 @@ class NetworkTrainer(GenerationTrainer[AMethod, AReport]):
     def _activations(self) -> tuple[str, ...]:
         return (ACTIVATION,) * (len(self._widths) - 2)
 
-    def _check_state(self, team: Team, state: Mapping[str, Array], *lengths: tuple[str, int], source: str) -> Array:
+    def _kept_of(self, team: Team, state: Mapping[str, Array], *lengths: tuple[str, int], source: str) -> Array:
         """Return the kept network of a checkpoint, whose state has arrays of these lengths by name.
 
         Raises:

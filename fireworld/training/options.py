@@ -12,7 +12,7 @@ from fireworld.draws import MOMENT, OPTION, ROLLOUT, hash_key, uniform
 from fireworld.kernels.addresses import address_row
 from fireworld.kernels.arrays import Array, WorldState
 from fireworld.kernels.choice import GIVEN
-from fireworld.planning.planner import BURNING_COST, FIRST_SEED
+from fireworld.planning.planner import FIRST_SEED, worth_of
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
 from fireworld.policy.seen_targets import seen_targets
@@ -153,5 +153,4 @@ class _Rollouts:
             getattr(forced, name)[brigade] = getattr(policy, name)[brigade]
         if done < last and score_of(room).n_burning:
             bound.run(seed, done, last)
-        score = score_of(room)
-        return score.score / score.score_max - BURNING_COST * score.n_burning
+        return worth_of(room)

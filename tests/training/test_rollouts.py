@@ -14,6 +14,7 @@ from fireworld.executors import threads
 from fireworld.kernels.fitting import fit_once, gain
 from fireworld.policy.teams.network_layers import OWN_SEEN
 from fireworld.policy.teams.team import load_team
+from fireworld.simulation.state import score_of
 from fireworld.training.methods.rollouts import Rollouts
 from fireworld.training.options import TriedDecision, try_options
 from tests.training.generations import CONDITIONS, SHORT_ROLLOUTS, maker, read
@@ -115,7 +116,7 @@ def test_a_target_that_is_chosen_anyway_is_worth_the_same(make, monkeypatch):
         forced = self._worth(before, step, asked.brigade, asked.targets[0], seed)
         options.copy_into(room, before)
         self._bound.run(seed, step - 1, step - 1 + self._trial.horizon)
-        score = options.score_of(room)
+        score = score_of(room)
         worths.append((forced, score.score / score.score_max - 0.005 * score.n_burning))
         return found
 

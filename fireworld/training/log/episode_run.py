@@ -119,7 +119,8 @@ class LearningRun:
         observer = Observer(world)
         yield observer.record()
         while not (world.terminated or world.truncated):
-            world.look()
+            if self._learning.own:
+                world.look()  # what is lit in the step that comes burns when it is decided
             codes = world.state.fire.fieryness.copy()
             choices = world.step(policy)
             errors = policy.learner.td_error.copy()

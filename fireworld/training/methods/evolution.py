@@ -146,7 +146,7 @@ class EvolutionTrainer(NetworkTrainer[Evolution, Generation]):
     def restore(self, team: Team, state: Mapping[str, Array], *, source: str) -> None:
         """Continue where another trainer stood; see `Trainer.restore`."""
         n = len(self.progress.mean)
-        kept = self._check_state(team, state, ("mean", n), ("direction", n), ("checks", 2), source=source)
+        kept = self._kept_of(team, state, ("mean", n), ("direction", n), ("checks", 2), source=source)
         generation = self._generation_of(state, source=source)
         checked, best = state["checks"].tolist()
         self.progress = Progress(generation, state["mean"].copy(), state["direction"].copy(), kept, checked, best)

@@ -175,7 +175,7 @@ class RolloutsTrainer(NetworkTrainer[Rollouts, Generation]):
     def restore(self, team: Team, state: Mapping[str, Array], *, source: str) -> None:
         """Continue where another trainer stood; see `Trainer.restore`."""
         n = len(self.progress.numbers)
-        kept = self._check_state(team, state, ("numbers", n), ("checks", 2), source=source)
+        kept = self._kept_of(team, state, ("numbers", n), ("checks", 2), source=source)
         generation, (checked, best) = self._generation_of(state, source=source), state["checks"].tolist()
         self.progress = Progress(generation, state["numbers"].copy(), kept, checked, best)
 
