@@ -6,14 +6,15 @@ import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
+from dataclasses import dataclass
 from threading import Event
-from typing import Annotated, Any, Final, TypeVar
+from typing import Annotated, Any, ClassVar, Final, TypeVar
 
 import numpy as np
 
 from fireworld.draws import BEGINNING
 from fireworld.errors import TrainingError, expected
-from fireworld.kernels.arrays import Array
+from fireworld.kernels.arrays import Array, NetworkArrays
 from fireworld.kernels.draws import fill_normals
 from fireworld.kernels.ranking import N_TARGET_FEATURES
 from fireworld.policy.kernel import KernelPolicy, from_network
@@ -36,12 +37,15 @@ N_OF_RANKING: Final = 2
 
 
 class NetworkMethod(GenerationMethod):
-    """A method that improves a network of one hidden layer, or of none."""
+    """A method that improves a network, whose layers follow from (k,) float64 numbers.
 
-    @property
-    @abstractmethod
-    def hidden(self) -> int:
-        """Numbers of the layer between the 26 features and the value, relu; 0: the value is one weighted sum."""
+    Attributes:
+        features: what the network reads of a target.
+        is_packed: the numbers are biases and weights of the layers, as `pack` puts them.
+    """
+
+    features: ClassVar[tuple[str, ...]] = OWN_SEEN
+    is_packed: ClassVar[bool] = False
 
     @property
     @abstractmethod
@@ -53,12 +57,68 @@ class NetworkMethod(GenerationMethod):
         """Fights of a check with each fire."""
         return 1
 
+    @property
+    @abstractmethod
+    def widths(self) -> tuple[int, ...]:
+        """How many features the network reads, and the outputs of its layers; relu comes after all but the last."""
+
+    @abstractmethod
+    def first_numbers(self, ranking: Array | None, seed: int) -> Array:
+        """Return the numbers before the first generation.
+
+        Args:
+            ranking: (13,) float64, weights of the features of a target by which the network values targets; None: it
+                values all of them 0.
+            seed: of what is drawn.
+        """
+
+    @abstractmethod
+    def layers_of(self, numbers: Array) -> tuple[Layer, ...]:
+        """Return the layers that follow from the numbers."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LayeredMethod(NetworkMethod):
+    """A method that improves the biases and weights of one hidden layer and of the value, or of the value alone."""
+
+    is_packed: ClassVar[bool] = True
+
+    hidden: Hidden
+    """Numbers of the layer between the 26 features and the value, relu; 0: the value is one weighted sum."""
+
     def __post_init__(self) -> None:
         """Raise TrainingError if a hyperparameter is not what it may be."""
         super().__post_init__()
         if self.start == "best" and 0 < self.hidden < N_OF_RANKING:
             wanted = f"0, or at least {N_OF_RANKING}, which a ranking takes (start best)"
             raise TrainingError(expected("method", "hidden", wanted, self.hidden))
+
+    @property
+    def widths(self) -> tuple[int, ...]:
+        """26 features, the hidden layer if there is one, the value."""
+        return (len(self.features), *([self.hidden] if self.hidden else []), 1)
+
+    def first_numbers(self, ranking: Array | None, seed: int) -> Array:
+        """Return the numbers before the first generation; see `NetworkMethod.first_numbers`.
+
+        Weights of hidden units that do not compute the ranking are drawn; what they say counts 0.
+        """
+        weighed = np.zeros(len(self.features))
+        if ranking is not None:
+            weighed[:N_TARGET_FEATURES] = ranking
+        if not self.hidden:
+            return pack([Layer(weighed[:, np.newaxis], np.zeros(1))], (), self.features).number
+        weights, values = np.zeros((len(weighed), self.hidden)), np.zeros((self.hidden, 1))
+        fill_normals(seed, BEGINNING, 0, weights)
+        weights /= math.sqrt(len(weighed))
+        if ranking is not None:
+            weights[:, 0], weights[:, 1], values[0], values[1] = weighed, -weighed, 1.0, -1.0
+        layers = [Layer(weights, np.zeros(self.hidden)), Layer(values, np.zeros(1))]
+        return pack(layers, (ACTIVATION,), self.features).number
+
+    def layers_of(self, numbers: Array) -> tuple[Layer, ...]:
+        """Return the layers whose biases and weights the numbers are."""
+        return unpack(numbers, self.widths)
 
 
 AMethod = TypeVar("AMethod", bound=NetworkMethod)
@@ -68,17 +128,16 @@ AReport = TypeVar("AReport", bound=Report)
 class NetworkTrainer(GenerationTrainer[AMethod, AReport]):
     """Improves one network; arguments as for `Method.trainer`.
 
-    The stages of the curriculum are the conditions; all of them count equally. Networks are (k,) float64 numbers as
-    `pack` puts them.
+    The stages of the curriculum are the conditions; all of them count equally. Networks are (k,) float64 numbers that
+    their layers follow from, as the method says.
     """
 
     def __init__(self, curriculum: Curriculum, method: AMethod, *, seed: int, cities: CityCache | None = None) -> None:
         super().__init__(curriculum, method, seed=seed, cities=cities)
-        self._widths = [len(OWN_SEEN), *([method.hidden] if method.hidden else []), 1]
+        self._activations = (ACTIVATION,) * (len(method.widths) - 2)
         self._conditions = _conditions(curriculum)
         self._start = load_team("best") if method.start == "best" else None
-        self._first = _first_numbers(self._widths, self._start, seed)
-        self._packed = pack(unpack(self._first, self._widths), self._activations, OWN_SEEN)
+        self._first = method.first_numbers(None if self._start is None else _weights_of(self._start), seed)
 
     @property
     @abstractmethod
@@ -92,40 +151,55 @@ class NetworkTrainer(GenerationTrainer[AMethod, AReport]):
 
     def team(self) -> NetworkTeam:
         """Return the best network that was checked so far; before the first generation what it starts with."""
-        provenance = {**self.identity, "generations_done": self.generation}
-        layers = unpack(self.kept, self._widths)
-        return NetworkTeam(layers, self._activations, OWN_SEEN, own_targets=True, provenance=provenance)
+        return self._team_of(self.kept)
 
     def own_plots(self) -> Mapping[str, str]:
         """Return the plot of the conditions, if there are several."""
         return {"conditions": "Score by condition"} if len(self._conditions) > 1 else {}
 
+    def network_of(self, numbers: Array) -> NetworkArrays:
+        """Return the network of these numbers as the kernels take it, with arrays of its own."""
+        return pack(self.method.layers_of(numbers), self._activations, self.method.features)
+
     def policy_of(self, numbers: Array) -> KernelPolicy:
         """Return the policy of a team whose brigades all follow the network of these numbers."""
-        return from_network(self._packed._replace(number=numbers), own_targets=True)
+        return from_network(self.network_of(numbers), own_targets=True)
 
-    @property
-    def _activations(self) -> tuple[str, ...]:
-        return (ACTIVATION,) * (len(self._widths) - 2)
+    def _team_of(self, numbers: Array) -> NetworkTeam:
+        """Return the team of these numbers."""
+        provenance = {**self.identity, "generations_done": self.generation}
+        layers, features = self.method.layers_of(numbers), self.method.features
+        return NetworkTeam(layers, self._activations, features, own_targets=True, provenance=provenance)
+
+    def _kept_state(self) -> dict[str, Array]:
+        """Return the kept numbers for a checkpoint, if its team does not tell them."""
+        return {} if self.method.is_packed else {"kept": self.kept}
 
     def _kept_of(self, team: Team, state: Mapping[str, Array], *lengths: tuple[str, int], source: str) -> Array:
-        """Return the kept network of a checkpoint, whose state has arrays of these lengths by name.
+        """Return the kept numbers of a checkpoint, whose state has arrays of these lengths by name, and `_kept_state`.
 
         Raises:
             TrainingError: it is of no such network.
         """
-        check_arrays(state, "generation", *(name for name, _ in lengths), source=source)
-        for name, wanted in lengths:
+        method = self.method
+        found = [*lengths, *((name, len(array)) for name, array in self._kept_state().items())]
+        check_arrays(state, "generation", *(name for name, _ in found), source=source)
+        for name, wanted in found:
             array = state[name]
             if array.shape != (wanted,) or array.dtype != np.float64:
                 raise TrainingError(expected(source, name, f"{wanted} numbers", f"{array.dtype} {array.shape}"))
             check_finite(array, name, source=source)
         if not isinstance(team, NetworkTeam):
             raise TrainingError(expected(source, "", NetworkTeam.what, team.what))
-        if list(team.widths) != self._widths or team.features != OWN_SEEN or team.activations != self._activations:
-            wanted_team = f"a network of {'-'.join(map(str, self._widths))}"
+        if team.widths != method.widths or team.features != method.features or team.activations != self._activations:
+            wanted_team = f"a network of {'-'.join(map(str, method.widths))}"
             raise TrainingError(expected(source, "", wanted_team, team.summary))
-        return pack(team.layers, team.activations, team.features).number
+        if method.is_packed:
+            return pack(team.layers, team.activations, team.features).number
+        kept = state["kept"].copy()
+        if self._team_of(kept).digest != team.digest:
+            raise TrainingError(expected(source, "kept", "the numbers of its team", "those of another"))
+        return kept
 
     def _score_on_all(self, pool: Executor, stop: Event, numbers: Array) -> float | None:
         """Return the score of a network on all fires, in whole fights; None if the work is to stop."""
@@ -159,23 +233,8 @@ def _conditions(curriculum: Curriculum) -> dict[str, range]:
     return found
 
 
-def _first_numbers(widths: Sequence[int], start: Team | None, seed: int) -> Array:
-    """Return a network before the first generation: it values targets as a ranking does, or all of them 0.
-
-    Weights of hidden units that do not compute the ranking are drawn; what they say counts 0.
-    """
-    ranking = np.zeros(len(OWN_SEEN))
-    if start is not None:
-        if not isinstance(start, RankingTeam) or not start.own_targets or len(start.weights) != 1:
-            raise TrainingError(expected("method", "start", "best to be one ranking of own targets", start.summary))
-        ranking[:N_TARGET_FEATURES] = start.weights[0, :N_TARGET_FEATURES]
-    if len(widths) == N_OF_RANKING:
-        return pack([Layer(ranking[:, np.newaxis], np.zeros(1))], (), OWN_SEEN).number
-    n_in, hidden, _ = widths
-    weights, values = np.zeros((n_in, hidden)), np.zeros((hidden, 1))
-    fill_normals(seed, BEGINNING, 0, weights)
-    weights /= math.sqrt(n_in)
-    if start is not None:
-        weights[:, 0], weights[:, 1], values[0], values[1] = ranking, -ranking, 1.0, -1.0
-    layers = [Layer(weights, np.zeros(hidden)), Layer(values, np.zeros(1))]
-    return pack(layers, (ACTIVATION,), OWN_SEEN).number
+def _weights_of(start: Team) -> Array:
+    """Return what the shipped ranking weighs the features of a target by, (13,) float64."""
+    if not isinstance(start, RankingTeam) or not start.own_targets or len(start.weights) != 1:
+        raise TrainingError(expected("method", "start", "best to be one ranking of own targets", start.summary))
+    return start.weights[0, :N_TARGET_FEATURES]

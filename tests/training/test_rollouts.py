@@ -149,7 +149,7 @@ def test_the_gradient_is_that_of_the_mean_worth(make):
     from fireworld.training.methods.rollouts import fresh_fitting
 
     trainer, random = make(hidden=3), np.random.default_rng(4)
-    network = trainer._packed._replace(number=random.normal(size=len(trainer.progress.numbers)))
+    network = trainer.network_of(random.normal(size=len(trainer.progress.numbers)))
     seen, worth, n_options = random.normal(size=(3, 4, 30)), random.normal(size=(3, 4)), np.array([4, 2, 3])
     order, temperature = np.array([2, 0, 1]), 0.7
 
@@ -159,7 +159,7 @@ def test_the_gradient_is_that_of_the_mean_worth(make):
 
     def values(number):
         layers = np.split(number, [3, 3 + 3 * 26, 3 + 3 * 26 + 1])
-        reads = trainer._packed.feature
+        reads = network.feature
         hidden = np.maximum(seen[:, :, reads] @ layers[1].reshape(26, 3) + layers[0], 0.0)
         return hidden @ layers[3] + layers[2]
 
@@ -196,7 +196,7 @@ def test_a_move_is_adams():
 
 def test_what_is_preferred_gains_its_worth(make):
     trainer = make(start="none", hidden=0)
-    network = trainer._packed._replace(number=np.zeros(27))
+    network = trainer.network_of(np.zeros(27))
     network.number[1 + OWN_SEEN.index(OWN_SEEN[0])] = 1.0
     seen = np.zeros((2, 3, 30))
     seen[0, :, network.feature[0]], seen[1, :, network.feature[0]] = [1, 3, 2], [1, 1, 9]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
@@ -20,20 +21,17 @@ from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import Curriculum
 from fireworld.training.log.records import Evolved
 from fireworld.training.method import Count, Limits, Positive, Report
-from fireworld.training.networks import Hidden, NetworkMethod, NetworkTrainer
+from fireworld.training.networks import Hidden, LayeredMethod, NetworkMethod, NetworkTrainer
 
 Momentum = Annotated[float, Limits("a number from 0, below 1", 0.0, math.nextafter(1.0, 0.0))]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Evolution(NetworkMethod):
-    """Evolution of a network that values targets."""
+class EvolutionStrategy(NetworkMethod):
+    """An evolution strategy for the numbers of a network."""
 
-    name: ClassVar[str] = "evolution"
     curriculum: ClassVar[str] = "conditions"
 
-    hidden: Hidden = 12
-    """Numbers of the layer between the 26 features and the value, relu; 0: the value is one weighted sum."""
     start: Literal["best", "none"] = "best"
     """The network before the first generation: it values targets as the shipped ranking `best`, or all of them 0."""
     n_generations: Count = 150
@@ -52,9 +50,27 @@ class Evolution(NetworkMethod):
     check_every: Count = 5
     """Generations from one check of the mean on all fires to the next; the best mean that was checked is the team."""
 
+    @abstractmethod
+    def drop_idle(self, noise: Array) -> None:
+        """Take out of noise, (pairs, k) float64, what changes no choice, so that the mean does not drift by it."""
+
     def trainer(self, curriculum: Curriculum, *, seed: int, cities: CityCache | None = None) -> EvolutionTrainer:
         """Return what trains one team; see `Method.trainer`."""
         return EvolutionTrainer(curriculum, self, seed=seed, cities=cities)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evolution(EvolutionStrategy, LayeredMethod):
+    """Evolution of a network that values targets."""
+
+    name: ClassVar[str] = "evolution"
+
+    hidden: Hidden = 12
+    """Numbers of the layer between the 26 features and the value, relu; 0: the value is one weighted sum."""
+
+    def drop_idle(self, noise: Array) -> None:
+        """Take out the noise of the last bias, which all targets get alike."""
+        noise[:, -1 - self.widths[-2]] = 0.0
 
 
 METHOD: Final = Evolution()
@@ -89,7 +105,7 @@ class Generation(Report):
 
 @dataclass
 class Progress:
-    """How far an evolution has come: all that it needs to continue. Networks are k numbers as `pack` puts them."""
+    """How far an evolution has come: all that it needs to continue. Networks are (k,) numbers."""
 
     generation: int
     mean: Array
@@ -102,7 +118,7 @@ class Progress:
     score_kept: float = 0.0
 
 
-class EvolutionTrainer(NetworkTrainer[Evolution, Generation]):
+class EvolutionTrainer(NetworkTrainer[EvolutionStrategy, Generation]):
     """Evolves one network, a report after every generation; arguments as for `Method.trainer`.
 
     The stages of the curriculum are the conditions; all of them count equally.
@@ -117,7 +133,7 @@ class EvolutionTrainer(NetworkTrainer[Evolution, Generation]):
     whole: ClassVar[type[Any] | None] = Evolved
 
     def __init__(
-        self, curriculum: Curriculum, method: Evolution, *, seed: int, cities: CityCache | None = None
+        self, curriculum: Curriculum, method: EvolutionStrategy, *, seed: int, cities: CityCache | None = None
     ) -> None:
         super().__init__(curriculum, method, seed=seed, cities=cities)
         self._evolved: Evolved | None = None
@@ -141,6 +157,7 @@ class EvolutionTrainer(NetworkTrainer[Evolution, Generation]):
             "mean": progress.mean,
             "direction": progress.direction,
             "checks": np.array([progress.score_checked, progress.score_kept]),
+            **self._kept_state(),
         }
 
     def restore(self, team: Team, state: Mapping[str, Array], *, source: str) -> None:
@@ -180,7 +197,7 @@ class EvolutionTrainer(NetworkTrainer[Evolution, Generation]):
         method, mean = self.method, self.progress.mean
         noise = np.zeros((method.n_pairs, len(mean)))
         fill_normals(self.seed, WEIGHT, self.generation, noise)
-        noise[:, -1 - self._widths[-2]] = 0.0  # the last bias, which all targets get alike
+        method.drop_idle(noise)
         return noise, np.concatenate([mean + method.noise * noise, mean - method.noise * noise])
 
     def _generation(self, pool: Executor, stop: Event) -> Generation | None:
@@ -279,7 +296,7 @@ def centred_ranks(scores: Sequence[float]) -> list[float]:
     return [(places[score][0] + places[score][-1]) / (2 * most) - 0.5 for score in scores]
 
 
-def _moved(progress: Progress, noise: Array, ranks: Sequence[float], method: Evolution) -> Progress:
+def _moved(progress: Progress, noise: Array, ranks: Sequence[float], method: EvolutionStrategy) -> Progress:
     """Move the mean: in the direction of the noise of candidates that fared better than their opposites. MODEL 10."""
     n = method.n_pairs
     worth = [(ranks[k] - ranks[n + k]) / n for k in range(n)]

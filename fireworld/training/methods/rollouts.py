@@ -22,13 +22,13 @@ from fireworld.simulation.state import fresh_target_learner
 from fireworld.training.curriculum import Curriculum
 from fireworld.training.log.records import Improved
 from fireworld.training.method import Count, Positive, PositiveShare, Report
-from fireworld.training.networks import Hidden, NetworkMethod, NetworkTrainer
+from fireworld.training.networks import Hidden, LayeredMethod, NetworkTrainer
 from fireworld.training.options import Trial, TriedDecision, try_options
 from fireworld.training.seeds import fight_seed
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rollouts(NetworkMethod):
+class Rollouts(LayeredMethod):
     """Improvement of a network that values targets by rollouts of its own decisions."""
 
     name: ClassVar[str] = "rollouts"
@@ -259,7 +259,7 @@ class RolloutsTrainer(NetworkTrainer[Rollouts, Generation]):
 
     def _learned(self, numbers: Array, decisions: Sequence[TriedDecision]) -> tuple[Array, float]:
         """Return the numbers of a network that has learned from decisions, and what it gains on them."""
-        method, network = self.method, self._packed._replace(number=numbers.copy())
+        method, network = self.method, self.network_of(numbers)
         d, c = len(decisions), method.n_options
         seen, worth = np.zeros((d, c, N_SEEN)), np.zeros((d, c))
         n_options = np.array([len(one.worth) for one in decisions], dtype=np.int64)
