@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fireworld.simulation.built import CityCache
+from fireworld.simulation.built import CityCache, build_scenario
 from fireworld.training.curriculum import load_curriculum
 
 CONDITIONS = """
@@ -19,6 +19,7 @@ stages:
 """
 """Five fires under two conditions."""
 SHORT_EVOLUTION = {"n_generations": 2, "n_pairs": 2, "n_fires": 3, "n_steps_max": 25, "hidden": 3, "check_every": 1}
+SHORT_GATES = {"n_generations": 2, "n_pairs": 2, "n_fires": 3, "n_steps_max": 25, "check_every": 1}
 SHORT_ROLLOUTS = {
     "n_generations": 2,
     "n_fights": 6,
@@ -48,3 +49,12 @@ def maker(curriculum, method):
         return method.with_settings(changes).trainer(curriculum, seed=seed, cities=cities)
 
     return make
+
+
+def decisions(policy, scenario, *, seed=3):
+    """Return what the brigades go for in a scenario, and the digest of all that comes of it, step by step."""
+    world, found = build_scenario(scenario).world(seed=seed), []
+    while not (world.terminated or world.truncated):
+        world.step(policy)
+        found.append((world.state.brigades.target.tolist(), world.digest()))
+    return found

@@ -16,9 +16,8 @@ from fireworld.policy.teams.network_layers import OWN_SEEN, pack
 from fireworld.policy.teams.network_team import NetworkTeam
 from fireworld.policy.teams.team import load_team
 from fireworld.scenario import load_scenario
-from fireworld.simulation.built import build_scenario
 from fireworld.training.methods.evolution import Evolution, centred_ranks
-from tests.training.generations import CONDITIONS, SHORT_EVOLUTION, maker, read
+from tests.training.generations import CONDITIONS, SHORT_EVOLUTION, decisions, maker, read
 from tests.training.test_search import SetAfter
 
 
@@ -56,23 +55,13 @@ def test_other_seeds_and_hyperparameters_another_evolution(make):
     assert len({evolved(make(**variant))[0] for variant in variants}) == len(variants)
 
 
-def decisions(team, name, *, seed=3):
-    """Return what the brigades of a scenario go for, and the digest of all that comes of it, step by step."""
-    world = build_scenario(load_scenario(name)).world(seed=seed)
-    policy, found = team.policy(), []
-    while not (world.terminated or world.truncated):
-        world.step(policy)
-        found.append((world.state.brigades.target.tolist(), world.digest()))
-    return found
-
-
 @pytest.mark.parametrize("hidden", [0, 2, 12])
 @pytest.mark.parametrize("name", ["quick", "test-2"])
 def test_it_starts_with_what_the_best_ranking_does(make, hidden, name):
     team = make(hidden=hidden).team()
     assert isinstance(team, NetworkTeam)
     assert team.widths == ((26, hidden, 1) if hidden else (26, 1))
-    assert decisions(team, name) == decisions(load_team("best"), name)
+    assert decisions(team.policy(), load_scenario(name)) == decisions(load_team("best").policy(), load_scenario(name))
 
 
 def test_without_a_start_all_targets_are_worth_the_same(make):

@@ -10,12 +10,17 @@ from fireworld.policy.teams.team import load_team
 from fireworld.training.log.reader import open_training
 from fireworld.training.log.verify import verify_training
 from fireworld.training.methods.evolution import Evolution
+from fireworld.training.methods.gates import Gates
 from fireworld.training.methods.rollouts import Rollouts
 from fireworld.training.train import train
 from fireworld.training.training import StopTraining
-from tests.training.generations import CONDITIONS, SHORT_EVOLUTION, SHORT_ROLLOUTS, maker, read
+from tests.training.generations import CONDITIONS, SHORT_EVOLUTION, SHORT_GATES, SHORT_ROLLOUTS, maker, read
 
-METHODS = [Evolution(**SHORT_EVOLUTION), Rollouts(**SHORT_ROLLOUTS)]
+METHODS = [Evolution(**SHORT_EVOLUTION), Gates(**SHORT_GATES), Rollouts(**SHORT_ROLLOUTS)]
+N_NUMBERS = {"evolution": 85, "gates": 40, "rollouts": 85}
+WIDTHS = {"evolution": "26-3-1", "gates": "19-15-4-1", "rollouts": "26-3-1"}
+ANOTHER = {"evolution": ({"hidden": 2}, 57), "gates": ({"n_rankings": 3}, 60), "rollouts": ({"hidden": 2}, 57)}
+"""Hyperparameters of another network, and how many numbers it has."""
 
 
 @pytest.fixture(scope="module")
@@ -75,15 +80,16 @@ def test_a_log_is_followed_to_the_same_state(fires, method, make, tmp_path):
     assert followed.points(reports[-1]) == trained.points(reports[-1])
     assert state_at_the_end(followed) == state_at_the_end(trained)
     assert log.team().digest == trained.team().digest
-    with pytest.raises(LogError, match=r"^a part holds no generation of networks of 85 numbers$"):
+    with pytest.raises(LogError, match=f"^a part holds no generation of networks of {N_NUMBERS[method.name]} numbers$"):
         make(start="none").follow({})
-    with pytest.raises(LogError, match=r"^a part holds no generation of networks of 57 numbers$"):
-        make(hidden=2).follow(next(iter(log.parts())))
+    changes, n_numbers = ANOTHER[method.name]
+    with pytest.raises(LogError, match=f"^a part holds no generation of networks of {n_numbers} numbers$"):
+        make(**changes).follow(next(iter(log.parts())))
 
 
-def test_checkpoints_of_others(make):
+def test_checkpoints_of_others(make, method):
     trainer = make()
-    with pytest.raises(TrainingError, match=r"^t.npz: expected a network of 26-3-1, got"):
-        trainer.restore(make(hidden=4).team(), trainer.state(), source="t.npz")
+    with pytest.raises(TrainingError, match=f"^t.npz: expected a network of {WIDTHS[method.name]}, got"):
+        trainer.restore(make(**ANOTHER[method.name][0]).team(), trainer.state(), source="t.npz")
     with pytest.raises(TrainingError, match=r"^t.npz: expected a network, got"):
         trainer.restore(load_team("best"), trainer.state(), source="t.npz")

@@ -14,6 +14,7 @@ from tests.training.conftest import TINY
 SHORT = {"n_episodes_max": 6, "n_episodes_unchanged": 3}
 SHORT_TARGETS = {"n_lessons": 3, "n_fights": 5, "n_steps_max": 10, "hidden": 4}
 SHORT_EVOLUTION = {"n_generations": 3, "n_pairs": 2, "n_fires": 2, "n_steps_max": 10, "hidden": 2, "check_every": 2}
+SHORT_GATES = {"n_generations": 3, "n_pairs": 2, "n_fires": 2, "n_steps_max": 10, "check_every": 2}
 SHORT_SEARCH = {"n_generations": 3, "n_candidates": 4, "n_best": 2, "n_fires": 2, "n_steps_max": 10}
 SHORT_ROLLOUTS = {"n_generations": 3, "n_fights": 2, "n_steps_max": 10, "hidden": 2, "horizon": 5, "n_epochs": 2}
 SHORT_OF = {
@@ -21,6 +22,7 @@ SHORT_OF = {
     "search": SHORT_SEARCH,
     "targets": SHORT_TARGETS,
     "evolution": SHORT_EVOLUTION,
+    "gates": SHORT_GATES,
     "rollouts": SHORT_ROLLOUTS,
 }
 
