@@ -325,9 +325,9 @@ class NetworkArrays(NamedTuple):
 class PolicyArrays(NamedTuple):
     """A policy that the kernels can follow by themselves, per brigade."""
 
-    kind: Int32  # (b,), as in `fireworld.kernels.choice`: FIXED, RANDOM, TABLE, RANK_NAMED, RANK_ALL, GIVEN, ALLOCATE
+    kind: Int32  # (b,), as in `fireworld.kernels.choice`: from FIXED to ASSIGN
     action: Int32  # (b,), the action of kinds 0 and 5
-    table_of: Int32  # (b,), the table of kind 2, the ranking of kinds 3 and 4, the target of kind 5 and OWN_TARGET
+    table_of: Int32  # (b,), the table of kind 2, the ranking of kinds 3, 4 and 7, the target of kind 5 and OWN_TARGET
     tables: Float64x3  # (tables, states, 4)
     rankings: Float64x2  # (rankings, 17), weights
     network: NetworkArrays  # if it has layers, kinds 3 and 4 value targets by it instead of a ranking

@@ -8,9 +8,9 @@ from fireworld.kernels.draws import below, uniform
 from fireworld.kernels.jit import inner, kernel
 from fireworld.kernels.observation import N_ACTIONS
 
-FIXED, RANDOM, TABLE, RANK_NAMED, RANK_ALL, GIVEN, ALLOCATE = 0, 1, 2, 3, 4, 5, 6
-"""Kinds of policies: always one action, a random one, greedy in a table; three that do not choose in a state but among
-targets, `fireworld.kernels.ranks` and `sharing`; of GIVEN, whoever runs the step says what the brigade does."""
+FIXED, RANDOM, TABLE, RANK_NAMED, RANK_ALL, GIVEN, ALLOCATE, ASSIGN = 0, 1, 2, 3, 4, 5, 6, 7
+"""Kinds of policies: always one action, a random one, greedy in a table; four that do not choose in a state but among
+targets, `fireworld.kernels.ranks`, `sharing` and `assignment`; of GIVEN, whoever runs the step says what it does."""
 
 
 @inner

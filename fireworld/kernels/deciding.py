@@ -6,8 +6,10 @@ import numpy as np
 
 from fireworld.kernels.allocation import join_site, named_range, stays
 from fireworld.kernels.arrays import BY_RANK, BY_TABLE, Array, Seen
+from fireworld.kernels.assignment import assign_target
 from fireworld.kernels.choice import (
     ALLOCATE,
+    ASSIGN,
     GIVEN,
     RANK_ALL,
     RANK_NAMED,
@@ -138,6 +140,9 @@ def decide_by_kind(
         where = episode.world.brigades, city.buildings, fire, city.geometry, sites
         action, choice = OWN_TARGET, GREEDY
         target = allocate(brigade, known, free, *where, episode.scratch.shares)
+    elif kind == ASSIGN:
+        action, target = decide_by_assignment(brigade, step, known, episode)
+        choice = GREEDY
     elif kind in (RANK_NAMED, RANK_ALL):
         action, target, choice = decide_by_worth(brigade, step, known, episode)
     else:
@@ -215,6 +220,20 @@ def decide_by_worth(brigade: int, step: int, known: Array, episode: Episode) -> 
         note_values(brigade, scratch.values, BY_RANK, seen)
         seen.target_value[brigade] = scratch.values[N_ACTIONS]
     return action, target, choice
+
+
+@inner
+def decide_by_assignment(brigade: int, step: int, known: Array, episode: Episode) -> tuple[int, int]:
+    """Return the action and the target of a brigade that is assigned to one together with others."""
+    policy, scratch, seen = episode.policy, episode.scratch, episode.seen
+    sight = sight_of(episode.city, episode.world, episode.constants, scratch)
+    in_turn, weights = episode.constants.observation.in_turn, policy.rankings[policy.table_of[brigade]]
+    team = known, policy.kind, weights
+    action, target = assign_target(brigade, in_turn, step, *team, sight, scratch.assignment, scratch.values)
+    if len(seen.state) > 0:
+        note_values(brigade, scratch.values, BY_RANK, seen)
+        seen.target_value[brigade] = scratch.values[N_ACTIONS]
+    return action, target
 
 
 @inner

@@ -89,6 +89,25 @@ class Shares(NamedTuple):
     n_joined: Int32  # (n,), by site: how many those are
 
 
+class Assignment(NamedTuple):
+    """How brigades are assigned to places at burning buildings; b brigades, n buildings. No rows where nobody asks.
+
+    Buildings are in the order of `SiteState.member`; each has up to b places.
+    """
+
+    ranks: Ranks  # what all see of the buildings
+    brigade: Int64  # (b,), numbers of those that are assigned
+    known: Int32  # (b,), what all others go for, -1 nothing
+    value: Float64x2  # (b, n), of the first place of each building to those that are assigned
+    further: Float64x2  # (b, n), by place: what it counts more than the first one, 0 or less
+    price: Float64  # (b,), scratch
+    place_price: Float64  # (b n,), scratch
+    taken_by: Int32  # (b n,), by place: which of those that are assigned has it, -1 none
+    gap: Float64  # (b n,), scratch
+    came_from: Int32  # (b n,), scratch
+    reached: UInt8  # (b n,), scratch
+
+
 class Scratch(NamedTuple):
     """What the steps of an episode write on; b brigades."""
 
@@ -100,6 +119,7 @@ class Scratch(NamedTuple):
     described_at: Int64  # (n,), -1 at first
     ranks: Ranks  # of n buildings, 0 where nobody ranks
     shares: Shares
+    assignment: Assignment
     warmth: Warmth
     seen: Float64  # (30,)
     work: Float64x2  # (2, w), w as `widest` says of the policy's network

@@ -7,10 +7,13 @@ from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fireworld.kernels.arrays import Array, CityArrays, NetworkArrays, PolicyArrays, Seen
+from fireworld.kernels.assignment import assign_target, fresh_assignment, settle
 from fireworld.kernels.choice import (
     ALLOCATE,
+    ASSIGN,
     FIXED,
     GIVEN,
     RANDOM,
@@ -59,7 +62,7 @@ class KernelPolicy(Policy):
 
     def __post_init__(self) -> None:
         """Raise ValueError for what the compiled episode and single steps would not do alike."""
-        if self.commit > 1 and {RANK_NAMED, RANK_ALL, ALLOCATE} & set(self.kinds):
+        if self.commit > 1 and {RANK_NAMED, RANK_ALL, ALLOCATE, ASSIGN} & set(self.kinds):
             raise ValueError("what values targets chooses in every step: commit must be 1")
 
     def for_brigades(self, n_brigades: int) -> PolicyArrays:
@@ -94,6 +97,8 @@ class KernelPolicy(Policy):
         brigade, seed, step = observation.brigade, observation.seed, observation.step
         if ready.kind[brigade] in (RANK_NAMED, RANK_ALL):
             return _by_rank(observation, ready)
+        if ready.kind[brigade] == ASSIGN:
+            return _by_assignment(observation, ready)
         if ready.kind[brigade] == ALLOCATE:
             return _by_share(observation)
         action = int(choose(brigade, observation.state_index, ready, seed, step))
@@ -113,7 +118,7 @@ class KernelPolicy(Policy):
         """SHA-256 of what the policy does."""
         content = hashlib.sha256(repr((self.kinds, self.actions, self.table_of, self.epsilon, self.commit)).encode())
         content.update(repr(self.tables.shape).encode() + np.ascontiguousarray(self.tables, dtype="<f8").tobytes())
-        if {RANK_NAMED, RANK_ALL} & set(self.kinds):
+        if {RANK_NAMED, RANK_ALL, ASSIGN} & set(self.kinds):
             content.update(np.ascontiguousarray(self.rankings, dtype="<f8").tobytes())
         if len(self.network.layer):
             for array, dtype in zip(self.network, ("<i8", "<i8", "<f8"), strict=True):
@@ -140,8 +145,8 @@ def noted_decisions(
             decisions.append(Decision(-1))
         elif choice == KEPT:
             decisions.append(Decision(act, target=int(last_target[brigade])))
-        elif kind in (RANK_NAMED, RANK_ALL):
-            own = int(target[brigade]) if kind == RANK_ALL else None
+        elif kind in (RANK_NAMED, RANK_ALL, ASSIGN):
+            own = int(target[brigade]) if kind != RANK_NAMED else None
             values = tuple(seen.action_values[brigade].tolist())
             decisions.append(Decision(act, target=own, q_values=values, value=float(seen.target_value[brigade])))
         elif kind == TABLE:
@@ -177,6 +182,41 @@ def _by_rank(observation: Observation, ready: PolicyArrays) -> Decision:
         q_values=tuple(values[: len(ACTIONS)].tolist()),
         value=float(values[len(ACTIONS)]),
     )
+
+
+def _by_assignment(observation: Observation, ready: PolicyArrays) -> Decision:
+    """Choose the target that a brigade is assigned to together with those that have not chosen yet."""
+    brigade, values = observation.brigade, np.zeros(len(ACTIONS) + 1)
+    n_brigades, n_buildings = len(ready.kind), len(observation.world.fire.energy)
+    action, target = assign_target(
+        brigade,
+        observation.constants.observation.in_turn,
+        observation.step,
+        observation.known_targets,
+        ready.kind,
+        ready.rankings[ready.table_of[brigade]],
+        observation.sight,
+        fresh_assignment(n_brigades, n_buildings),
+        values,
+    )
+    return Decision(
+        int(action),
+        target=int(target),
+        q_values=tuple(values[: len(ACTIONS)].tolist()),
+        value=float(values[len(ACTIONS)]),
+    )
+
+
+def settled_targets(observation: Observation, kind: Array) -> NDArray[np.int32]:
+    """Return the (b,) targets of those that are not assigned together with a brigade, -1 for all others.
+
+    `kind` (b,) is the policy's: who follows an assignment.
+    """
+    assignment = fresh_assignment(len(kind), 0)
+    in_turn = observation.constants.observation.in_turn
+    settle(observation.brigade, in_turn, observation.known_targets, kind, observation.sight, assignment)
+    known: NDArray[np.int32] = assignment.known
+    return known
 
 
 def _by_share(observation: Observation) -> Decision:
@@ -220,6 +260,11 @@ def from_rankings(rankings: Array, *, own_targets: bool) -> KernelPolicy:
     n = len(rankings)
     kind = RANK_ALL if own_targets else RANK_NAMED
     return KernelPolicy((kind,) * n, (0,) * n, tuple(range(n)), NO_TABLES, rankings=rankings)
+
+
+def from_assignment(ranking: Array) -> KernelPolicy:
+    """Return the policy that assigns brigades to targets by what one ranking says of them, (17,) weights."""
+    return KernelPolicy((ASSIGN,), (0,), (0,), NO_TABLES, rankings=ranking[np.newaxis])
 
 
 def from_network(network: NetworkArrays, *, own_targets: bool) -> KernelPolicy:

@@ -11,7 +11,8 @@ import numpy as np
 
 from fireworld.kernels.addresses import address_row
 from fireworld.kernels.arrays import Array, FireState, Learner, PolicyArrays, Seen
-from fireworld.kernels.choice import ALLOCATE, RANK_ALL, RANK_NAMED
+from fireworld.kernels.assignment import fresh_assignment
+from fireworld.kernels.choice import ALLOCATE, ASSIGN, RANK_ALL, RANK_NAMED
 from fireworld.kernels.episode_arrays import LAST_STEP, SEED, STEP, Scratch
 from fireworld.kernels.network import widest
 from fireworld.kernels.observation import N_ACTIONS, N_FEATURES
@@ -82,9 +83,11 @@ def bind(
 
 def fresh_scratch(policy: PolicyArrays, fire: FireState, *, describes: bool) -> Scratch:
     """Return what the steps of a team write on; arguments as of `bind`."""
-    n_brigades, ranks = len(policy.kind), bool(np.isin(policy.kind, (RANK_NAMED, RANK_ALL)).any())
-    shares, n_buildings = bool((policy.kind == ALLOCATE).any()), len(fire.energy)
-    n_described = n_buildings if describes or ranks else 0
+    n_brigades, n_buildings = len(policy.kind), len(fire.energy)
+    ranks, shares, assigns = (
+        bool(np.isin(policy.kind, kinds).any()) for kinds in ((RANK_NAMED, RANK_ALL), ALLOCATE, ASSIGN)
+    )
+    n_described = n_buildings if describes or ranks or assigns else 0
     return Scratch(
         features=np.zeros(N_FEATURES, dtype=np.int64),
         action_before=np.zeros(n_brigades, dtype=np.int32),
@@ -94,6 +97,7 @@ def fresh_scratch(policy: PolicyArrays, fire: FireState, *, describes: bool) -> 
         described_at=np.full(n_described, -1),
         ranks=fresh_ranks(n_brigades, n_buildings if ranks else 0),
         shares=fresh_shares(n_brigades if shares else 0, n_buildings if shares else 0),
+        assignment=fresh_assignment(n_brigades if assigns else 0, n_buildings if assigns else 0),
         warmth=fresh_warmth(n_buildings, fire.air.shape),
         seen=np.zeros(N_SEEN),
         work=np.zeros((2, widest(policy.network))),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fireworld.errors import PolicyError
-from fireworld.policy.kernel import from_rankings, from_tables
+from fireworld.policy.kernel import from_assignment, from_rankings, from_tables
 from fireworld.policy.names import BUILT_IN, find_policy
 from fireworld.policy.protocol import Action, Decision
 from fireworld.testing import PolicyConformance
@@ -41,6 +41,11 @@ class TestRanking(PolicyConformance):
 
     def make_policy(self):
         return from_rankings(np.random.default_rng(1).normal(size=(2, 17)), own_targets=self.own_targets)
+
+
+class TestAssignment(PolicyConformance):
+    def make_policy(self):
+        return from_assignment(np.random.default_rng(1).normal(size=17))
 
 
 class TestNetwork(TestRanking):

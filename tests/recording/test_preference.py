@@ -28,6 +28,10 @@ def recorded(team, folder, scenario="test-1", **options):
     return fw.open_log(folder / "a.mcap")
 
 
+def assigned_team():
+    return RankingTeam(np.random.default_rng(7).normal(size=(1, 17)), True, assigned=True)
+
+
 def named_team(own_targets):
     return RankingTeam(np.random.default_rng(5).normal(size=(2, 17)), own_targets)
 
@@ -124,3 +128,17 @@ def test_errors_are_named(tmp_path):
         fw.preferences("best", run, step=0)
     with pytest.raises(TrainingError, match="a ranking or a network"):
         fw.preferences("paper-cooperative", run, step=1)
+
+
+def test_an_assigned_brigade_is_told_what_targets_are_worth_to_it_alone(tmp_path):
+    run = recorded(assigned_team(), tmp_path)
+    found = fw.preferences(assigned_team(), run, step=STEP)
+    values = run.step(STEP).decisions.target_value
+    assert found.brigades
+    for one in found.brigades:
+        assert one.chosen_value == pytest.approx(values[one.brigade], rel=1e-6), "what is on record"
+        if one.other is not None:
+            difference = one.chosen_value - one.other_value
+            assert sum(share.part for share in one.shares) == pytest.approx(difference, abs=1e-6)
+            assert ("though alone it would be given" in one.text) == (difference < 0)
+    assert any(one.other is not None for one in found.brigades)

@@ -18,6 +18,7 @@ from fireworld.policy.kernel import (
     always,
     at_random,
     each_another,
+    from_assignment,
     from_rankings,
     from_tables,
 )
@@ -37,6 +38,7 @@ POLICIES = (
     "table-of-270",
     "ranking-of-named",
     "ranking-of-all",
+    "assignment",
     "network-of-named",
     "network-of-all",
     "allocate",
@@ -71,6 +73,7 @@ def policy_named(name: str) -> KernelPolicy:
         "table-of-270": lambda: from_tables(random.normal(size=(1, 270, 4))),
         "ranking-of-named": lambda: from_rankings(random.normal(size=(2, 17)), own_targets=False),
         "ranking-of-all": lambda: from_rankings(random.normal(size=(2, 17)), own_targets=True),
+        "assignment": lambda: from_assignment(random.normal(size=17)),
         "network-of-named": lambda: make_network().policy(),
         "network-of-all": lambda: make_network(own_targets=True).policy(),
         "allocate": allocating,

@@ -11,7 +11,7 @@ import numpy as np
 
 from fireworld.errors import TrainingError, expected
 from fireworld.kernels.arrays import Array
-from fireworld.policy.kernel import KernelPolicy, from_rankings
+from fireworld.policy.kernel import KernelPolicy, from_assignment, from_rankings
 from fireworld.policy.teams.npz import check_arrays, check_finite
 from fireworld.policy.teams.ranking_words import (
     HINT,
@@ -40,17 +40,20 @@ class RankingTeam(Team):
     """Brigades go for any burning building of their site, not only for the four that the paper's actions name."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
     """Curriculum, method, seed, version: plain values."""
+    assigned: bool = False
+    """Brigades are assigned to own targets together, so that the sum of values is highest; all follow one row."""
 
     @property
     def digest(self) -> str:
         """SHA-256 of what the brigades follow."""
-        kind = repr((self.weights.shape, self.own_targets)).encode()
+        kind = repr((self.weights.shape, self.own_targets, *(["assigned"] if self.assigned else []))).encode()
         return hashlib.sha256(kind + self.arrays()["weights"].tobytes()).hexdigest()
 
     @property
     def summary(self) -> str:
         """What is ranked."""
-        return "a ranking of " + ("own targets" if self.own_targets else "the paper's actions")
+        own = "own targets, to which brigades are assigned together" if self.assigned else "own targets"
+        return "a ranking of " + (own if self.own_targets else "the paper's actions")
 
     @property
     def counted(self) -> Sequence[Weight]:
@@ -65,6 +68,8 @@ class RankingTeam(Team):
 
     def policy(self) -> KernelPolicy:
         """Return the policy of the team."""
+        if self.assigned:
+            return from_assignment(self.weights[0])
         return from_rankings(self.weights, own_targets=self.own_targets)
 
     def arrays(self) -> dict[str, Array]:
@@ -73,7 +78,8 @@ class RankingTeam(Team):
 
     def header(self) -> dict[str, Any]:
         """Return the names of the weights, and what is ranked."""
-        return {"weights": [weight.name for weight in WEIGHTS], "own_targets": self.own_targets}
+        assigned = {"assigned": True} if self.assigned else {}
+        return {"weights": [weight.name for weight in WEIGHTS], "own_targets": self.own_targets, **assigned}
 
     @classmethod
     def from_file(
@@ -86,13 +92,19 @@ class RankingTeam(Team):
             raise TrainingError(expected(source, "weights", ", ".join(wanted), str(names)))
         if not isinstance(own_targets, bool):
             raise TrainingError(expected(source, "own_targets", "true or false", own_targets))
+        assigned = header.pop("assigned", False)
+        if not isinstance(assigned, bool) or (assigned and not own_targets):
+            kept = "true or false, and true only with own_targets"
+            raise TrainingError(expected(source, "assigned", kept, assigned))
         check_arrays(arrays, "weights", source=source)
         weights = arrays.pop("weights")
         if weights.ndim != 2 or not len(weights) or weights.shape[1] != len(WEIGHTS) or weights.dtype != np.float64:
             shape = f"float64 weights of shape (brigades, {len(WEIGHTS)})"
             raise TrainingError(expected(source, "weights", shape, f"{weights.dtype} {weights.shape}"))
+        if assigned and len(weights) != 1:
+            raise TrainingError(expected(source, "weights", "one row, which all follow", f"{len(weights)} rows"))
         check_finite(weights, "weights", source=source)
-        return cls(np.ascontiguousarray(weights), own_targets, provenance)
+        return cls(np.ascontiguousarray(weights), own_targets, provenance, assigned)
 
     def preferences(self, *, row: int) -> list[Preference]:
         """Return what the brigades that follow a row prefer, the largest weight first; weights of 0 are left out."""
@@ -126,7 +138,9 @@ class RankingTeam(Team):
                 WeightChange(row, weight.name, a, b) for weight, a, b in zip(WEIGHTS, of_a, of_b, strict=True) if a != b
             ]
             changed += sorted(found, key=lambda change: -abs(change.b - change.a))
-        return RankingDifference(len(self.weights), tuple(changed), (self.own_targets, other.own_targets))
+        return RankingDifference(
+            len(self.weights), tuple(changed), (self.own_targets, other.own_targets), (self.assigned, other.assigned)
+        )
 
     def describe(self, *, states: Sequence[str] = (), limit: int = SHOWN_MAX) -> Iterator[Block]:
         """Yield the weights, and what they come to in words."""
@@ -136,7 +150,7 @@ class RankingTeam(Team):
         whose = (
             "one row of weights for all brigades" if n == 1 else f"{n} rows of weights, one for each brigade in turn"
         )
-        yield f"a ranking of {targets_in_words(own_targets=self.own_targets)}, {whose}"
+        yield f"a ranking of {targets_in_words(own_targets=self.own_targets, assigned=self.assigned)}, {whose}"
         yield from (*self.origin, f"digest {self.digest}", "")
         columns = ["value"] if n == 1 else [f"brigade {row}" for row in range(n)]
         rows = [
@@ -156,6 +170,7 @@ class RankingTeam(Team):
         return {
             "digest": self.digest,
             "own_targets": self.own_targets,
+            "assigned": self.assigned,
             "n_rows": len(self.weights),
             "provenance": self.short_provenance,
             "weights": [

@@ -69,8 +69,10 @@ class Preference:
         return {"weight": self.weight.name, "strength": self.strength, "words": self.words}
 
 
-def targets_in_words(*, own_targets: bool) -> str:
-    """Return among what a ranking chooses."""
+def targets_in_words(*, own_targets: bool, assigned: bool = False) -> str:
+    """Return among what a ranking chooses, and how."""
+    if assigned:
+        return "all burning buildings of the fire site, to which brigades are assigned together"
     return "all burning buildings of the fire site" if own_targets else "the targets of the paper's four actions"
 
 
@@ -93,18 +95,22 @@ class RankingDifference(TeamDifference):
     changed: tuple[WeightChange, ...]
     """Row by row, in each the largest change first."""
     own_targets: tuple[bool, bool]
+    assigned: tuple[bool, bool]
 
     @property
     def same(self) -> bool:
         """Whether the brigades of both do the same."""
-        return not self.changed and self.own_targets[0] == self.own_targets[1]
+        return not self.changed and all(one == other for one, other in (self.own_targets, self.assigned))
 
     def describe(self, *, limit: int = SHOWN_MAX) -> Iterator[Block]:
         """Yield which weights differ."""
         if self.same:
             yield f"the same: {self.n_rows} row{'s' if self.n_rows > 1 else ''} of weights"
             return
-        a, b = (targets_in_words(own_targets=own) for own in self.own_targets)
+        a, b = (
+            targets_in_words(own_targets=own, assigned=assigned)
+            for own, assigned in zip(self.own_targets, self.assigned, strict=True)
+        )
         if a != b:
             yield f"A ranks {a}, B {b}"
         n = len(self.changed)
@@ -130,5 +136,6 @@ class RankingDifference(TeamDifference):
             "n_rows": self.n_rows,
             "n_changed": len(self.changed),
             "own_targets": list(self.own_targets),
+            "assigned": list(self.assigned),
             "changed": [{"row": one.row, "weight": one.name, "a": one.a, "b": one.b} for one in self.changed[:limit]],
         }

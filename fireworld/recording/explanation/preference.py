@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
@@ -13,6 +13,7 @@ from fireworld.errors import LogError, TrainingError, expected
 from fireworld.kernels.arrays import Array
 from fireworld.kernels.observation import find_target
 from fireworld.kernels.ranking import N_TARGET_FEATURES
+from fireworld.policy.kernel import settled_targets
 from fireworld.policy.protocol import Decision, Observation, Policy
 from fireworld.policy.seen_targets import seen_targets
 from fireworld.policy.teams.network_layers import SEEN, Layer
@@ -54,6 +55,7 @@ class Preference:
         other: id of the target that the team values most of all others; None if there was no other.
         other_value: by the team.
         shares: one for each feature that the team reads, the largest part first; the parts add up to the difference.
+        assigned: the team assigns brigades together: the values are those of targets that no other of them is given.
     """
 
     brigade: int
@@ -62,6 +64,7 @@ class Preference:
     other: int | None = None
     other_value: float = 0.0
     shares: tuple[FeatureShare, ...] = ()
+    assigned: bool = False
 
     @property
     def text(self) -> str:
@@ -72,7 +75,8 @@ class Preference:
         head += f", worth {self.chosen_value:.3f}"
         if self.other is None:
             return f"{head}: there is no other target"
-        word = "rather than" if self.chosen_value >= self.other_value else "though the team would go for"
+        though = "though alone it would be given" if self.assigned else "though the team would go for"
+        word = "rather than" if self.chosen_value >= self.other_value else though
         return f"{head}, {word} {self.other}, worth {self.other_value:.3f}"
 
 
@@ -164,6 +168,10 @@ class _Looking(Policy):
 
 def _preference(team: RankingTeam | NetworkTeam, observation: Observation, made: Decision) -> Preference:
     """Return what a team makes of a decision."""
+    assigned = isinstance(team, RankingTeam) and team.assigned
+    if assigned:
+        kind = team.policy().for_brigades(len(observation.known_targets)).kind
+        observation = replace(observation, known_targets=settled_targets(observation, kind))
     targets, seen = _options(observation, own_targets=team.own_targets)
     chosen = made.target if made.target is not None else observation.targets[made.action]
     reads, layers, activations = _as_layers(team, observation.brigade)
@@ -175,7 +183,7 @@ def _preference(team: RankingTeam | NetworkTeam, observation: Observation, made:
     others = [k for k, target in enumerate(targets) if target != chosen]
     value = float(values[place])
     if not others:
-        return Preference(observation.brigade, int(ids[chosen]), value)
+        return Preference(observation.brigade, int(ids[chosen]), value, assigned=assigned)
     other = min(others, key=lambda k: (-values[k], k))
     of_chosen, of_other = seen[place, reads], seen[other, reads]
     parts = _parts(of_chosen, of_other, layers, activations)
@@ -190,6 +198,7 @@ def _preference(team: RankingTeam | NetworkTeam, observation: Observation, made:
         int(ids[targets[other]]),
         float(values[other]),
         tuple(sorted(shares, key=lambda share: -abs(share.part))),
+        assigned,
     )
 
 
