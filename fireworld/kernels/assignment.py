@@ -29,6 +29,7 @@ def fresh_assignment(n_brigades: int, n_buildings: int) -> Assignment:
         brigade=np.zeros(n_brigades, dtype=np.int64),
         known=np.zeros(n_brigades, dtype=np.int32),
         value=np.empty((n_brigades, n_buildings)),
+        building=np.empty(n_buildings, dtype=np.int32),
         further=np.empty((n_brigades, n_buildings)),
         price=np.zeros(n_brigades),
         place_price=np.empty(n_places),
@@ -66,7 +67,7 @@ def settle(brigade: int, in_turn: bool, known: Array, kind: Array, sight: Sight,
 def value_for_all(
     n: int, first: int, end: int, step: int, weights: Array, sight: Sight, assignment: Assignment
 ) -> None:
-    """Write what each of the first n brigades values the buildings [first, end) in the row, and their further places.
+    """Write what the first places of the buildings [first, end) in the row are worth to each of the first n brigades.
 
     `weights` (17,) are the ranking's.
     """
@@ -83,11 +84,44 @@ def value_for_all(
         if target >= 0 and sites.place[target] >= 0:
             mine = np.uint64(ranks.position[target])
         weigh_row(brigades.x[brigade], brigades.y[brigade], mine, range_square, first, end, weights, 0.0, ranks)
-        value = assignment.value[i]
-        for k in range(np.uint64(first), np.uint64(end)):
-            value[k] = ranks.value[k]
-    for k in range(np.uint64(first), np.uint64(end)):
-        here, needed, before = ranks.n_here[k], ranks.needed[k], 0.0
+        for k in range(end - first):
+            assignment.value[i, k] = ranks.value[first + k]
+
+
+@kernel
+def keep_best(n: int, n_buildings: int, assignment: Assignment) -> int:
+    """Keep the buildings that are among the n best of one of the first n brigades; return how many these are.
+
+    No other is needed: whatever the others get, in one of a brigade's n best there is nobody. Written: `building`, the
+    kept ones in their order; `value` becomes that of these.
+    """
+    value, kept, seen_by = assignment.value, assignment.reached, assignment.came_from
+    for k in range(n_buildings):
+        kept[k], seen_by[k] = 0, NOBODY
+    for i in range(n):
+        for _ in range(min(n, n_buildings)):
+            best = NOBODY
+            for k in range(n_buildings):
+                if seen_by[k] != i and (best == NOBODY or value[i, k] > value[i, best]):
+                    best = k
+            kept[best], seen_by[best] = 1, i
+    n_kept = 0
+    for k in range(n_buildings):
+        if kept[k] != 0:
+            assignment.building[n_kept] = k
+            for i in range(n):
+                value[i, n_kept] = value[i, k]
+            n_kept += 1
+    return n_kept
+
+
+@inner
+def price_further(n: int, n_kept: int, first: int, weights: Array, assignment: Assignment) -> None:
+    """Write what the n places of each kept building count more than its first one, 0 or less."""
+    ranks = assignment.ranks
+    for k in range(n_kept):
+        at = first + np.int64(assignment.building[k])
+        here, needed, before = ranks.n_here[at], ranks.needed[at], 0.0
         enough = 1.0 if is_enough(here, needed) else 0.0
         for place in range(n):
             more_enough = (1.0 if is_enough(here + place, needed) else 0.0) - enough
@@ -96,7 +130,7 @@ def value_for_all(
 
 
 @inner
-def look_from(taker: int, last: int, first: int, n_buildings: int, n_places: int, assignment: Assignment) -> np.int64:
+def look_from(taker: int, last: int, n_buildings: int, n_places: int, assignment: Assignment) -> np.int64:
     """Write how far each place that is not reached yet is by way of a taker, who has the place `last`, -1 none.
 
     Returns the nearest of all that are not reached.
@@ -105,7 +139,7 @@ def look_from(taker: int, last: int, first: int, n_buildings: int, n_places: int
     for j in range(n_places):
         if assignment.reached[j] != 0:
             continue
-        k = first + j % n_buildings
+        k = j % n_buildings
         worth = assignment.value[taker, k] + assignment.further[j // n_buildings, k]
         lack = assignment.price[taker] - worth + assignment.place_price[j]
         if lack < gap[j]:
@@ -116,7 +150,7 @@ def look_from(taker: int, last: int, first: int, n_buildings: int, n_places: int
 
 
 @inner
-def reach_free_place(new: int, first: int, n_buildings: int, n_places: int, assignment: Assignment) -> np.int64:
+def reach_free_place(new: int, n_buildings: int, n_places: int, assignment: Assignment) -> np.int64:
     """Return the nearest free place for a new taker, by way of places that others would give up for further ones."""
     price, place_price, gap, reached = assignment.price, assignment.place_price, assignment.gap, assignment.reached
     price[new] = 0.0
@@ -124,7 +158,7 @@ def reach_free_place(new: int, first: int, n_buildings: int, n_places: int, assi
         gap[j], reached[j], assignment.came_from[j] = np.inf, 0, NOBODY
     taker, last = np.int64(new), np.int64(NOBODY)
     while True:
-        nearest = look_from(taker, last, first, n_buildings, n_places, assignment)
+        nearest = look_from(taker, last, n_buildings, n_places, assignment)
         step = gap[nearest]
         price[new] -= step
         for j in range(n_places):
@@ -139,18 +173,17 @@ def reach_free_place(new: int, first: int, n_buildings: int, n_places: int, assi
 
 
 @kernel
-def assign(n: int, first: int, end: int, assignment: Assignment) -> None:
-    """Assign the first n brigades to places of the buildings [first, end) in the row: the highest sum of values.
+def assign(n: int, n_buildings: int, assignment: Assignment) -> None:
+    """Assign the first n brigades to places of the first buildings, n each: the highest sum of values.
 
     The Hungarian method with prices and shortest augmenting paths (Kuhn 1955, Munkres 1957, Jonker and Volgenant 1987),
-    brigade after brigade. Written: `taken_by`, place p of building k being number p * (end - first) + k - first.
+    brigade after brigade. Written: `taken_by`, place p of building k being number p * n_buildings + k.
     """
-    n_buildings = end - first
     n_places = n * n_buildings
     for j in range(n_places):
         assignment.place_price[j], assignment.taken_by[j] = 0.0, NOBODY
     for new in range(n):
-        place = reach_free_place(new, first, n_buildings, n_places, assignment)
+        place = reach_free_place(new, n_buildings, n_places, assignment)
         while place != NOBODY:
             before = np.int64(assignment.came_from[place])
             assignment.taken_by[place] = new if before == NOBODY else assignment.taken_by[before]
@@ -179,17 +212,19 @@ def assign_target(
         return np.int64(-1), np.int64(-1)
     n = settle(brigade, in_turn, known, kind, sight, assignment)
     value_for_all(n, first, end, step, weights, sight, assignment)
-    assign(n, first, end, assignment)
-    row, place = 0, 0
+    row = 0
     for i in range(n):
         if assignment.brigade[i] == brigade:
             row = i
-    for j in range(n * (end - first)):
-        if assignment.taken_by[j] == row:
-            place = j
-    k = first + place % (end - first)
-    values[N_ACTIONS] = assignment.value[row, k]
     for action in range(N_ACTIONS):
         b = find_target(brigade, action, sight.brigades, sight.buildings, sight.fire, sight.geometry, sight.sites)
-        values[action] = assignment.value[row, assignment.ranks.position[b]]
-    return np.int64(OWN_TARGET), np.int64(sight.sites.member[k])
+        values[action] = assignment.value[row, assignment.ranks.position[b] - first]
+    n_kept = keep_best(n, end - first, assignment)
+    price_further(n, n_kept, first, weights, assignment)
+    assign(n, n_kept, assignment)
+    k = 0
+    for j in range(n * n_kept):
+        if assignment.taken_by[j] == row:
+            k = j % n_kept
+    values[N_ACTIONS] = assignment.value[row, k]
+    return np.int64(OWN_TARGET), np.int64(sight.sites.member[first + assignment.building[k]])

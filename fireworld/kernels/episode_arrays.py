@@ -92,13 +92,14 @@ class Shares(NamedTuple):
 class Assignment(NamedTuple):
     """How brigades are assigned to places at burning buildings; b brigades, n buildings. No rows where nobody asks.
 
-    Buildings are in the order of `SiteState.member`; each has up to b places.
+    Each building has up to b places.
     """
 
     ranks: Ranks  # what all see of the buildings
     brigade: Int64  # (b,), numbers of those that are assigned
     known: Int32  # (b,), what all others go for, -1 nothing
     value: Float64x2  # (b, n), of the first place of each building to those that are assigned
+    building: Int32  # (n,), the kept buildings, by their place among those that may be named
     further: Float64x2  # (b, n), by place: what it counts more than the first one, 0 or less
     price: Float64  # (b,), scratch
     place_price: Float64  # (b n,), scratch

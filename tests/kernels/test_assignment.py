@@ -5,7 +5,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from fireworld.kernels.assignment import assign, fresh_assignment
+from fireworld.kernels.assignment import assign, fresh_assignment, keep_best
 from fireworld.policy.kernel import from_assignment, from_rankings
 from fireworld.scenario import load_scenario
 from fireworld.simulation.built import CityCache
@@ -14,10 +14,9 @@ from fireworld.simulation.built import CityCache
 def assigned(value, further):
     """Return the building and place of each row, by the kernel; value (n, k), further (n, k)."""
     n, n_buildings = value.shape
-    first = 2  # whatever comes before in the row is not touched
-    room = fresh_assignment(n, first + n_buildings)
-    room.value[:, first:], room.further[:, first:] = value, further
-    assign(n, first, first + n_buildings, room)
+    room = fresh_assignment(n, n_buildings)
+    room.value[:], room.further[:] = value, further
+    assign(n, n_buildings, room)
     taken = room.taken_by[: n * n_buildings]
     return [divmod(int(np.flatnonzero(taken == row)[0]), n_buildings) for row in range(n)]
 
@@ -41,6 +40,21 @@ def test_sum_is_the_highest(seed):
     assert len({*found}) == n, "a place is taken once"
     total = sum(value[row, k] + further[place, k] for row, (place, k) in enumerate(found))
     assert total == pytest.approx(best_sum(value, further), rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_is_not_kept_is_not_needed(seed):
+    random = np.random.default_rng(seed)
+    value = random.integers(0, 9, size=(3, 8)).astype(float)
+    further = np.minimum.accumulate(np.vstack([np.zeros(8), -random.integers(0, 9, size=(2, 8))]).astype(float))
+    room = fresh_assignment(3, 8)
+    room.value[:] = value
+    n_kept = keep_best(3, 8, room)
+    kept = room.building[:n_kept]
+    assert 3 <= n_kept <= 8
+    assert [*kept] == sorted({*kept})
+    np.testing.assert_array_equal(room.value[:, :n_kept], value[:, kept])
+    assert best_sum(value[:, kept], further[:, kept]) == best_sum(value, further)
 
 
 def test_all_go_to_one_building_if_further_places_cost_nothing():

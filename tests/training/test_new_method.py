@@ -169,8 +169,8 @@ def test_from_the_command_line(here, fireworld, guessing):
         "fireworld: method: n_guesses: expected a whole number from 1 to 1000000, got 0\n"
     )
     assert fireworld("train", "-o", "b.npz", "--method", "gues").err == (
-        "fireworld: --method: expected one of paper, assignment, evolution, gates, rollouts, sarsa, search, targets, guess, "
-        "got 'gues'\n"
+        "fireworld: --method: expected one of paper, assignment, evolution, gates, rollouts, sarsa, search, targets, "
+        "guess, got 'gues'\n"
     )
 
 
@@ -179,7 +179,17 @@ def test_a_module_in_the_folder_is_all_it_takes(here, fireworld, monkeypatch, gu
     assert fireworld(*guessing, "-o", "a.npz").code == 2
     (here / "guess.py").write_text("from tests.training.test_new_method import Guess\n\nMETHOD = Guess()\n")
     monkeypatch.setattr(methods, "__path__", [*methods.__path__, str(here)])
-    assert method_names() == ["paper", "assignment", "evolution", "gates", "rollouts", "sarsa", "search", "targets", "guess"]
+    assert method_names() == [
+        "paper",
+        "assignment",
+        "evolution",
+        "gates",
+        "rollouts",
+        "sarsa",
+        "search",
+        "targets",
+        "guess",
+    ]
     assert fireworld(*guessing, "-o", "a.npz").code == 0
     monkeypatch.delitem(sys.modules, f"{methods.__name__}.guess")
 
