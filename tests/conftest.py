@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 POLICIES = Path(__file__).with_name("policies.py")
 LEAN_ON_LIBRARIES = ("cli", "envs", "executors", "recorder", "viewer")
@@ -31,6 +32,10 @@ for name in (
     "LINES",
 ):
     os.environ.pop(name, None)
+
+# On a machine that is busy, an example takes as long as it takes: no test depends on time.
+settings.register_profile("patient", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("patient")
 
 pytest_plugins = ["pytester"]
 

@@ -84,7 +84,7 @@ def exchanges(draw):
 
 
 @given(exchanges())
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 def test_ranks_give_exactly_what_one_building_after_another_gives(exchange):
     air, order, seed = exchange
     parameters = FireParameters()
@@ -198,7 +198,7 @@ def test_cooling_by_hand():
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 0.5))
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_fuel_never_rises_and_water_is_never_made(seed, rate):
     random = np.random.default_rng(seed)
     n = len(MINI.capacity)

@@ -31,7 +31,7 @@ def test_by_hand(outline, crosses):
         assert crosses_itself(turned) == crosses
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(st.lists(st.tuples(st.integers(0, 6), st.integers(0, 6)), min_size=3, max_size=9))
 def test_the_sweep_says_what_shapely_says(corners):
     outline = [corner for k, corner in enumerate(corners) if corner != corners[k - 1]]

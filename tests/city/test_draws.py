@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
 
@@ -55,7 +55,6 @@ def test_many_at_once_are_the_same_draws(seed, purpose, entities, step, bound):
     assert lot_draws.below(seed, purpose, many, step, bound=np.full(len(many), bound)).tolist() == each
 
 
-@settings(deadline=None)  # the first example compiles
 @given(INT64, st.integers(0, 20), INT64, INT64, st.integers(1, 2**31))
 def test_both_twins_agree(seed, purpose, entity, step, bound):
     assert int(kernel.hash_key(seed, purpose, entity, step)) == draws.hash_key(seed, purpose, entity, step)

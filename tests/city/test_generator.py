@@ -45,7 +45,7 @@ def test_refuges_stand_on_the_lots_nearest_to_their_places():
     assert crowd.footprints.refuge.tolist() == [1, 1]
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(
     columns=st.integers(1, 9),
     rows=st.integers(1, 9),

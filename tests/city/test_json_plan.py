@@ -261,7 +261,7 @@ JUNK = st.recursive(
 )
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(path=st.sampled_from([path for path in places(CITY) if path]), value=JUNK | st.just(DELETE))
 def test_a_city_is_read_or_refused_but_never_fails(path, value):
     message = complaint(json.dumps(changed(path, value)).encode())
@@ -269,7 +269,7 @@ def test_a_city_is_read_or_refused_but_never_fails(path, value):
     assert message.isprintable()
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(st.binary(max_size=40), st.integers(0, len(json.dumps(CITY))))
 def test_no_bytes_make_it_fail(noise, place):
     text = json.dumps(CITY).encode()

@@ -145,7 +145,7 @@ def test_direction_place_and_start_of_an_outline(shift):
 GRID = st.integers(0, 24).map(lambda k: 500 * k)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.lists(st.tuples(GRID, GRID), min_size=4, max_size=9), st.booleans())
 def test_any_outline_is_what_the_reference_makes_of_it(corners, closed):
     frame = rectangle(0, 0, 12_500, 12_500)  # so that every outline covers something

@@ -100,7 +100,7 @@ def plain_footpaths(points):
     large=st.sampled_from([1, 4, 500]),
     at_once=st.sampled_from([1, 60, 1 << 19]),
 )
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 def test_footpaths_are_those_of_all_pairs(points, apart, large, at_once):
     points = [(x + apart * (k % 3), y) for k, (x, y) in enumerate(points)]  # some of them in clusters far away
     drawn = footprints(*[rectangle(x, y, 2, 2) for x, y in points])

@@ -192,7 +192,7 @@ def test_programs_in_a_trace_never_run(tmp_path):
 
 
 @given(st.data())
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 def test_damaged_bytes(tmp_path, data):
     """Damage is refused in one line, or is where it changes nothing: an archive has checksums."""
     content = bytearray(trace_path("mini_brigades").read_bytes())
@@ -218,7 +218,7 @@ ANY_ARRAY = st.one_of(
 
 
 @given(st.dictionaries(st.sampled_from(sorted(ARRAYS)), ANY_ARRAY, min_size=1, max_size=3))
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 def test_any_arrays(tmp_path, changes):
     """Whatever the arrays are, there is a report or one line."""
     path = tmp_path / "trace.npz"
@@ -294,7 +294,7 @@ EVENT_KEYS = ["ignitions", "later_ignitions", "water", "brigades", "brigade_move
 
 
 @given(st.dictionaries(st.sampled_from(EVENT_KEYS), JSON_VALUE, min_size=1))
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 def test_any_events(tmp_path, changes):
     """Whatever a city file says of the run, it is read or refused in one line."""
     path = tmp_path / "city.json"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import fireworld as fw
@@ -15,7 +15,6 @@ from fireworld.policy.kernel import from_tables
 from tests.envs.towns import SMALL
 
 
-@settings(deadline=None)  # the first call compiles
 @given(
     seed=st.integers(0, RUN_SEED_MAX),
     brigade=st.integers(0, 3),

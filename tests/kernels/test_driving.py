@@ -168,7 +168,7 @@ coordinate = st.integers(-120_000, 120_000)
     part=st.tuples(st.integers(0, 100), st.integers(0, 100)),
     range_mm=st.integers(100, 90_000),
 )
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_stopping_is_what_looking_at_every_millimetre_finds(end, target, part, range_mm):
     """Streets at any angle, whose whole lengths are not quite their true ones."""
     nodes_m = [(0, 0), (end[0] / METRE, end[1] / METRE)]
@@ -194,7 +194,7 @@ SLANTED = make_world(make_city(square(0, 0), nodes_m=[(0, 0), (100, 0)]))
 
 
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(1, 120_000)), min_size=1, max_size=20))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_brigade_is_always_on_its_street_and_never_too_fast(trips):
     world = make_world(make_city(*BUILDINGS, nodes_m=NODES_M, streets=STREETS), brigades=[AT_UP])
     streets, brigades = world.city_arrays.streets, world.state.brigades

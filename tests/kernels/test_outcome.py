@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fireworld.kernels.outcome import exp_of_minus
@@ -57,7 +57,6 @@ def test_the_score_of_today(hp):
     assert world.state.outcome.score[2] == pytest.approx(expected, rel=1e-14)
 
 
-@settings(deadline=None)  # the first call compiles
 @given(st.floats(0.0, 8.0))
 def test_the_exponential_is_that_of_the_library(x):
     assert exp_of_minus(x) == pytest.approx(math.exp(-x), rel=3e-14)

@@ -131,14 +131,14 @@ def graphs(draw: st.DrawFn) -> Streets:
 
 
 @given(streets=graphs())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_all_ways_are_those_of_plain_numpy(streets):
     for found, expected in zip(complete(streets), shortest_ways(streets), strict=True):
         np.testing.assert_array_equal(found, expected)
 
 
 @given(streets=graphs(), n_kept=st.integers(1, 5), order=st.integers(0, 1000))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_so_are_those_that_are_asked_for_one_by_one(streets, n_kept, order):
     driven = np.unique(streets.street)
     for found, expected in zip(
@@ -148,7 +148,7 @@ def test_so_are_those_that_are_asked_for_one_by_one(streets, n_kept, order):
 
 
 @given(streets=graphs(), n_kept=st.integers(2, 5), trips=st.lists(st.tuples(*[st.integers(0, 999)] * 4), max_size=12))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_whole_ways_are_the_same_however_few_are_kept(streets, n_kept, trips):
     """Driven from street to street with the lines that were looked up where the way began, as brigades do."""
     arrays = tables(streets)

@@ -61,13 +61,13 @@ def protobuf_types():
     return types
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(record=st.sampled_from(FLAT).flatmap(records_of))
 def test_a_record_survives_encoding(record):
     assert same(codec.decode(type(record), codec.encode(record)), record)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(record=st.sampled_from(FLAT).flatmap(records_of))
 def test_bytes_are_those_of_the_protobuf_library(protobuf_types, record):
     data = codec.encode(record)
@@ -139,7 +139,7 @@ def test_malformed_messages_are_refused(data, words):
         codec.decode(Buildings, data)
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 @given(data=st.binary(max_size=60), topic=st.sampled_from(TOPICS))
 def test_any_bytes_decode_or_are_refused(data, topic):
     with contextlib.suppress(LogError):

@@ -123,7 +123,7 @@ def test_health(share):
     st.integers(0, 900),
     st.tuples(st.integers(-60_000, 60_000), st.integers(-60_000, 60_000)),
 )
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 def test_requests(litres, tank, target_mm):
     parameters = OFFICIAL_2011.brigades
     constants = brigade_constants(parameters)

@@ -262,7 +262,7 @@ def test_driving_where_ways_tie_and_refilling_where_brigades_queue():
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_sites_of_fires_that_jump_about(seed):
     """Far wilder than real fires: sites merge, split and trade numbers at every step."""
     play, random = rough(1), np.random.default_rng(seed)
@@ -327,7 +327,7 @@ def assert_same_sites(compiled: World, plain: episode.World, seen: sites.Sites |
     st.lists(st.integers(0, 5000), min_size=1, max_size=60),
     st.integers(0, 1000),
 )
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_draws(seed, purpose, entities, step):
     """Many at once are the same draws as one by one; the episodes above show that it is that of the kernels."""
     many = np.array(entities)

@@ -126,7 +126,7 @@ def test_civilians_around_a_named_fire_or_a_point():
     assert ids(plan, named.civilian_building) == [12, 0]
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(order=st.permutations(range(SIDE * SIDE)), seed=st.integers(0, 2**32 - 1))
 def test_the_order_of_the_map_moves_no_one(order, seed):
     wanted = scenario("[{at: [0.41, 0.57], n_buildings: 3}]", f"{{n: 6, seed: {seed}}}")

@@ -49,7 +49,7 @@ runs = st.fixed_dictionaries(
 
 
 @given(run=runs, name=st.sampled_from(POLICIES))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_every_step(run, name):
     world = town_world(**run, n_steps_max=40)
     policy = begin(policy_named(name), world)
@@ -168,7 +168,7 @@ def everything(city, fire):
 
 
 @given(seed=st.integers(0, 2**32 - 1), step=st.integers(1, 500))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_a_building_far_away_changes_no_draws(seed, step):
     constants = fire_constants(PAPER.fire)
     rates = []

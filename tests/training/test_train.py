@@ -181,7 +181,7 @@ def test_a_callback_that_fails_is_the_callers_matter(here, files):
         ),
         (
             {"method": "magic"},
-            "^--method: expected one of paper, evolution, gates, rollouts, sarsa, search, targets, got 'magic'$",
+            "^--method: expected one of paper, assignment, .*, search, targets, got 'magic'$",
         ),
         ({"method": 3}, "^--method: expected a name or a Method, got 'int'$"),
         ({"seed": -1}, "^seed: expected a whole number from 0 to 4294967295, got -1$"),

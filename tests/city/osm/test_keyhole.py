@@ -59,7 +59,7 @@ def test_rings_may_run_either_way(clockwise):
     assert doubled_area_mm2(outline) == 2 * (400 - 25)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.lists(st.tuples(*[st.integers(5, 45)] * 4), min_size=9, max_size=9), st.integers(0, 3), st.booleans())
 def test_what_is_inside_stays_inside(drawn, turn, mirrored):
     """Up to nine holes in cells of 100, some left out; area, length and insides as of the rings themselves."""
