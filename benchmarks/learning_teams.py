@@ -131,12 +131,19 @@ def contestants(
             lambda _, group: best_joint(fires[group]),
         ),
         Contestant(
-            "planner", "rollouts at run time; over `best` it saves more", 1, lambda _, __: Planner(), SEEDS_OF_PLANNER
+            "planner",
+            "rollouts at run time; over `best-2026` it saves more",
+            1,
+            lambda _, __: Planner(),
+            SEEDS_OF_PLANNER,
         ),
         *(replace(rival, n_seeds=SEEDS_OF_RIVALS) for rival in rivals),
         Contestant("own-alone", f"search, own targets{SIGHT_WORDS['alone']}", n, workshop.ranking("own", "alone")),
         Contestant(
-            "own-cooperative", "search, own targets: how `best` was made", n, workshop.ranking("own", "cooperative")
+            "own-cooperative",
+            "search, own targets: how `best-2026` was made",
+            n,
+            workshop.ranking("own", "cooperative"),
         ),
     ]
 

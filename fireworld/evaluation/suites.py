@@ -21,7 +21,7 @@ from fireworld.scenario.yaml_text import read_yaml
 from fireworld.training.curriculum import SIZE_MAX_BYTES, StageText, build_stage
 
 NAMES: Final = (
-    "tests", "contested", "larger", "scarce-water", "two-sites", "three-sites", "few-brigades",
+    "tests", "paper-world", "contested", "larger", "scarce-water", "two-sites", "three-sites", "few-brigades",
     "many-brigades", "official-like",
 )  # fmt: skip
 """All suites in the order in which they are shown."""

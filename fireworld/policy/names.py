@@ -62,6 +62,8 @@ RECORDED: Final = "recorded"
 _FILE: Final = re.compile(rf"(.+?(?:{re.escape(CODE_SUFFIX)}|{re.escape(SUFFIX)}))(?::(.*))?", re.DOTALL)
 _OVER: Final = re.compile(rf"(?:{'|'.join(PLANNERS)}):(?:[^\"']*,)?over=(?=[^\"'])", re.DOTALL)
 """The beginning of a planner's name, up to the policy that it is over."""
+FORMER_TEAMS: Final = {"best": ("best-2026",)}
+"""Names under which teams are kept that had this name before."""
 
 
 class KnownPolicy(NamedTuple):
@@ -187,6 +189,15 @@ def with_file(name: str, changed: Callable[[str], str]) -> str:
     rest, more = (name[len(before) :], "") if not over else _until_comma(name[len(before) :])
     file = _FILE.fullmatch(rest)
     return name if file is None else before + changed(file[1]) + rest[len(file[1]) :] + more
+
+
+def former_names(name: str) -> list[str]:
+    """Return the names of what a policy may have been when it was recorded: planners over a team that had this name."""
+    over = _OVER.match(name)
+    if over is None:
+        return []
+    team, more = _until_comma(name[len(over[0]) :])
+    return [over[0] + former + more for former in FORMER_TEAMS.get(team, ())]
 
 
 def _until_comma(text: str) -> tuple[str, str]:

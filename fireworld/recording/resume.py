@@ -10,7 +10,7 @@ import numpy as np
 
 from fireworld.errors import FireworldError, LogError, PolicyError, expected
 from fireworld.policy.asking import begin
-from fireworld.policy.names import TEAM_ATTACHMENT, NamedPolicy, find_policy
+from fireworld.policy.names import TEAM_ATTACHMENT, NamedPolicy, find_policy, former_names
 from fireworld.policy.protocol import Policy
 from fireworld.policy.teams.team import parse_team
 from fireworld.recording.decisions import RecordedDecisions, ShadowPolicy
@@ -79,6 +79,8 @@ def recorded_policy(header: RunHeader, *, source: str) -> NamedPolicy:
         reason = str(error).removeprefix("--policy: ")
         hint = "name another one with --policy"
         raise PolicyError(f"{source}: its policy {name} cannot be loaded: {reason}; {hint}") from error
+    before = [] if named.digest == header.policy_digest else map(find_policy, former_names(name))
+    named = next((one for one in before if one.digest == header.policy_digest), named)
     if named.digest != header.policy_digest:
         wanted = f"the policy {name} as it was recorded ({header.policy_digest[:12]})"
         got = f"one that has changed since ({named.digest[:12]})"

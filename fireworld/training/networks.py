@@ -50,7 +50,7 @@ class NetworkMethod(GenerationMethod):
     @property
     @abstractmethod
     def start(self) -> str:
-        """The network before the first generation: `best` values targets as that ranking, `none` all of them 0."""
+        """The network before the first generation: `best-2026` values targets as that ranking, `none` all of them 0."""
 
     @property
     def n_checks(self) -> int:
@@ -89,8 +89,8 @@ class LayeredMethod(NetworkMethod):
     def __post_init__(self) -> None:
         """Raise TrainingError if a hyperparameter is not what it may be."""
         super().__post_init__()
-        if self.start == "best" and 0 < self.hidden < N_OF_RANKING:
-            wanted = f"0, or at least {N_OF_RANKING}, which a ranking takes (start best)"
+        if self.start == "best-2026" and 0 < self.hidden < N_OF_RANKING:
+            wanted = f"0, or at least {N_OF_RANKING}, which a ranking takes (start best-2026)"
             raise TrainingError(expected("method", "hidden", wanted, self.hidden))
 
     @property
@@ -136,7 +136,7 @@ class NetworkTrainer(GenerationTrainer[AMethod, AReport]):
         super().__init__(curriculum, method, seed=seed, cities=cities)
         self._activations = (ACTIVATION,) * (len(method.widths) - 2)
         self._conditions = _conditions(curriculum)
-        self._start = load_team("best") if method.start == "best" else None
+        self._start = None if method.start == "none" else load_team(method.start)
         self._first = method.first_numbers(None if self._start is None else _weights_of(self._start), seed)
 
     @property
@@ -236,5 +236,5 @@ def _conditions(curriculum: Curriculum) -> dict[str, range]:
 def _weights_of(start: Team) -> Array:
     """Return what the shipped ranking weighs the features of a target by, (13,) float64."""
     if not isinstance(start, RankingTeam) or not start.own_targets or len(start.weights) != 1:
-        raise TrainingError(expected("method", "start", "best to be one ranking of own targets", start.summary))
+        raise TrainingError(expected("method", "start", "one ranking of own targets", start.summary))
     return start.weights[0, :N_TARGET_FEATURES]

@@ -61,7 +61,7 @@ def test_one_layer_is_the_ranking_where_the_sums_are(own_targets):
 
 
 def test_the_best_team_as_a_network():
-    best = load_team("best")
+    best = load_team("best-2026")
     network = as_network(best)
     for name in ("default", "test-3-brigades-8"):
         ends = []

@@ -13,10 +13,12 @@ from fireworld_recorder.diff import compare
 from fireworld_recorder.reader import open_log
 from fireworld_recorder.writer import StepFile
 
+from fireworld.errors import PolicyError
+from fireworld.policy.names import find_policy
 from fireworld.policy.teams.table_team import TableTeam
 from fireworld.recording.fork import prepare_fork
 from fireworld.recording.replay import build_recorded
-from fireworld.recording.resume import Beginning, resume
+from fireworld.recording.resume import Beginning, recorded_policy, resume
 from fireworld.records import ACTION_NAMES, ACTIONS, MemoryRecording
 from tests.recording.conftest import STEPS, write_log
 
@@ -347,6 +349,18 @@ def test_a_policy_with_a_memory_that_decides_otherwise_now(here, fireworld):
 def altered(records, step, **changes):
     """Return records one of which holds something else."""
     return [replace(record, **changes) if record.step == step else record for record in records]
+
+
+def test_a_planner_over_a_team_that_has_another_name_now(here, fireworld):
+    """`best` was another team once: old recordings of planners over it are known by their digest."""
+    fireworld("run", "quick", "--policy", "random", "--steps", 1, "--record", "a.mcap")
+    header = replace(open_log("a.mcap").header, policy="planner:horizon=5,over=best,interval=2")
+    old, new = (find_policy(f"planner:horizon=5,over={name},interval=2").digest for name in ("best-2026", "best"))
+    assert old != new
+    for digest in (old, new):
+        assert recorded_policy(replace(header, policy_digest=digest), source="a.mcap").digest == digest
+    with pytest.raises(PolicyError, match="one that has changed since"):
+        recorded_policy(replace(header, policy_digest="0" * 64), source="a.mcap")
 
 
 def test_a_recording_that_does_not_replay(here, fireworld, recordings):

@@ -61,7 +61,8 @@ def test_it_starts_with_what_the_best_ranking_does(make, hidden, name):
     team = make(hidden=hidden).team()
     assert isinstance(team, NetworkTeam)
     assert team.widths == ((26, hidden, 1) if hidden else (26, 1))
-    assert decisions(team.policy(), load_scenario(name)) == decisions(load_team("best").policy(), load_scenario(name))
+    scenario = load_scenario(name)
+    assert decisions(team.policy(), scenario) == decisions(load_team("best-2026").policy(), scenario)
 
 
 def test_without_a_start_all_targets_are_worth_the_same(make):
@@ -69,15 +70,13 @@ def test_without_a_start_all_targets_are_worth_the_same(make):
     assert not team.layers[-1].weights.any()
     assert team.layers[0].weights.any(), "hidden weights are drawn"
     assert "start" not in make(start="none").identity
-    assert make().identity["start"] == load_team("best").digest
+    assert make().identity["start"] == load_team("best-2026").digest
 
 
 def test_a_start_that_is_no_ranking(make, monkeypatch):
     network = make().team()
     monkeypatch.setattr("fireworld.training.networks.load_team", lambda _: network)
-    with pytest.raises(
-        TrainingError, match=r"^method: start: expected best to be one ranking of own targets, got a net"
-    ):
+    with pytest.raises(TrainingError, match=r"^method: start: expected one ranking of own targets, got a net"):
         make()
 
 
@@ -195,9 +194,9 @@ def test_centred_ranks():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"hidden": 1}, r"hidden: expected 0, or at least 2, which a ranking takes \(start best\), got 1"),
+        ({"hidden": 1}, r"hidden: expected 0, or at least 2, which a ranking takes \(start best-2026\), got 1"),
         ({"hidden": 257}, "hidden: expected a whole number from 0 to 256, got 257"),
-        ({"start": "paper"}, "start: expected one of best, none, got 'paper'"),
+        ({"start": "paper"}, "start: expected one of best-2026, none, got 'paper'"),
         ({"n_generations": 0}, "n_generations: expected a whole number from 1 to 1000000, got 0"),
         ({"n_pairs": 0}, "n_pairs: expected a whole number from 1"),
         ({"n_fires": 0}, "n_fires: "),

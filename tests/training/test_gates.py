@@ -139,7 +139,7 @@ class Watching(Policy):
     """Does what the ranking `best` does, and keeps what each brigade saw of its targets."""
 
     def __init__(self):
-        self.policy, self.found = load_team("best").policy(), []
+        self.policy, self.found = load_team("best-2026").policy(), []
         self.policy.begin(None, TWO_SITES.brigades.n, 0)
 
     def decide(self, observation):
@@ -169,16 +169,16 @@ def test_it_starts_with_what_the_best_ranking_does(make, n_rankings, name):
     assert team.widths == (19, 13 + n_rankings * (n_rankings - 1), 2 * n_rankings, 1)
     assert team.features == (*FEATURES, *SITUATION)
     rankings, *gates = parts_of(trainer.progress.mean, n_rankings)
-    assert (rankings == load_team("best").weights[0, :13]).all()
+    assert (rankings == load_team("best-2026").weights[0, :13]).all()
     assert not any(gate.any() for gate in gates)
-    assert decisions(team.policy(), scenario) == decisions(load_team("best").policy(), scenario)
+    assert decisions(team.policy(), scenario) == decisions(load_team("best-2026").policy(), scenario)
 
 
 def test_without_a_start_all_targets_are_worth_the_same(make):
     trainer = make(start="none")
     assert not trainer.progress.mean.any()
     assert "start" not in trainer.identity
-    assert make().identity["start"] == load_team("best").digest
+    assert make().identity["start"] == load_team("best-2026").digest
 
 
 class InNumpy(Policy):
@@ -263,7 +263,7 @@ def test_the_command_line_trains_records_and_resumes(here, fireworld):
     assert fireworld(*words, "-o", "b.npz", "--stages", "alone", "--set", "start=none", "--record", "b.mcap").code == 0
     assert fireworld("verify", "a.mcap", "--team", "a.npz").code == 0
     shown = fireworld("info", "a.mcap")
-    assert (shown.code, "gates: start best, " in shown.out, "n_rankings 3\n" in shown.out) == (0, True, True)
+    assert (shown.code, "gates: start best-2026, " in shown.out, "n_rankings 3\n" in shown.out) == (0, True, True)
     assert fireworld("report", "a.mcap", "-o", "a.html").code == 0
     assert fireworld("diff", "a.mcap", "b.mcap").code == 1
     assert fireworld("export", "a.mcap", "--csv", "tables").code == 0
@@ -284,7 +284,7 @@ def test_the_command_line_trains_records_and_resumes(here, fireworld):
         ({"n_rankings": 1}, "n_rankings: expected a whole number from 2 to 4, got 1"),
         ({"n_rankings": 5}, "n_rankings: expected a whole number from 2 to 4, got 5"),
         ({"n_rankings": 2.5}, "n_rankings: expected a whole number from 2 to 4, got 2.5"),
-        ({"start": "paper"}, "start: expected one of best, none, got 'paper'"),
+        ({"start": "paper"}, "start: expected one of best-2026, none, got 'paper'"),
         ({"noise": 0.0}, "noise: expected a number > 0, got 0.0"),
         ({"n_pairs": 0}, "n_pairs: expected a whole number from 1"),
     ],

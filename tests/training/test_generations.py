@@ -17,9 +17,9 @@ from fireworld.training.training import StopTraining
 from tests.training.generations import CONDITIONS, SHORT_EVOLUTION, SHORT_GATES, SHORT_ROLLOUTS, maker, read
 
 METHODS = [Evolution(**SHORT_EVOLUTION), Gates(**SHORT_GATES), Rollouts(**SHORT_ROLLOUTS)]
-N_NUMBERS = {"evolution": 85, "gates": 40, "rollouts": 85}
-WIDTHS = {"evolution": "26-3-1", "gates": "19-15-4-1", "rollouts": "26-3-1"}
-ANOTHER = {"evolution": ({"hidden": 2}, 57), "gates": ({"n_rankings": 3}, 60), "rollouts": ({"hidden": 2}, 57)}
+N_NUMBERS = {"evolution": 85, "gates": 40, "rollouts": 255}
+WIDTHS = {"evolution": "26-3-1", "gates": "19-15-4-1", "rollouts": "26-9-1"}
+ANOTHER = {"evolution": ({"hidden": 2}, 57), "gates": ({"n_rankings": 3}, 60), "rollouts": ({"hidden": 2}, 171)}
 """Hyperparameters of another network, and how many numbers it has."""
 
 
@@ -92,4 +92,4 @@ def test_checkpoints_of_others(make, method):
     with pytest.raises(TrainingError, match=f"^t.npz: expected a network of {WIDTHS[method.name]}, got"):
         trainer.restore(make(**ANOTHER[method.name][0]).team(), trainer.state(), source="t.npz")
     with pytest.raises(TrainingError, match=r"^t.npz: expected a network, got"):
-        trainer.restore(load_team("best"), trainer.state(), source="t.npz")
+        trainer.restore(load_team("best-2026"), trainer.state(), source="t.npz")

@@ -224,4 +224,4 @@ def test_its_teams_show_themselves(here, fireworld, guessing):
     assert repr(team) == f"<FixedTeam: always nearest-to-center, digest {team.digest[:12]}>"
     assert '<td class="text">nearest-to-center</td>' in team._repr_html_()
     with pytest.raises(TrainingError, match=r"^B: expected a fixed action, as in A, got a ranking of targets$"):
-        compare_teams(team, load_team("best"))
+        compare_teams(team, load_team("best-2026"))

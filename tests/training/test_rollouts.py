@@ -30,7 +30,7 @@ def improved(trainer, *, n_threads=1):
     """Improve to the end; return the network and what is kept."""
     list(trainer.run(threads(n_threads)))
     assert trainer.done
-    return trainer.progress.numbers.tobytes(), trainer.progress.kept.tobytes()
+    return trainer.newest.tobytes(), trainer.kept.tobytes()
 
 
 def test_other_seeds_and_hyperparameters_another_network(make):
@@ -53,6 +53,27 @@ def test_stopped_and_resumed(make, n_looks, n_done):
     assert improved(second) == improved(whole)
 
 
+@pytest.mark.parametrize("hidden", [3, 0])
+def test_the_team_is_the_mean_of_the_last_networks(make, hidden):
+    trainer = make(hidden=hidden, n_generations=3, n_averaged=2)
+    networks = [trainer.newest]
+    for _ in trainer:
+        networks.append(trainer.newest)
+        of_each = [trainer.method.layers_of(one) for one in networks[-2:]]
+        seen = np.random.default_rng(1).normal(size=(50, 26))
+        values = [by_layers(layers, seen) for layers in (*of_each, trainer.team().layers)]
+        assert values[2] == pytest.approx((values[0] + values[1]) / 2)
+        assert not np.allclose(values[0], values[1])
+    assert len({one.tobytes() for one in networks}) == 4
+
+
+def by_layers(layers, seen):
+    """The values of a network of one hidden layer, or of none."""
+    for layer in layers[:-1]:
+        seen = np.maximum(seen @ layer.weights + layer.biases, 0.0)
+    return (seen @ layers[-1].weights + layers[-1].biases)[:, 0]
+
+
 def test_curves(make):
     trainer = make()
     for report in trainer:
@@ -60,7 +81,7 @@ def test_curves(make):
         assert {*found} == {*trainer.plots, *trainer.own_plots()}
         assert {*found["conditions"]} == {"usual", "many"}
         assert math.isclose(math.fsum(found["conditions"].values()) / 2, report.score_mean)
-        assert report.score_kept >= report.score_checked
+        assert found["check"] == {"": report.score_checked}
 
 
 def test_the_conditions_come_in_turn(make):
@@ -77,21 +98,21 @@ def tried_in(make, *, share=1.0, **changes):
     trainer = make(share=share, **changes)
     built = trainer._cities.build(trainer.curriculum.scenarios[-1])
     world = built.world(seed=5, n_steps_max=20)
-    return world, try_options(world, trainer.policy_of(trainer.progress.numbers), trainer.method.trial, Event())
+    return world, try_options(world, trainer.policy_of(trainer.newest), trainer.method.trial, Event())
 
 
 def test_trying_options_out_changes_no_fight(make):
     world, found = tried_in(make)
     trainer = make()
     alone = trainer._cities.build(trainer.curriculum.scenarios[-1]).world(seed=5, n_steps_max=20)
-    alone.run(trainer.policy_of(trainer.progress.numbers).for_brigades(alone.n_brigades))
+    alone.run(trainer.policy_of(trainer.newest).for_brigades(alone.n_brigades))
     assert world.digest() == alone.digest()
     assert len(found) > 5
 
 
 def test_what_was_chosen_comes_first_and_is_worth_nothing_more(make):
     _, found = tried_in(make)
-    weights = load_team("best").weights[0, :13]
+    weights = load_team("best-2026").weights[0, :13]
     for decision in found:
         assert decision.worth[0] == 0.0
         assert decision.seen.shape == (len(decision.worth), 30)
@@ -121,9 +142,7 @@ def test_a_target_that_is_chosen_anyway_is_worth_the_same(make, monkeypatch):
         return found
 
     monkeypatch.setattr(options._Rollouts, "tried", tried)
-    try_options(
-        built.world(seed=5, n_steps_max=20), trainer.policy_of(trainer.progress.numbers), trainer.method.trial, Event()
-    )
+    try_options(built.world(seed=5, n_steps_max=20), trainer.policy_of(trainer.newest), trainer.method.trial, Event())
     assert len(worths) > 5
     assert all(one == other for one, other in worths)
 
@@ -136,11 +155,11 @@ def test_a_network_learns_to_prefer_what_is_worth_more(make):
         seen = random.normal(size=(4, 30))
         worth = seen[:, 2] - seen[0, 2]
         decisions.append(TriedDecision(seen, worth))
-    numbers, gained = trainer._learned(trainer.progress.numbers, decisions)
+    numbers, gained = trainer._learned(trainer.newest, decisions)
     most = float(np.mean([one.worth.max() for one in decisions]))
     assert gained > 0.9 * most
-    before = trainer._learned(trainer.progress.numbers, [])[0]
-    assert before.tobytes() == trainer.progress.numbers.tobytes()
+    before = trainer._learned(trainer.newest, [])[0]
+    assert before.tobytes() == trainer.newest.tobytes()
     assert numbers.tobytes() != before.tobytes()
 
 
@@ -149,7 +168,7 @@ def test_the_gradient_is_that_of_the_mean_worth(make):
     from fireworld.training.methods.rollouts import fresh_fitting
 
     trainer, random = make(hidden=3), np.random.default_rng(4)
-    network = trainer.network_of(random.normal(size=len(trainer.progress.numbers)))
+    network = trainer.network_of(random.normal(size=len(trainer.newest)))
     seen, worth, n_options = random.normal(size=(3, 4, 30)), random.normal(size=(3, 4)), np.array([4, 2, 3])
     order, temperature = np.array([2, 0, 1]), 0.7
 
@@ -207,13 +226,15 @@ def test_what_is_preferred_gains_its_worth(make):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"hidden": 1}, r"hidden: expected 0, or at least 2, which a ranking takes \(start best\), got 1"),
-        ({"start": "paper"}, "start: expected one of best, none, got 'paper'"),
+        ({"hidden": 1}, r"hidden: expected 0, or at least 2, which a ranking takes \(start best-2026\), got 1"),
+        ({"start": "paper"}, "start: expected one of best-2026, none, got 'paper'"),
         ({"share": 0.0}, "share: expected a number above 0, at most 1, got 0.0"),
         ({"n_fights": 0}, "n_fights: expected a whole number from 1"),
         ({"horizon": 0}, "horizon: "),
         ({"temperature": -1.0}, "temperature: expected a number > 0"),
         ({"n_checks": 0}, "n_checks: "),
+        ({"n_averaged": 0}, "n_averaged: expected a whole number from 1"),
+        ({"hidden": 100, "n_averaged": 11}, r"n_averaged: expected at most 10 \(with 100 hidden\), got 11"),
     ],
 )
 def test_hyperparameters_that_make_no_improvement(changes, message):
@@ -225,8 +246,9 @@ def test_hyperparameters_that_make_no_improvement(changes, message):
     ("broken", "wanted"),
     [
         ({"generation": np.array([9])}, "generation: expected a whole number up to 2"),
-        ({"numbers": np.zeros(3)}, r"numbers: expected 85 numbers, got float64 \(3,\)"),
-        ({"checks": np.zeros(3)}, "checks: expected 2 numbers"),
+        ({"kept": np.zeros(3)}, r"kept: expected 255 numbers, got float64 \(3,\)"),
+        ({"kept": np.ones(255)}, "kept: expected the numbers of its team, got those of another"),
+        ({"check": np.zeros(3)}, "check: expected 1 numbers"),
     ],
 )
 def test_a_checkpoint_that_makes_no_sense(make, broken, wanted):

@@ -16,6 +16,7 @@ from fireworld.policy.teams import team_names, team_path
 from fireworld.policy.teams.table_team import TableTeam
 from fireworld.policy.teams.team import load_team
 from fireworld.training.curriculum import load_curriculum
+from fireworld.training.methods.rollouts import Rollouts
 from fireworld.training.methods.sarsa import PAPER
 from fireworld.training.methods.search import Search
 from fireworld.training.training import check_same
@@ -28,15 +29,19 @@ CURRICULA = {
 
 
 def test_the_papers_teams_are_there():
-    assert {*SHAPES, "best"} == set(COMMANDS) <= set(team_names())
+    assert {*SHAPES, "best", "best-2026"} == set(COMMANDS) <= set(team_names())
 
 
-def test_the_best_comes_from_the_shipped_curriculum():
-    ranking = load_team("best")
-    wanted = Search().trainer(load_curriculum("contested"), seed=1).identity
-    assert {key: ranking.provenance[key] for key in wanted} == wanted
-    assert ranking.provenance["generations_done"] == Search().n_generations
-    assert ranking.own_targets
+@pytest.mark.parametrize(
+    ("name", "method", "curriculum", "seed"),
+    [("best", Rollouts(), "conditions", 2026), ("best-2026", Search(), "contested", 1)],
+)
+def test_the_best_come_from_the_shipped_curricula(name, method, curriculum, seed):
+    team = load_team(name)
+    wanted = method.trainer(load_curriculum(curriculum), seed=seed).identity
+    assert {key: team.provenance[key] for key in wanted} == wanted
+    assert team.provenance["generations_done"] == method.n_generations
+    assert team.own_targets
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -64,11 +69,12 @@ def test_by_its_name(name):
 @pytest.mark.parametrize("name", COMMANDS)
 def test_it_shows_itself(name):
     team = load_team(name)
-    kind, what = ("RankingTeam", "own targets") if name == "best" else ("TableTeam", "states")
+    kinds = {"best": ("NetworkTeam", "own targets"), "best-2026": ("RankingTeam", "own targets")}
+    kind, what = kinds.get(name, ("TableTeam", "states"))
     assert repr(team).startswith(f"<{kind}: ")
     assert what in repr(team)
     assert repr(team).endswith(f"digest {team.digest[:12]}>")
-    assert team._repr_html_().count("<table>") == 1
+    assert team._repr_html_().count("<table>") == (2 if name == "best" else 1)
     assert team.digest in team._repr_html_()
     assert pickle.loads(pickle.dumps(team)).policy().digest == team.policy().digest  # noqa: S301 - our own
 

@@ -288,14 +288,17 @@ class Improved:
         "double",
         "how much more, on the mean, rollouts came to after what the network after it prefers than after what was done",
     )
-    score_checked: float = value(5, "double", "of the network after it on all fires")
-    score_kept: float = value(6, "double", "the best of those: that of the team")
-    fire: Array = column(7, "sfixed32", "the scenario of each fight, a position in /plan", per="fire")
-    seed: Array = column(8, "fixed64", "of its random draws", per="fire")
-    score: Array = column(9, "double", "at its end, as a share of the maximum", per="fire")
-    n_tried: Array = column(10, "sfixed32", "decisions of it whose options were tried", per="fire")
-    numbers: Array = column(11, "double", "biases and weights of the network after it, layer by layer", per="weight")
-    kept: Array = column(12, "double", "biases and weights of the team", per="weight")
+    score_checked: float = value(5, "double", "of the team after it on all fires")
+    fire: Array = column(6, "sfixed32", "the scenario of each fight, a position in /plan", per="fire")
+    seed: Array = column(7, "fixed64", "of its random draws", per="fire")
+    score: Array = column(8, "double", "at its end, as a share of the maximum", per="fire")
+    n_tried: Array = column(9, "sfixed32", "decisions of it whose options were tried", per="fire")
+    numbers: Array = column(
+        10,
+        "double",
+        "of the networks that the team is the mean of, the newest last: biases and weights, layer by layer",
+        per="weight",
+    )
 
 
 @dataclass(frozen=True)
@@ -340,8 +343,8 @@ def check_places(record: Any, n_brigades: Sequence[int]) -> None:
         check_played(record, n_brigades[record.scenario])
     if isinstance(record, Lesson) and len({*map(len, (record.fire, record.seed, record.score, record.n_steps))}) > 1:
         raise LogError(f"{record.topic}: its columns are not of the same fights")
-    if isinstance(record, Improved) and not _fits_improved(record):
-        raise LogError(f"{record.topic}: its columns are not of the same fights, or of the same networks")
+    if isinstance(record, Improved) and len({*map(len, (record.fire, record.seed, record.score, record.n_tried))}) > 1:
+        raise LogError(f"{record.topic}: its columns are not of the same fights")
     if isinstance(record, Tried) and not _fits(record):
         raise LogError(f"{record.topic}: its columns are not of the same rankings, weights and fires")
     if isinstance(record, Evolved) and not _fits_evolved(record):
@@ -364,12 +367,6 @@ def _fits_evolved(evolved: Evolved) -> bool:
     if len({*map(len, (evolved.mean, evolved.direction, evolved.kept))}) > 1 or len(evolved.seed) != n_fires:
         return False
     return n_fires > 0 and len(evolved.scores) % (2 * n_fires) == 0
-
-
-def _fits_improved(improved: Improved) -> bool:
-    """Return whether the columns of a generation are of the same fights and networks."""
-    of_fights = {*map(len, (improved.fire, improved.seed, improved.score, improved.n_tried))}
-    return len(of_fights) == 1 and len(improved.numbers) == len(improved.kept)
 
 
 TRAINING: Final = LogKind(

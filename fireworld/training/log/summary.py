@@ -117,8 +117,7 @@ COLUMNS: Final[Mapping[type[Any], Mapping[str, tuple[str, str]]]] = {
         "score": ("score_mean", ".3f"),
         "decisions": ("n_decisions", ",d"),
         "gain": ("gain", ".5f"),
-        "on all fires": ("score_checked", ".3f"),
-        "of the team": ("score_kept", ".3f"),
+        "of the team on all fires": ("score_checked", ".3f"),
     },
 }
 """What is shown of parts that are of no one scenario: by heading, the field and how it is written."""

@@ -32,8 +32,8 @@ class EvolutionStrategy(NetworkMethod):
 
     curriculum: ClassVar[str] = "conditions"
 
-    start: Literal["best", "none"] = "best"
-    """The network before the first generation: it values targets as the shipped ranking `best`, or all of them 0."""
+    start: Literal["best-2026", "none"] = "best-2026"
+    """The network before the first generation: it values targets as the ranking `best-2026`, or all of them 0."""
     n_generations: Count = 150
     n_pairs: Count = 24
     """Pairs of candidates of a generation: the mean plus and minus the same noise."""

@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from itertools import pairwise
 from threading import Event
 from typing import Any, ClassVar, Final, Literal
 
 import numpy as np
 
 from fireworld.draws import FIRE, SHUFFLE, hash_key
-from fireworld.errors import LogError
+from fireworld.errors import LogError, TrainingError, expected
 from fireworld.kernels.arrays import Array, NetworkArrays
 from fireworld.kernels.fitting import Fitting, fit_once, gain
 from fireworld.kernels.network import widest
 from fireworld.kernels.situation import N_SEEN
+from fireworld.policy.teams.network_layers import WIDTH_MAX, Layer, unpack
 from fireworld.policy.teams.team import Team
 from fireworld.simulation.built import CityCache
 from fireworld.simulation.state import fresh_target_learner
@@ -33,12 +35,15 @@ class Rollouts(LayeredMethod):
 
     name: ClassVar[str] = "rollouts"
     curriculum: ClassVar[str] = "conditions"
+    is_packed: ClassVar[bool] = False
 
     hidden: Hidden = 24
     """Numbers of the layer between the 26 features and the value, relu; 0: the value is one weighted sum."""
-    start: Literal["best", "none"] = "best"
-    """The network before the first generation: it values targets as the shipped ranking `best`, or all of them 0."""
-    n_generations: Count = 12
+    start: Literal["best-2026", "none"] = "best-2026"
+    """The network before the first generation: it values targets as the ranking `best-2026`, or all of them 0."""
+    n_generations: Count = 4
+    n_averaged: Count = 3
+    """Networks that the team is the mean of: those after the last generations, and the first one before them."""
     n_fights: Count = 2500
     """Fights of a generation, the conditions in turn."""
     n_steps_max: Count = 200
@@ -64,7 +69,38 @@ class Rollouts(LayeredMethod):
     temperature: Positive = 0.1
     """Differences of values that decide, while the network learns, how probable an option is."""
     n_checks: Count = 2
-    """Fights with every fire after each generation; the best network so checked is the team."""
+    """Fights of the team with every fire after each generation."""
+
+    def __post_init__(self) -> None:
+        """Raise TrainingError if a hyperparameter is not what it may be."""
+        super().__post_init__()
+        if self.hidden * self.n_averaged > WIDTH_MAX:
+            wanted = f"at most {WIDTH_MAX // self.hidden} (with {self.hidden} hidden)"
+            raise TrainingError(expected("method", "n_averaged", wanted, self.n_averaged))
+
+    @property
+    def widths(self) -> tuple[int, ...]:
+        """Of the team: 26 features, the hidden layers of all networks side by side if there are any, the value."""
+        return (len(self.features), *([self.hidden * self.n_averaged] if self.hidden else []), 1)
+
+    def layers_of(self, numbers: Array) -> tuple[Layer, ...]:
+        """Return the layers of a network by its numbers, or of the mean of several by theirs, one after another.
+
+        The mean of networks is one, whose hidden layer has the units of all.
+        """
+        widths = (len(self.features), *([self.hidden] if self.hidden else []), 1)
+        n_numbers = sum(n_out * (1 + n_in) for n_in, n_out in pairwise(widths))
+        networks = [unpack(one, widths) for one in numbers.reshape(-1, n_numbers)]
+        n, (*hidden, values) = len(networks), zip(*networks, strict=True)
+        biases = sum(one.biases for one in values) / n
+        if not self.hidden:
+            return (Layer(sum(one.weights for one in values) / n, biases),)
+        (sides,) = hidden
+        side_by_side = np.concatenate([one.weights for one in sides], axis=1)
+        return (
+            Layer(side_by_side, np.concatenate([one.biases for one in sides])),
+            Layer(np.concatenate([one.weights for one in values]) / n, biases),
+        )
 
     def trainer(self, curriculum: Curriculum, *, seed: int, cities: CityCache | None = None) -> RolloutsTrainer:
         """Return what trains one team; see `Method.trainer`."""
@@ -109,31 +145,25 @@ class Generation(Report):
     gain: float
     """How much more rollouts came to after what the network prefers now, on the mean of these decisions."""
     score_checked: float
-    """Of the network on all fires."""
-    score_kept: float
-    """The best of those: that of the team."""
+    """Of the team on all fires."""
 
     @property
     def text(self) -> str:
         """The generation in one line."""
         return (
             f"generation {self.generation + 1} of {self.n_generations}, score {self.score_mean:.3f}, "
-            f"{self.n_decisions:,} decisions, gain {self.gain:.5f}, on all fires {self.score_checked:.3f}, "
-            f"of the team {self.score_kept:.3f}"
+            f"{self.n_decisions:,} decisions, gain {self.gain:.5f}, of the team on all fires {self.score_checked:.3f}"
         )
 
 
 @dataclass
 class Progress:
-    """How far a training has come: all that it needs to continue. Networks are (k,) float64."""
+    """How far a training has come: all that it needs to continue."""
 
     generation: int
-    numbers: Array
-    """The network whose fights come next."""
-    kept: Array
-    """The best one that was checked: the team."""
+    networks: Array
+    """(averaged, k) float64, the networks that the team is the mean of; the fights of the last one come next."""
     score_checked: float = 0.0
-    score_kept: float = 0.0
 
 
 class RolloutsTrainer(NetworkTrainer[Rollouts, Generation]):
@@ -143,7 +173,7 @@ class RolloutsTrainer(NetworkTrainer[Rollouts, Generation]):
     plots: ClassVar[Mapping[str, str]] = {
         "score": "Score of the fights, as a share of the maximum",
         "gain": "What the network gains on its decisions",
-        "check": "Score on all fires",
+        "check": "Score of the team on all fires",
     }
     topics: ClassVar[tuple[type[Any], ...]] = (Improved,)
     whole: ClassVar[type[Any] | None] = Improved
@@ -151,7 +181,7 @@ class RolloutsTrainer(NetworkTrainer[Rollouts, Generation]):
     def __init__(self, curriculum: Curriculum, method: Rollouts, *, seed: int, cities: CityCache | None = None) -> None:
         super().__init__(curriculum, method, seed=seed, cities=cities)
         self._improved: Improved | None = None
-        self.progress = Progress(0, self._first, self._first)
+        self.progress = Progress(0, np.repeat(self._first[np.newaxis], method.n_averaged, axis=0))
 
     @property
     def generation(self) -> int:
@@ -159,25 +189,26 @@ class RolloutsTrainer(NetworkTrainer[Rollouts, Generation]):
         return self.progress.generation
 
     @property
+    def newest(self) -> Array:
+        """The network whose fights come next, (k,) float64."""
+        newest: Array = self.progress.networks[-1]
+        return newest
+
+    @property
     def kept(self) -> Array:
-        """The numbers of the best network that was checked."""
-        return self.progress.kept
+        """The networks that the team is the mean of, one after another."""
+        return self.progress.networks.ravel()
 
     def state(self) -> dict[str, Array]:
-        """Return the generation, the network, and the scores of the checks."""
-        progress = self.progress
-        return {
-            "generation": np.array([progress.generation], dtype=np.int64),
-            "numbers": progress.numbers,
-            "checks": np.array([progress.score_checked, progress.score_kept]),
-        }
+        """Return the generation, the networks, and the score of the last check."""
+        generation = np.array([self.generation], dtype=np.int64)
+        return {"generation": generation, "check": np.array([self.progress.score_checked]), **self._kept_state()}
 
     def restore(self, team: Team, state: Mapping[str, Array], *, source: str) -> None:
         """Continue where another trainer stood; see `Trainer.restore`."""
-        n = len(self.progress.numbers)
-        kept = self._kept_of(team, state, ("numbers", n), ("checks", 2), source=source)
-        generation, (checked, best) = self._generation_of(state, source=source), state["checks"].tolist()
-        self.progress = Progress(generation, state["numbers"].copy(), kept, checked, best)
+        kept = self._kept_of(team, state, ("check", 1), source=source)
+        generation = self._generation_of(state, source=source)
+        self.progress = Progress(generation, kept.reshape(self.method.n_averaged, -1), float(state["check"][0]))
 
     def records(self) -> list[Any]:
         """Return the last generation."""
@@ -186,8 +217,8 @@ class RolloutsTrainer(NetworkTrainer[Rollouts, Generation]):
     def follow(self, part: Mapping[type[Any], Any]) -> Generation:
         """Go through a generation that a training log holds; see `Trainer.follow`."""
         improved: Improved | None = part.get(Improved)
-        n = len(self.progress.numbers)
-        if improved is None or {len(improved.numbers), len(improved.kept)} != {n}:
+        n = len(self.kept)
+        if improved is None or len(improved.numbers) != n:
             raise LogError(f"a part holds no generation of networks of {n} numbers")
         return self._end_generation(improved)
 
@@ -198,7 +229,7 @@ class RolloutsTrainer(NetworkTrainer[Rollouts, Generation]):
         return {
             "score": {"": report.score_mean},
             "gain": {"": report.gain},
-            "check": {"last": report.score_checked, "of the team": report.score_kept},
+            "check": {"": report.score_checked},
             **({"conditions": conditions} if len(self._conditions) > 1 else {}),
         }
 
@@ -211,8 +242,9 @@ class RolloutsTrainer(NetworkTrainer[Rollouts, Generation]):
         if stop.is_set():
             return None
         decisions = [decision for _, tried in fights for decision in tried]
-        numbers, gained = self._learned(before.numbers, decisions)
-        checked = self._checked(pool, stop, before, numbers)
+        numbers, gained = self._learned(self.newest, decisions)
+        kept = np.concatenate([*self.progress.networks[1:], numbers])
+        checked = self._score_on_all(pool, stop, kept)
         if checked is None:
             return None
         scores = [score for score, _ in fights]
@@ -221,28 +253,21 @@ class RolloutsTrainer(NetworkTrainer[Rollouts, Generation]):
             score_mean=self._mean(scores, fires),
             n_decisions=len(decisions),
             gain=gained,
-            score_checked=checked.score_checked,
-            score_kept=checked.score_kept,
+            score_checked=checked,
             fire=np.array(fires),
             seed=np.array(seeds, dtype=np.uint64),
             score=np.array(scores),
             n_tried=np.array([len(tried) for _, tried in fights]),
-            numbers=numbers,
-            kept=checked.kept,
+            numbers=kept,
         )
         return self._end_generation(improved)
 
     def _end_generation(self, improved: Improved) -> Generation:
         """Continue with the next generation; return the report of this one."""
         self._improved = improved
-        self.progress = Progress(
-            improved.generation + 1,
-            improved.numbers.copy(),
-            improved.kept.copy(),
-            improved.score_checked,
-            improved.score_kept,
-        )
-        named = ("generation", "score_mean", "n_decisions", "gain", "score_checked", "score_kept")
+        networks = improved.numbers.reshape(self.method.n_averaged, -1)
+        self.progress = Progress(improved.generation + 1, networks, improved.score_checked)
+        named = ("generation", "score_mean", "n_decisions", "gain", "score_checked")
         return Generation(n_generations=self.method.n_generations, **{name: getattr(improved, name) for name in named})
 
     def _fire(self, fight: int) -> int:
@@ -254,7 +279,7 @@ class RolloutsTrainer(NetworkTrainer[Rollouts, Generation]):
         """Fight a fire and try options out on the way; return the score, as a share of the maximum, and these."""
         built = self._fires[fire]
         world = built.world(seed=seed, n_steps_max=min(self.method.n_steps_max, built.scenario.steps))
-        tried = try_options(world, self.policy_of(self.progress.numbers), self.method.trial, stop)
+        tried = try_options(world, self.policy_of(self.newest), self.method.trial, stop)
         return world.outcome.score_share, tried
 
     def _learned(self, numbers: Array, decisions: Sequence[TriedDecision]) -> tuple[Array, float]:
@@ -272,18 +297,3 @@ class RolloutsTrainer(NetworkTrainer[Rollouts, Generation]):
             order = np.argsort(np.array(keys, dtype=np.uint64), kind="stable")
             fit_once(network, seen, worth, n_options, order, method.n_batch, method.temperature, method.rate, fitting)
         return network.number, gain(network, seen, worth, n_options, fitting.work)
-
-    def _checked(self, pool: Executor, stop: Event, before: Progress, numbers: Array) -> Progress | None:
-        """Return the progress with what the check says; before the first generation its start is checked, too."""
-        kept, score_kept = before.kept, before.score_kept
-        if before.generation == 0:
-            first = self._score_on_all(pool, stop, before.numbers)
-            if first is None:
-                return None
-            score_kept = first
-        score = self._score_on_all(pool, stop, numbers)
-        if score is None:
-            return None
-        if score > score_kept:
-            kept, score_kept = numbers, score
-        return Progress(before.generation + 1, numbers, kept, score, score_kept)
