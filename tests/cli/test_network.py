@@ -103,8 +103,14 @@ def test_a_model_imported(here, fireworld):
     ("words", "message"),
     [
         (("show", "mine.npz", "1193"), "fireworld: STATE: expected none: a network has no states, got '1193'"),
-        (("diff", "mine.npz", "best"), "fireworld: best: expected a network, as in mine.npz, got a ranking of targets"),
-        (("diff", "best", "mine.npz"), "fireworld: mine.npz: expected a ranking of targets, as in best, got a network"),
+        (
+            ("diff", "mine.npz", "best-2026"),
+            "fireworld: best-2026: expected a network, as in mine.npz, got a ranking of targets",
+        ),
+        (
+            ("diff", "best-2026", "mine.npz"),
+            "fireworld: mine.npz: expected a ranking of targets, as in best-2026, got a network",
+        ),
         (
             ("diff", "mine.npz", "mine.npz", "--actions-only"),
             "fireworld: --actions-only: expected two teams with tables of actions, got two networks",

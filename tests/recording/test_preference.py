@@ -63,9 +63,9 @@ def test_the_parts_add_up_to_the_difference_of_the_values_on_record(team, tmp_pa
 
 
 def test_a_feature_of_a_ranking_adds_its_weight_times_what_it_differs_by(tmp_path):
-    run, team = recorded("best", tmp_path), load_team("best")
+    run, team = recorded("best-2026", tmp_path), load_team("best-2026")
     weights = {weight.name: values[0] for weight, values in team.by_size}
-    for one in fw.preferences("best", run, step=1).brigades:
+    for one in fw.preferences("best-2026", run, step=1).brigades:
         for share in one.shares:
             assert share.part == pytest.approx(weights[share.feature] * (share.chosen - share.other))
 
@@ -111,7 +111,7 @@ def test_the_command_line_prints_the_same(tmp_path, monkeypatch):
     assert json.loads(done.out) == json.loads(json.dumps(fw.preferences("best", "a.mcap", step=STEP).as_dict()))
     shown = command_line.call(monkeypatch, *words, "--limit", "3").out
     assert shown.startswith(f"step {STEP}: brigade 0 goes for ")
-    assert "... and 10 more" in shown
+    assert "... and 23 more" in shown
     for words, wanted in (
         (("best", "--step", "3"), "--step needs --log"),
         (("best", "1193", "--log", "a.mcap", "--step", "3"), "no STATE"),

@@ -18,7 +18,8 @@ from tests.training.conftest import SHORT
 DATA = Path(__file__).parent / "data"
 TABLES, RANKING = DATA / "fireworld-team-1.npz", DATA / "fireworld-ranking-1.npz"
 SHIPPED = {
-    "best": "042f726d665698a3",
+    "best": "f3b3f8c1bdfb2234",
+    "best-2026": "042f726d665698a3",
     "paper-cooperative": "5eaa625114742317",
     "paper-noncooperative": "eb891902f38f8b04",
 }
