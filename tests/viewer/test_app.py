@@ -252,3 +252,13 @@ def test_the_map_from_above_shows_the_whole_box_with_north_up():
 def test_names_from_files_keep_letters_that_the_viewer_can_draw(small):
     header = type(small.header)(**{**small.header.__dict__, "scenario": "Zürich \U0001f525\n"})
     assert title(type(small)(header, small.city, [])) == "Zürich ??, easiest, seed 3"
+
+
+def test_a_viewer_that_does_not_listen_is_killed(tmp_path, monkeypatch):
+    """As Rerun's server does now and then on a busy machine: it is asked to end, and goes on."""
+    deaf = tmp_path / "deaf"
+    deaf.write_text("#!/bin/sh\ntrap '' TERM INT\nsleep 1\nkill -INT $PPID\nwhile :; do sleep 1; done\n")
+    deaf.chmod(0o755)
+    monkeypatch.setattr(app, "viewer_executable", lambda: deaf)
+    monkeypatch.setattr(app, "ENDING_SECONDS", 0.5)
+    app._run_viewer(lambda path: path.write_bytes(b""), [])

@@ -34,6 +34,8 @@ WIDGET_PIXELS: Final = (1200, 800)
 APPLICATION_ID: Final = "fireworld"
 _END_BYTES: Final = 32  # of a Rerun file, after its table of contents
 _WRITE_SECONDS: Final = 60.0  # for one block of a Rerun file, a few MB
+ENDING_SECONDS: Final = 5.0
+"""For a viewer that is asked to end."""
 
 
 def save(
@@ -273,14 +275,23 @@ def _run_viewer(
                 status = 0
             finally:
                 signal.signal(signal.SIGTERM, before)
-                viewer.terminate()
-                viewer.wait()
+                _end(viewer)
             errors.seek(0)
             reason = " ".join(errors.read().split())
     if status:
         why = f": {reason.rpartition(': ')[2][-120:]}" if reason else ""
         hint = "try --save FILE.rrd, --web, or `fireworld render`"
         raise ViewError(f"view: Rerun's viewer ended with code {status}{why}; {hint}")
+
+
+def _end(viewer: subprocess.Popen[bytes]) -> None:
+    """End a viewer; one that is busy and does not listen is killed after a while."""
+    viewer.terminate()
+    try:
+        viewer.wait(ENDING_SECONDS)
+    except subprocess.TimeoutExpired:
+        viewer.kill()
+        viewer.wait()
 
 
 def _import_rerun() -> ModuleType:
