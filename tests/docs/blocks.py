@@ -44,7 +44,10 @@ BLOCK = re.compile(
 REMARK = re.compile(r"<!-- (in|needs|not run:|long:|given:) (.+?) ?-->", re.DOTALL)
 AS_WRITTEN = bool(os.environ.get("FIREWORLD_PAGES_AS_WRITTEN"))
 SHORTER = (
-    (r"train .*--method (search|assignment)", "--set n_generations=1 --set n_candidates=4 --set n_best=2 --set n_fires=2"),
+    (
+        r"train .*--method (search|assignment)",
+        "--set n_generations=1 --set n_candidates=4 --set n_best=2 --set n_fires=2",
+    ),
     (r"golden add (?!.*n_episodes_max).*--train", "--set n_episodes_max=3"),
     (r"train (?!.*--set n_)", "--set n_episodes_max=3"),
     (r"compare (?!.*--seeds)", "--seeds 2"),
