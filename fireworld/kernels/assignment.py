@@ -16,7 +16,7 @@ from fireworld.kernels.episode_arrays import Assignment
 from fireworld.kernels.jit import inner, kernel
 from fireworld.kernels.observation import N_ACTIONS, find_target
 from fireworld.kernels.ranking import OWN_TARGET, Sight, is_enough
-from fireworld.kernels.ranks import add_up, fresh_ranks, line_up, weigh_alike, weigh_row
+from fireworld.kernels.ranks import add_up, fresh_ranks, line_up, weigh_alike, weigh_for
 
 NOBODY = -1
 
@@ -71,19 +71,14 @@ def value_for_all(
 
     `weights` (17,) are the ranking's.
     """
-    brigades, sites, range_square = sight.brigades, sight.sites, sight.brigade_constants.range_square
     ranks = assignment.ranks
-    line_up(assignment.known, sight.geometry, sites, ranks)
+    line_up(assignment.known, sight.geometry, sight.sites, ranks)
     weigh_alike(first, end, 0, weights, step, sight, ranks)
     for k in range(np.uint64(first), np.uint64(end)):
         ranks.near[k] = 0.0
     add_up(0, len(assignment.known), first, end, ranks.nearness, ranks.near)
     for i in range(n):
-        brigade = assignment.brigade[i]
-        target, mine = brigades.target[brigade], np.uint64(end)
-        if target >= 0 and sites.place[target] >= 0:
-            mine = np.uint64(ranks.position[target])
-        weigh_row(brigades.x[brigade], brigades.y[brigade], mine, range_square, first, end, weights, 0.0, ranks)
+        weigh_for(assignment.brigade[i], first, end, weights, 0.0, sight, ranks)
         for k in range(end - first):
             assignment.value[i, k] = ranks.value[first + k]
 

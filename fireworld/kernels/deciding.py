@@ -217,8 +217,7 @@ def decide_by_worth(brigade: int, step: int, known: Array, episode: Episode) -> 
     if learning and action >= 0:
         target, choice = explore_and_learn(brigade, target, step, known, sight, episode)
     if noting:
-        note_values(brigade, scratch.values, BY_RANK, seen)
-        seen.target_value[brigade] = scratch.values[N_ACTIONS]
+        note_worth(brigade, scratch.values, seen)
     return action, target, choice
 
 
@@ -231,8 +230,7 @@ def decide_by_assignment(brigade: int, step: int, known: Array, episode: Episode
     team = known, policy.kind, weights
     action, target = assign_target(brigade, in_turn, step, *team, sight, scratch.assignment, scratch.values)
     if len(seen.state) > 0:
-        note_values(brigade, scratch.values, BY_RANK, seen)
-        seen.target_value[brigade] = scratch.values[N_ACTIONS]
+        note_worth(brigade, scratch.values, seen)
     return action, target
 
 
@@ -259,6 +257,13 @@ def explore_and_learn(
     )
     go_for_and_learn(brigade, scratch.seen, policy.network, learner)
     return target, choice
+
+
+@inner
+def note_worth(brigade: int, values: Array, seen: Seen) -> None:
+    """Note the values, (5,), by which a brigade chose a target: of those of the four actions, and of its own."""
+    note_values(brigade, values, BY_RANK, seen)
+    seen.target_value[brigade] = values[N_ACTIONS]
 
 
 @inner

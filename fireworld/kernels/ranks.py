@@ -159,6 +159,17 @@ def weigh_row(
 
 
 @inner
+def weigh_for(brigade: int, first: int, end: int, weights: Array, extra: float, sight: Sight, ranks: Ranks) -> None:
+    """Write the values of the buildings [first, end) in the row for a brigade, as `weigh_row` does."""
+    brigades, sites = sight.brigades, sight.sites
+    target, mine = brigades.target[brigade], np.uint64(end)
+    if target >= 0 and sites.place[target] >= 0:
+        mine = np.uint64(ranks.position[target])
+    range_square = sight.brigade_constants.range_square
+    weigh_row(brigades.x[brigade], brigades.y[brigade], mine, range_square, first, end, weights, extra, ranks)
+
+
+@inner
 def see_place(brigade: int, k: int, around: bool, known: Array, sight: Sight, ranks: Ranks, seen: Array) -> None:
     """Write what a brigade sees of the k-th building in the row, `seen` (30,), the 13 last only where they are read.
 
@@ -191,7 +202,7 @@ def value_targets(
 
     All else as for `rank_targets`.
     """
-    brigades, sites, range_square = sight.brigades, sight.sites, sight.brigade_constants.range_square
+    sites = sight.sites
     weigh_alike(first, end, ranking, weights, step, sight, ranks)
     add_up_others(brigade, len(known), first, end, ranks)
     count_in(known[brigade], -1.0, sites, ranks)
@@ -203,11 +214,8 @@ def value_targets(
             see_place(brigade, np.int64(k), around, known, sight, ranks, seen)
             ranks.value[k] = value_by_network(network, seen, work)
     else:
-        target, mine = brigades.target[brigade], np.uint64(end)
-        if target >= 0 and sites.place[target] >= 0:
-            mine = np.uint64(ranks.position[target])
         extra = weights[N_TARGET_FEATURES + action] if action >= 0 else 0.0
-        weigh_row(brigades.x[brigade], brigades.y[brigade], mine, range_square, first, end, weights, extra, ranks)
+        weigh_for(brigade, first, end, weights, extra, sight, ranks)
     count_in(known[brigade], 1.0, sites, ranks)
 
 

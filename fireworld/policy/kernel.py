@@ -176,12 +176,7 @@ def _by_rank(observation: Observation, ready: PolicyArrays) -> Decision:
         np.zeros((2, widest(ready.network))),
         values,
     )
-    return Decision(
-        int(action),
-        target=int(target) if own else None,
-        q_values=tuple(values[: len(ACTIONS)].tolist()),
-        value=float(values[len(ACTIONS)]),
-    )
+    return _valued(int(action), int(target) if own else None, values)
 
 
 def _by_assignment(observation: Observation, ready: PolicyArrays) -> Decision:
@@ -199,12 +194,13 @@ def _by_assignment(observation: Observation, ready: PolicyArrays) -> Decision:
         fresh_assignment(n_brigades, n_buildings),
         values,
     )
-    return Decision(
-        int(action),
-        target=int(target),
-        q_values=tuple(values[: len(ACTIONS)].tolist()),
-        value=float(values[len(ACTIONS)]),
-    )
+    return _valued(int(action), int(target), values)
+
+
+def _valued(action: int, target: int | None, values: Array) -> Decision:
+    """Return a decision with the values of the four actions' targets and of its own, (5,)."""
+    *of_actions, value = values.tolist()
+    return Decision(action, target=target, q_values=tuple(of_actions), value=value)
 
 
 def settled_targets(observation: Observation, kind: Array) -> NDArray[np.int32]:

@@ -150,7 +150,7 @@ class NetworkTrainer(GenerationTrainer[AMethod, AReport]):
         return {**super().identity, **({} if self._start is None else {"start": self._start.digest})}
 
     def team(self) -> NetworkTeam:
-        """Return the best network that was checked so far; before the first generation what it starts with."""
+        """Return the network of the kept numbers; before the first generation what it starts with."""
         return self._team_of(self.kept)
 
     def own_plots(self) -> Mapping[str, str]:

@@ -81,14 +81,15 @@ class Rollouts(LayeredMethod):
     @property
     def widths(self) -> tuple[int, ...]:
         """Of the team: 26 features, the hidden layers of all networks side by side if there are any, the value."""
-        return (len(self.features), *([self.hidden * self.n_averaged] if self.hidden else []), 1)
+        n_in, *hidden, n_out = super().widths
+        return (n_in, *(n * self.n_averaged for n in hidden), n_out)
 
     def layers_of(self, numbers: Array) -> tuple[Layer, ...]:
         """Return the layers of a network by its numbers, or of the mean of several by theirs, one after another.
 
         The mean of networks is one, whose hidden layer has the units of all.
         """
-        widths = (len(self.features), *([self.hidden] if self.hidden else []), 1)
+        widths = super().widths
         n_numbers = sum(n_out * (1 + n_in) for n_in, n_out in pairwise(widths))
         networks = [unpack(one, widths) for one in numbers.reshape(-1, n_numbers)]
         n, (*hidden, values) = len(networks), zip(*networks, strict=True)

@@ -275,7 +275,8 @@ def _run_viewer(
                 status = 0
             finally:
                 signal.signal(signal.SIGTERM, before)
-                _end(viewer)
+                viewer.terminate()
+                wait_or_kill(viewer, ENDING_SECONDS)
             errors.seek(0)
             reason = " ".join(errors.read().split())
     if status:
@@ -284,11 +285,10 @@ def _run_viewer(
         raise ViewError(f"view: Rerun's viewer ended with code {status}{why}; {hint}")
 
 
-def _end(viewer: subprocess.Popen[bytes]) -> None:
-    """End a viewer; one that is busy and does not listen is killed after a while."""
-    viewer.terminate()
+def wait_or_kill(viewer: subprocess.Popen[bytes], seconds: float) -> None:
+    """Wait for a viewer to end; one that does not, busy or deaf, is killed after a while."""
     try:
-        viewer.wait(ENDING_SECONDS)
+        viewer.wait(seconds)
     except subprocess.TimeoutExpired:
         viewer.kill()
         viewer.wait()

@@ -70,11 +70,7 @@ class ViewerProcess:
         if self._stays:
             self._process.returncode = 0  # it is the user's from now on: no warning that it still runs
             return finished
-        try:
-            self._process.wait(PATIENCE_SECONDS if finished else 0)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        app.wait_or_kill(self._process, PATIENCE_SECONDS if finished else 0)
         self._input.close()  # again where all was written; else the process is dead, and the writing thread fails
         return finished and self._process.returncode == 0
 
