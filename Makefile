@@ -136,7 +136,7 @@ faults: install  ## Try faults of every kind for FAULT_SECONDS (600): kills, ful
 bench: install  ## Measure speed against baselines; with AGAINST=COMMIT, this tree against that commit.
 	$(BIN)/python -m benchmarks.$(if $(AGAINST),against $(AGAINST),bench)
 
-check-teams: install  ## Train the teams that come with fireworld again, for an hour; they must be the same.
+check-teams: install  ## Train the teams that come with fireworld again, for more than an hour; they must be the same.
 	$(BIN)/python -m benchmarks.shipped
 
 clean:  ## Remove what the other targets made, .venv too.

@@ -1,7 +1,7 @@
 """The trained teams that come with fireworld: train them again by the documented commands, compare or replace them.
 
 `python -m benchmarks.shipped` trains each anew and prints whether it is the shipped one; `--write` puts what was
-trained in its place. With names it is these: `best` takes an hour on two cores, all others together a minute.
+trained in its place. With names it is these: `best` takes more than an hour on two cores, all others together a minute.
 """
 
 from __future__ import annotations
