@@ -74,7 +74,7 @@ def test_every_viewer_is_started_on_this_machine_only(monkeypatch, tmp_path):
         def __init__(self, command, **_):
             started.append(command)
 
-        def wait(self):
+        def wait(self, timeout=None):
             return 0
 
         def terminate(self):
