@@ -224,14 +224,27 @@ def test_a_study_is_resumed_and_comes_out_the_same(small, tmp_path):
     assert tables(tmp_path / "b") == tables(tmp_path / "a")
     assert again.findings == whole.findings
     assert 0 < len(again.study.timing.parts[0]) < 8, "the times of those that were made now"
-    with pytest.raises(TrainingError, match="trainings"):
-        fw.try_readings(tmp_path / "b", quick=True, repetitions=2, curriculum=small, resume=True)
+    with pytest.raises(TrainingError, match="seeds"):
+        fw.try_readings(tmp_path / "b", quick=True, seeds=3, curriculum=small, resume=True)
     other = tmp_path / "other.yaml"
     other.write_text(SHIPPED.read_text().replace("epsilon_schedule: compounding", "epsilon_schedule: training"))
     with pytest.raises(
         TrainingError, match=f"{RUNS}: line [0-9]+: expected a reading that is to be tried, got another"
     ):
         fw.try_readings(tmp_path / "b", file=other, quick=True, curriculum=small, resume=True)
+
+
+@pytest.mark.slow
+def test_a_study_is_continued_with_more_trainings(small, tmp_path):
+    """What was tried is not tried again; the trainings that there were are the first of more."""
+    words = {"quick": True, "curriculum": small}
+    once = fw.try_readings(tmp_path / "a", **words).study
+    twice = fw.try_readings(tmp_path / "a", repetitions=2, resume=True, **words).study
+    assert len(twice.timing.parts[0]) == 8, "the second trainings alone"
+    anew = fw.try_readings(tmp_path / "b", repetitions=2, **words).study
+    for first, grown, whole in zip(once.differences, twice.differences, anew.differences, strict=True):
+        assert (first == grown[:1]).all()
+        assert (grown == whole).all()
 
 
 OF_TWO = """\

@@ -11,6 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from fireworld.errors import TrainingError, expected
 from fireworld.executors import AnyExecutor, Workers, workers_for
 from fireworld.interrupt import Interrupted, gentle_interrupt
 from fireworld.kernels.arrays import Array
@@ -158,12 +159,13 @@ def measure_readings(
     varied, signs, readings = designed(choices, kind=size.design)
     readings += further(choices) if size.further else []
     trained_in = load_curriculum(curriculum)
+    if all(stage.cooperation for stage in trained_in.stages):
+        raise TrainingError(expected(str(curriculum), "stages", "one without cooperation", "none"))
     seeds = range(FIRST_SEED, FIRST_SEED + size.seeds)
     with gentle_interrupt(stop) as asked:
         workers = workers_for(executor, stop=asked)
         identity: dict[str, Any] = {
             "design": size.design,
-            "trainings": size.trainings,
             "seeds": [*seeds],
             "method": size.method.as_dict(),
             "curriculum": {"digest": trained_in.digest},
@@ -174,9 +176,8 @@ def measure_readings(
         runs.open(resume=resume, force=force)
         trials = Trials(settings, seeds, runs, workers, on_progress)
         try:
-            tried = trials.run(
-                "trying", [(n, seed + 1) for n in range(len(readings)) for seed in range(size.trainings)]
-            )
+            every = [(n, seed + 1) for seed in range(size.trainings) for n in range(len(readings))]
+            tried = trials.run("trying", every)  # all readings once, then all again: what is cut short is balanced
             differences = [one[:, :, 0] - one[:, :, 1] for one in tried.values()]
             again = [(n, FRESH + seed + 1) for n in best_of(differences) for seed in range(size.n_fresh)]
             confirmed = trials.run("confirming", again)

@@ -23,7 +23,7 @@ from fireworld.scenario.scenario import read_city_file
 from fireworld.simulation.built import BuiltScenario, CityCache
 from fireworld.simulation.state import NO_LEARNER, fresh_learner
 from fireworld.training.curriculum import Curriculum
-from fireworld.training.methods.sarsa import RULES, Sarsa, SarsaTrainer
+from fireworld.training.methods.sarsa import RULES, Progress, Sarsa, SarsaTrainer
 
 N_DIFFERENT = 4
 OTHER_TRAININGS = 100_000
@@ -143,25 +143,27 @@ class Trial:
 
     def _train(self, method: Sarsa, cities: CityCache) -> tuple[Any, Any]:
         """Return the tables of the cooperative team, and of the one without cooperation."""
-        curriculum = self.setting.curriculum
-        flagless = [stage for stage in curriculum.stages if not stage.cooperation]
-        n_alone = sum(len(stage.scenarios) for stage in flagless)
-        trainer, alone = SarsaTrainer(curriculum, method, seed=self.training, cities=cities), None
+        curriculum, study = self.setting.curriculum, self.setting.study
+        flagless = [scenario for stage in curriculum.stages if not stage.cooperation for scenario in stage.scenarios]
+        trainer, alone, learned = SarsaTrainer(curriculum, method, seed=self.training, cities=cities), None, None
         for _ in trainer:
             if self.stop.is_set():
                 raise Interrupted("interrupted")
-            if alone is None and trainer.progress.scenario_number == n_alone:
-                alone = trainer.progress.tables[:1, ::N_FLAG_VALUES].copy()
-        study = self.setting.study
-        if study.alone_through_both or study.different_alone:
-            n = N_DIFFERENT if study.different_alone else 1
-            seeds = [self.training + OTHER_TRAININGS * k for k in range(n)]
-            alone = np.concatenate([self._train_alone(curriculum, method, seed, cities) for seed in seeds])
-        return trainer.team().tables, alone
+            progress, graduate = trainer.progress, trainer.graduate
+            if alone is None and graduate is not None and progress.scenario_number == len(flagless):
+                alone = progress.tables[:1, ::N_FLAG_VALUES].copy()
+                if all(scenario.brigades.n == 1 for scenario in flagless):  # who was alone need not learn that again
+                    learned = replace(progress, tables=graduate.tables, visits=graduate.visits)
+        if not (study.alone_through_both or study.different_alone):
+            return trainer.team().tables, alone
+        n = N_DIFFERENT if study.different_alone else 1
+        first = self._train_alone(method, self.training, cities, learned)
+        others = [self._train_alone(method, self.training + OTHER_TRAININGS * k, cities) for k in range(1, n)]
+        return trainer.team().tables, np.concatenate([first, *others])
 
-    def _train_alone(self, curriculum: Curriculum, method: Sarsa, seed: int, cities: CityCache) -> Any:
-        """Return the table of one brigade alone, (1, 270, 4)."""
-        single = {"brigades.n": 1}
+    def _train_alone(self, method: Sarsa, seed: int, cities: CityCache, learned: Progress | None = None) -> Any:
+        """Return the table of one brigade alone, (1, 270, 4), which may have learned some of that before."""
+        curriculum, single = self.setting.curriculum, {"brigades.n": 1}
         stages = [
             replace(
                 stage,
@@ -171,7 +173,8 @@ class Trial:
             for stage in curriculum.stages
             if not stage.cooperation or self.setting.study.alone_through_both
         ]
-        trainer = SarsaTrainer(replace(curriculum, stages=tuple(stages)), method, seed=seed, cities=cities)
+        trained_in = replace(curriculum, stages=tuple(stages))
+        trainer = SarsaTrainer(trained_in, method, seed=seed, progress=learned, cities=cities)
         for _ in trainer:
             if self.stop.is_set():
                 raise Interrupted("interrupted")
