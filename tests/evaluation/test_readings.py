@@ -18,9 +18,16 @@ from fireworld.executors.packing import Packer
 from fireworld.executors.receiving import work
 from fireworld.executors.self_test import self_test
 from fireworld.interrupt import Interrupted
+from fireworld.markdown import escaped
 from fireworld.reproduction.readings.choices import SHIPPED, load_choices, read_as
 from fireworld.reproduction.readings.design import N_BASIC, design, designed, further, generators
-from fireworld.reproduction.readings.effects import main_effects, over_trainings, permutation_p, student_95
+from fireworld.reproduction.readings.effects import (
+    main_effects,
+    over_readings,
+    over_trainings,
+    permutation_p,
+    student_95,
+)
 from fireworld.reproduction.readings.findings import findings_text
 from fireworld.reproduction.readings.runs import RUNS
 from fireworld.reproduction.readings.study import ReadingsSize, ReadingsStudy
@@ -142,6 +149,7 @@ def test_effects_of_made_up_readings():
     assert [round(one.mean, 9) + 0.0 for one in effects] == [0, 0, 0.3, 0, 0, -0.1, 0, 0]
     width = {round(one.high - one.low, 9) for one in effects}
     assert len(width) == 1, "one spread for all: what the main effects leave"
+    assert over_readings(signs, means).mean == pytest.approx(0.1)
     assert permutation_p(signs, 0.1 + 0.2 * signs[:, 2]) < 0.001
     noise = np.array([(7 * n * n) % 31 for n in range(32)]) / 31.0
     assert permutation_p(signs, noise) > 0.01
@@ -157,17 +165,21 @@ def test_quantiles_of_students_t(freedom, quantile):
 @pytest.mark.parametrize("uneven", [False, True])
 def test_intervals_of_main_effects_hold_what_is_true_in_95_of_100_studies(uneven):
     """Trainings and seeds of a reading have much in common; with `uneven`, readings scatter more at some levels."""
-    draws, n_held, n_all = np.random.default_rng(7), 0, 0
+    draws, n_held, n_mean_held, n_all = np.random.default_rng(7), 0, 0, 0
     signs = design(21, 6)
     for _ in range(400):
         true = draws.normal(0.0, 0.1, 21)
         of_reading = draws.normal(0.0, 0.15, (64, 1, 1)) * (np.exp(0.5 * signs[:, :1, None]) if uneven else 1.0)
         of_training, of_run = draws.normal(0.0, 0.25, (64, 2, 1)), draws.normal(0.0, 0.2, (64, 2, 10))
         values = (signs @ true / 2.0)[:, None, None] + of_reading + of_training + of_run
-        effects = main_effects([""] * 21, signs, values.mean(axis=(1, 2)))
+        means = values.mean(axis=(1, 2))
+        effects = main_effects([""] * 21, signs, means)
+        mean = over_readings(signs, means)
+        n_mean_held += mean.low <= 0.0 <= mean.high
         n_held += sum(one.low <= wanted <= one.high for one, wanted in zip(effects, true, strict=True))
         n_all += 21
     assert 0.94 <= n_held / n_all <= 0.96
+    assert 0.92 <= n_mean_held / 400 <= 0.98
 
 
 @pytest.mark.parametrize("n_trainings", [3, 5])
@@ -214,6 +226,9 @@ def test_a_study_is_resumed_and_comes_out_the_same(small, tmp_path):
     assert len(rows) == (8 + 3) * 2
     assert len(whole.study.confirmed) == 3
     assert "Main effects" in whole.report.read_text()
+    quoted = (tmp_path / "a" / "readings.md").read_text()
+    for effect in (*whole.study.effects, *whole.study.level_effects, *whole.study.control_effects):
+        assert escaped(effect.text()) in quoted
     assert all(sentence.endswith(".") for sentence in whole.findings)
     with pytest.raises(OutputError, match="--resume continues it"):
         fw.try_readings(tmp_path / "a", quick=True, curriculum=small)

@@ -49,15 +49,16 @@ def main_effects(names: Sequence[str], signs: Array, means: Array) -> list[Effec
         signs: (readings, choices), -1 ours and 1 the other level.
         means: (readings,) of each reading.
     """
-    n_readings, n_choices = signs.shape
-    effects = _contrasts(signs, means)
-    fitted = means.mean() + signs @ effects / 2.0
-    left = n_readings - n_choices - 1
-    spread = math.sqrt(math.fsum(((means - fitted) ** 2).tolist()) / left) if left > 0 else math.inf
-    half = student_95(left) * 2.0 * spread / math.sqrt(n_readings) if left > 0 else math.inf
+    effects, half = _contrasts(signs, means), 2.0 * _half_width(signs, means)
     return [
         Effect(float(one), float(one - half), float(one + half), name) for name, one in zip(names, effects, strict=True)
     ]
+
+
+def over_readings(signs: Array, means: Array) -> Effect:
+    """Estimate the mean over all readings, as uncertain as main effects leave it; arguments as of `main_effects`."""
+    mean, half = math.fsum(means.tolist()) / len(means), _half_width(signs, means)
+    return Effect(mean, mean - half, mean + half)
 
 
 def over_trainings(values: Array) -> Effect:
@@ -107,3 +108,14 @@ def _contrasts(signs: Array, means: Array) -> Array:
     """Return the mean of each choice's other level minus that of ours, (choices,)."""
     found: Array = signs.T @ (means - means.mean()) * 2.0 / len(means)
     return found
+
+
+def _half_width(signs: Array, means: Array) -> float:
+    """Return half the width of the interval of a mean over readings, by what main effects leave of their spread."""
+    n_readings, n_choices = signs.shape
+    left = n_readings - n_choices - 1
+    if left <= 0:
+        return math.inf
+    fitted = means.mean() + signs @ _contrasts(signs, means) / 2.0
+    spread = math.sqrt(math.fsum(((means - fitted) ** 2).tolist()) / left)
+    return student_95(left) * spread / math.sqrt(n_readings)

@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
-from statistics import fmean
+from collections.abc import Iterable
 
-from fireworld.reproduction.readings.effects import TRAININGS_LEAST, over_trainings
+from fireworld.reproduction.readings.effects import TRAININGS_LEAST, Effect, over_trainings
 from fireworld.reproduction.readings.study import ReadingsStudy
 
 
 def findings_text(study: ReadingsStudy) -> list[str]:
     """Return what was found, a sentence each, written from the numbers."""
     found, n = study.estimates, study.n_designed
-    mean = fmean(one.mean for one in found[:n])
     said = [
-        f"Over {n} readings cooperation adds {mean:+.2f} of the greatest score on the mean; the paper: +0.60.",
+        f"Over {n} readings cooperation adds {study.mean.text()} of the greatest score on the mean; the paper: +0.60.",
         _intervals_text(study),
         f"That no reading matters has p = {study.p:.3f} (main effects together, {len(study.choices)} choices).",
     ]
-    sure = [one for one in study.effects if one.above_zero or one.below_zero]
+    sure = _sure(study.effects)
     said.append(
-        "Choices that change what cooperation adds: " + "; ".join(f"{one.choice} {one.text()}" for one in sure) + "."
+        f"Choices that change what cooperation adds: {sure}."
         if sure
         else "No choice by itself changes what cooperation adds by an amount that is off 0."
     )
-    sure = [one for one in study.level_effects if one.above_zero or one.below_zero]
-    if sure:
-        said.append("On the cooperative team's level: " + "; ".join(f"{one.choice} {one.text()}" for one in sure) + ".")
+    for team, effects in (("with", study.level_effects), ("without", study.control_effects)):
+        if sure := _sure(effects):
+            said.append(f"On the level of the team {team} cooperation: {sure}.")
     if len(found) > n:
         further = (f"{study.named(number)} {found[number].text()}" for number in range(n, len(found)))
         said.append(f"Further levels, all else ours, where it adds {found[0].text()}: " + "; ".join(further) + ".")
@@ -39,6 +38,11 @@ def findings_text(study: ReadingsStudy) -> list[str]:
     if study.size.design == "quick" or study.size.trainings < 2:
         said.append("This was too little to claim anything: it shows how it looks.")
     return said
+
+
+def _sure(effects: Iterable[Effect]) -> str:
+    """Return those effects that are off 0, in words."""
+    return "; ".join(f"{one.choice} {one.text()}" for one in effects if one.above_zero or one.below_zero)
 
 
 def _intervals_text(study: ReadingsStudy) -> str:

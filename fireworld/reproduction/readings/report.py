@@ -1,7 +1,8 @@
-"""What a study of readings leaves in its folder: effects and the specification curve as CSV and figure, and a page."""
+"""What a study of readings leaves in its folder: effects and the specification curve as CSV and figure, and pages."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 from typing import Final
@@ -11,13 +12,22 @@ from fireworld_viewer.pictures.specification import draw_specification
 
 from fireworld.files import write_file
 from fireworld.html_page import html_figure, html_page, html_table, text_cell
+from fireworld.markdown import escaped, markdown_table
+from fireworld.reproduction.readings.choices import OpenChoice
+from fireworld.reproduction.readings.effects import Effect
 from fireworld.reproduction.readings.findings import findings_text
 from fireworld.reproduction.readings.study import ReadingsStudy
 
 PAGE: Final = "readings.html"
+MARKDOWN: Final = "readings.md"
 EFFECTS: Final = "readings-effects.csv"
 CURVE: Final = "readings-curve.csv"
 FIGURE: Final = "readings-curve.png"
+SAID_OF_CURVE: Final = (
+    "What cooperation adds in each reading, with its 95 % interval over trainings, if there are three or more."
+)
+SAID_OF_EFFECTS: Final = "Of the other level against ours, all other choices balanced, over the readings of the design."
+EFFECT_HEADS: Final = ("on what cooperation adds", "on the team with cooperation", "on the team without")
 
 
 def write_readings(study: ReadingsStudy, folder: Path) -> Path:
@@ -35,13 +45,19 @@ def write_readings(study: ReadingsStudy, folder: Path) -> Path:
     label = "cooperative - non-cooperative"
     image = png_bytes(draw_specification(estimates, names, others, label=label))
     write_file(folder / FIGURE, image)
+    write_file(folder / MARKDOWN, markdown_text(study))
     write_file(folder / PAGE, _page(study, image))
     return folder / PAGE
 
 
 def _effects(study: ReadingsStudy) -> str:
     lines = ["choice,level,of,effect,low_95,high_95"]
-    for of, effects in (("difference", study.effects), ("cooperative", study.level_effects)):
+    of_all = {
+        "difference": study.effects,
+        "cooperative": study.level_effects,
+        "non_cooperative": study.control_effects,
+    }
+    for of, effects in of_all.items():
         for choice, one in zip(study.choices, effects, strict=True):
             lines.append(f"{choice.name},{choice.screen[1]},{of},{one.mean!r},{one.low!r},{one.high!r}")
     return "\n".join(lines) + "\n"
@@ -58,27 +74,52 @@ def _curve(study: ReadingsStudy) -> str:
     return "\n".join(lines) + "\n"
 
 
+def markdown_text(study: ReadingsStudy) -> str:
+    """Return what was found as Markdown: how much was tried, findings, main effects, and the figure beside it."""
+    said = "\n".join(f"* {escaped(one)}" for one in findings_text(study))
+    rows = [
+        (choice.name, choice.ours, choice.screen[1], *(effect.text() for effect in effects))
+        for choice, *effects in _by_choice(study)
+    ]
+    parts = [
+        _size_text(study),
+        said,
+        markdown_table(("choice", "ours", "other", *EFFECT_HEADS), rows),
+        SAID_OF_EFFECTS,
+        f"![{SAID_OF_CURVE}]({FIGURE})",
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _by_choice(study: ReadingsStudy) -> Iterator[tuple[OpenChoice, Effect, Effect, Effect]]:
+    return zip(study.choices, study.effects, study.level_effects, study.control_effects, strict=True)
+
+
+def _size_text(study: ReadingsStudy) -> str:
+    size = study.size
+    return (
+        f"{len(study.readings)} readings, {size.trainings} trainings of each, {size.seeds} seeds a test. "
+        "Share of the greatest score, mean over the three tests with four brigades."
+    )
+
+
 def _page(study: ReadingsStudy, image: bytes) -> str:
     rows = [
-        [*map(text_cell, (choice.name, escape(choice.sentence), choice.ours, choice.screen[1])),
-         effect.text(), level.text()]
-        for choice, effect, level in zip(study.choices, study.effects, study.level_effects, strict=True)
-    ]  # fmt: skip
-    heads = ["choice", "the paper", "ours", "other", "on what cooperation adds", "on the cooperative team"]
+        [
+            *map(text_cell, (choice.name, escape(choice.sentence), choice.ours, choice.screen[1])),
+            *(effect.text() for effect in effects),
+        ]
+        for choice, *effects in _by_choice(study)
+    ]
     said = "".join(f"<li>{escape(one)}</li>" for one in findings_text(study))
-    size = study.size
     body = [
         "<h1>The paper in every reading</h1>",
-        f"<p>{len(study.readings)} readings, {size.trainings} trainings of each, {size.seeds} seeds a test.</p>",
-        "<p>Share of the greatest score, mean over the three tests with four brigades.</p>",
+        f"<p>{_size_text(study)}</p>",
         f"<h2>Findings</h2><ul>{said}</ul>",
         "<h2>Main effects</h2>",
-        html_table(heads, rows, n_text=4),
-        "<p>Of the other level against ours, all other choices balanced, over the readings of the design.</p>",
+        html_table(["choice", "the paper", "ours", "other", *EFFECT_HEADS], rows, n_text=4),
+        f"<p>{SAID_OF_EFFECTS}</p>",
         "<h2>All readings</h2>",
-        html_figure(
-            image,
-            "What cooperation adds in each reading, with its 95 % interval over trainings, if there are three or more.",
-        ),
+        html_figure(image, SAID_OF_CURVE),
     ]
     return html_page("fireworld: readings", body)

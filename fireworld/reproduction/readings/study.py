@@ -17,7 +17,7 @@ from fireworld.interrupt import Interrupted, gentle_interrupt
 from fireworld.kernels.arrays import Array
 from fireworld.reproduction.readings.choices import OpenChoice, Reading
 from fireworld.reproduction.readings.design import designed, further
-from fireworld.reproduction.readings.effects import Effect, main_effects, over_trainings, permutation_p
+from fireworld.reproduction.readings.effects import Effect, main_effects, over_readings, over_trainings, permutation_p
 from fireworld.reproduction.readings.runs import Key, Runs
 from fireworld.reproduction.readings.timing import Timing
 from fireworld.reproduction.readings.trial import Setting, Trial, Tried, setting_of
@@ -94,6 +94,11 @@ class ReadingsStudy:
         return [over_trainings(values) for values in self.differences]
 
     @property
+    def mean(self) -> Effect:
+        """What cooperation adds on the mean of the design's readings."""
+        return over_readings(self.signs, self._means(self.differences))
+
+    @property
     def effects(self) -> list[Effect]:
         """What each choice changes in what cooperation adds."""
         return self._effects(self.differences)
@@ -102,6 +107,11 @@ class ReadingsStudy:
     def level_effects(self) -> list[Effect]:
         """What each choice changes in the cooperative team's share."""
         return self._effects(self.levels)
+
+    @property
+    def control_effects(self) -> list[Effect]:
+        """What each choice changes in the share of the team without cooperation."""
+        return self._effects([both - adds for both, adds in zip(self.levels, self.differences, strict=True)])
 
     @property
     def p(self) -> float:
