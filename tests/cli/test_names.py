@@ -13,7 +13,7 @@ from fireworld.stdout import HarmlessOutput, PatientOutput
 
 pytestmark = pytest.mark.slow
 RUN = ("run", "quick", "--policy", "chief", "--steps", 2, "--record")
-ODD = [os.fsdecode(name) for name in (b"\xff\xfe", b"\x1b[31mred", b"\x1b]0;title\x07", b"a\nb", b"[x]", b"\xc3(")]
+ODD = [os.fsdecode(name) for name in (b"\xff\xfe\x1b[31mred", b"\x1b]0;title\x07a\nb[x]", b"\xc3(")]
 
 
 @pytest.mark.parametrize("odd", ODD, ids=repr)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import runpy
 import subprocess
 import sys
 import warnings
 from dataclasses import replace
+from pathlib import Path
 from pkgutil import resolve_name
 
 import numpy as np
@@ -22,6 +24,7 @@ if not MISSING:
     import gymnasium
 
     from fireworld import envs
+    from fireworld.envs.check import everything
     from fireworld.envs.check.checks import COLUMNS, Check, run_check, table_of
     from fireworld.envs.check.everything import checks_of
     from fireworld.envs.check.logs import follow
@@ -152,18 +155,23 @@ class Reseeded:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("as_json", [False, True])
-def test_the_command(as_json):
-    command = [sys.executable, "-m", "fireworld.envs.check", "--no-benchmark", *(["--json"] if as_json else [])]
+def test_the_command():
+    command = [sys.executable, "-m", "fireworld.envs.check", "--no-benchmark", "--json"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
-    if as_json:
-        found = json.loads(done.stdout)
-        assert len(found) == len(CHECKS)
-        assert all(one["ok"] and one["seconds"] >= 0 for one in found)
-    else:
-        assert done.stdout.endswith(f"{len(CHECKS)} of {len(CHECKS)} checks are passed\n")
-        assert max(map(len, done.stdout.splitlines())) <= 80
+    found = json.loads(done.stdout)
+    assert len(found) == len(CHECKS)
+    assert all(one["ok"] and one["seconds"] >= 0 for one in found)
+
+
+def test_the_command_prints_a_table(monkeypatch, capsys):
+    two = [Check("fine", "team", lambda: "10,000 turns a second"), Check("wrong", "turns", lambda: 1 / 0)]
+    monkeypatch.setattr("fireworld.envs.check.everything.checks_of", lambda *_, **__: two)
+    monkeypatch.setattr("sys.argv", ["check"])
+    with pytest.raises(SystemExit) as exit_:
+        runpy.run_path(str(Path(everything.__file__).with_name("__main__.py")))
+    assert exit_.value.code == 1
+    assert capsys.readouterr().out == table_of([run_check(one) for one in two]) + "\n"
 
 
 def test_a_command_that_cannot_check():
