@@ -1,4 +1,4 @@
-# fireworld: `make demo` shows it (and installs no more than that), `make check` checks it within a minute, `make test` checks all of it.
+# fireworld: `make demo` shows it (and installs no more than that), `make check` checks it within a minute, `make test` within ten, `make heavy` the rest.
 # Needs Python 3.11 or newer, and pip.
 PYTHON ?= python3
 WORKERS ?= 2
@@ -11,7 +11,7 @@ PICTURE := recordings/picture-
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help install demo check test static check-format check-lint check-types check-imports check-tests format docs site oldest pictures fuzz faults bench check-teams clean
+.PHONY: help install demo check test heavy static check-format check-lint check-types check-imports check-tests format docs site oldest pictures fuzz faults bench check-teams clean
 
 help:  ## List these targets.
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -56,7 +56,12 @@ demo: .venv/.demo  ## Run the default scenario, record it, verify the recording,
 check: static  ## Check format, lint, types and imports, and run the tests that are not slow.
 	$(BIN)/python -m pytest --numprocesses $(WORKERS) -m "not slow"
 
-test: static check-tests  ## Run everything that CI checks, slow tests too.
+# Ten minutes on two cores.
+test: static check-tests  ## The same with slow tests, but for the heavy ones.
+
+# Another ten.
+heavy: install  ## Run the heavy tests: pages of the docs, browsers, compilations, installed packages, whole studies.
+	$(BIN)/python -m pytest --numprocesses $(WORKERS) -m heavy $(PYTEST)
 
 static: check-format check-lint check-types check-imports  ## Check everything but the tests.
 
@@ -72,13 +77,13 @@ check-types: install  ## Run mypy --strict.
 check-imports: install  ## Check that imports go down only.
 	$(BIN)/lint-imports
 
-check-tests: install  ## Run all tests; PYTEST=... are further options of pytest.
-	$(BIN)/python -m pytest --numprocesses $(WORKERS) $(PYTEST)
+check-tests: install  ## Run all tests but the heavy ones; PYTEST=... are further options of pytest.
+	$(BIN)/python -m pytest --numprocesses $(WORKERS) -m "not heavy" $(PYTEST)
 
 # The lowest versions that pyproject.toml allows. Pages of the docs are as the newest libraries write them; of what is slow,
 # only what leans on libraries.
 oldest: .venv-oldest/.installed  ## Run the tests of everything but docs and packages with the oldest libraries, in a .venv-oldest.
-	.venv-oldest/bin/python -m pytest --numprocesses $(WORKERS) -m "not slow or libraries" --ignore tests/docs --ignore tests/installed $(PYTEST)
+	.venv-oldest/bin/python -m pytest --numprocesses $(WORKERS) -m "not slow or libraries and not heavy" --ignore tests/docs --ignore tests/installed $(PYTEST)
 
 .venv-oldest/.installed: pyproject.toml constraints-oldest.txt
 	$(PYTHON) -m venv .venv-oldest

@@ -40,10 +40,13 @@ settings.load_profile("patient")
 pytest_plugins = ["pytester"]
 
 
+@pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
 def pytest_collection_modifyitems(items):
-    """Mark the tests that lean on libraries by the folder they are in."""
+    """Mark the tests that lean on libraries by the folder they are in, and what is heavy as slow, too."""
     folders = [Path(__file__).with_name(name) for name in LEAN_ON_LIBRARIES]
     for item in items:
+        if item.get_closest_marker("heavy"):
+            item.add_marker("slow")
         if any(folder in item.path.parents for folder in folders):
             item.add_marker("libraries")
 

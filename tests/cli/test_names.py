@@ -16,6 +16,7 @@ RUN = ("run", "quick", "--policy", "chief", "--steps", 2, "--record")
 ODD = [os.fsdecode(name) for name in (b"\xff\xfe\x1b[31mred", b"\x1b]0;title\x07a\nb[x]", b"\xc3(")]
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("odd", ODD, ids=repr)
 def test_a_name_of_any_bytes_serves_every_output(here, fireworld_process, odd):
     a, b = f"{odd}a.mcap", f"{odd}b.mcap"

@@ -18,7 +18,7 @@ def _plain(monkeypatch):
     monkeypatch.setattr("sys.dont_write_bytecode", True)
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 @pytest.mark.filterwarnings("default")
 @pytest.mark.parametrize("page", WITH_BLOCKS, ids=page_name)
 def test_a_page_does_what_it_says(page):

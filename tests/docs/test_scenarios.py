@@ -6,7 +6,7 @@ from tests.docs.contested_table import PAGE, renew
 from tests.docs.pages import fenced
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_the_table_of_the_shipped_scenarios_is_what_is_found():
     page = PAGE.read_text(encoding="utf-8")
     assert renew(page) == page

@@ -103,7 +103,7 @@ def sockets_of(process: int) -> set[str]:
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="this system does not list its sockets in /proc")
 def test_view_web_listens_on_this_machine_only(tmp_path):
     log = tmp_path / "a.mcap"

@@ -219,7 +219,7 @@ def tables(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_a_study_is_resumed_and_comes_out_the_same(small, tmp_path):
     whole = fw.try_readings(tmp_path / "a", quick=True, curriculum=small)
     rows = [*csv.DictReader((tmp_path / "a" / RUNS).read_text().splitlines())]
@@ -249,7 +249,7 @@ def test_a_study_is_resumed_and_comes_out_the_same(small, tmp_path):
         fw.try_readings(tmp_path / "b", file=other, quick=True, curriculum=small, resume=True)
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_a_study_is_continued_with_more_trainings(small, tmp_path):
     """What was tried is not tried again; the trainings that there were are the first of more."""
     words = {"quick": True, "curriculum": small}
@@ -269,7 +269,7 @@ choices:
 """
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_a_study_is_continued_with_a_further_level(small, tmp_path, monkeypatch):
     """What was tried is not tried again, whatever its number is now."""
     monkeypatch.setattr(try_readings_module, "QUICK", ReadingsSize("quick", 1, 2, METHOD))
@@ -288,7 +288,7 @@ def test_a_study_is_continued_with_a_further_level(small, tmp_path, monkeypatch)
     assert anew <= continued, "the best of before may have been confirmed as well"
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 @pytest.mark.parametrize("word", ["processes", dask, "tests.executors.far:make_executor"])
 def test_a_study_has_the_same_bytes_whoever_makes_it(word, small, tmp_path):
     fw.try_readings(tmp_path / "here", quick=True, curriculum=small, executor=1)
@@ -297,7 +297,7 @@ def test_a_study_has_the_same_bytes_whoever_makes_it(word, small, tmp_path):
     assert [len(part) for part in found.study.timing.parts] == [8, 3]
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 @pytest.mark.parametrize("word", ["threads", "processes"])
 def test_a_study_that_is_stopped_keeps_its_trials(word, small, tmp_path):
     stop = Event()
@@ -347,7 +347,7 @@ def with_map(path, folder):
     return file
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_a_map_is_a_level_of_the_city(small, tmp_path):
     """Its folder is relative to the file of readings; it travels with the trials."""
     fw.export_city("quick", tmp_path / "town")
@@ -372,7 +372,7 @@ def test_a_map_is_a_level_of_the_city(small, tmp_path):
     assert tried.shares == shares
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_kobe_is_a_level_of_the_city(small, tmp_path):
     choices = load_choices(with_map(real_file("maps/kobe"), tmp_path))
     setting = setting_of(read_as(choices, {"city": "kobe"}), load_curriculum(small), METHOD)
@@ -388,7 +388,7 @@ def test_a_map_that_is_not_there_is_named(tmp_path):
         load_choices(with_map("no-map", tmp_path))
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     "level",
     [(choice.name, name) for choice in load_choices() for name in choice.levels if name != choice.ours],

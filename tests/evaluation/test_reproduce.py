@@ -32,7 +32,7 @@ from fireworld.training.log.reader import open_training
 from fireworld.training.methods.sarsa import Sarsa, SarsaTrainer
 from fireworld.training.train import train as fw_train
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.heavy
 
 CURRICULUM = """
 stages:

@@ -49,7 +49,7 @@ def run_example(name, *arguments, cwd):
     return run(str(FOLDER / name), *arguments, cwd=cwd)
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 @needs_extra()
 def test_parallel(here, fireworld):
     printed = run_example("parallel.py", "--scenario", "quick", "--episodes", "2", cwd=here)
@@ -62,7 +62,7 @@ def test_parallel(here, fireworld):
     assert fw.open_log("episode.mcap").outcome.score / 5 == pytest.approx(by_rule, abs=0.001)
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 @LEARN
 @pytest.mark.parametrize(
     ("name", "budget", "output"),
@@ -79,7 +79,7 @@ def test_a_network_becomes_a_team(name, budget, output, here, fireworld):
     assert fireworld("compare", "chief", output, "--scenarios", "quick", "--seeds", "2").code == 0
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 @needs_extra()
 def test_sarsa_is_the_method_to_the_last_bit(here):
     printed = run_example("sarsa.py", "--episodes", "12", "--seed", "2", cwd=here)
@@ -88,14 +88,14 @@ def test_sarsa_is_the_method_to_the_last_bit(here):
     assert fw.load_team("sarsa.npz").digest == own.digest
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 @needs_extra()
 def test_sarsa_of_episodes_that_are_truncated(here):
     """At the last step something burns in all of these."""
     assert run_example("sarsa.py", "--scenario", "test-2", "--episodes", "2", cwd=here).startswith("equal: ")
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_counterfactual(here):
     printed = run_example("counterfactual.py", "--futures", "3", "--step", "2", "--scenario", "quick", cwd=here)
     rows = [line.split(maxsplit=1) for line in printed.splitlines()[2:4]]
@@ -104,7 +104,7 @@ def test_counterfactual(here):
     assert fw.verify("counterfactual.mcap").same
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 @pytest.mark.parametrize("name", sorted(NEEDS))
 def test_each_says_what_it_lacks(name, here):
     printed = run("-c", WITHOUT.format(library=NEEDS[name], path=str(FOLDER / f"{name}.py")), cwd=here)

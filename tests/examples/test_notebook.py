@@ -25,7 +25,7 @@ def test_it_is_kept_without_outputs(cells):
     nbformat.validate(nbformat.read(NOTEBOOK, as_version=4))
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 @pytest.mark.filterwarnings("ignore")
 def test_it_runs_and_everything_shows_itself(here):
     notebook = nbformat.read(NOTEBOOK, as_version=4)

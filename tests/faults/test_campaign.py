@@ -27,7 +27,7 @@ GOOD = Done(("run",), 0, "", "", 0.5, 300_000_000)
 LINE = "fireworld: a.mcap: expected a recording, got nothing; try another\n"
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_a_slice_of_every_kind(tmp_path):
     words = ("--cases", "2", "--seconds", "120", "--light", "--reports", str(tmp_path))
     done = subprocess.run(
@@ -77,7 +77,7 @@ def leave():
         os._exit(0)
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     ("act", "seconds", "kinds"),
     [
@@ -92,7 +92,7 @@ def test_what_a_fork_does_is_seen(tmp_path, act, seconds, kinds):
     assert [failure.kind for failure in judge(done, {0}, cpu_seconds_max=seconds)] == kinds
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_files_that_its_parent_has_mapped_hide_nothing(tmp_path):
     """They are memory of the parent, and none of a fork that does not read them."""
     n_bytes = 400_000_000
@@ -104,7 +104,7 @@ def test_files_that_its_parent_has_mapped_hide_nothing(tmp_path):
     assert [failure.kind for failure in judge(done, {0}, cpu_seconds_max=60)] == ["memory"]
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 @pytest.mark.parametrize("call", [forked, process])
 def test_what_its_parent_holds_is_not_counted(tmp_path, call):
     held = bytes(b"x" * 1_200_000_000)
@@ -157,7 +157,7 @@ def small(tmp_path, monkeypatch):
     return run
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_a_failure_is_counted_and_can_be_repeated(small, capsys):
     assert small("--cases", "3", fails={2}) == 1
     out = capsys.readouterr().out
@@ -168,7 +168,7 @@ def test_a_failure_is_counted_and_can_be_repeated(small, capsys):
     assert "planted:1000001: good" in capsys.readouterr().out
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_a_second_call_goes_on_and_tries_again_what_failed(small, tmp_path, capsys):
     assert small("--cases", "3", fails={1}) == 1
     assert small("--cases", "5", "--resume") == 0
@@ -178,7 +178,7 @@ def test_a_second_call_goes_on_and_tries_again_what_failed(small, tmp_path, caps
     assert (tmp_path / "tried").stat().st_size == 6 + 2
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_ctrl_c_prints_the_table(small, monkeypatch, capsys):
     def interrupted(_, ledger, *__):
         ledger.add("planted:1000000", Outcome(), 0.5)
@@ -211,7 +211,7 @@ def test_every_kind_has_its_share_and_many_ways():
     assert len(set(MAKERS)) > 8
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_a_crowd_works_at_once(tmp_path):
     began = time.monotonic()
     (tmp_path / "io").mkdir()

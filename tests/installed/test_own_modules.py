@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.heavy
 
 NAMES = (
     *("recorder", "viewer", "scenarios", "recordings", "cli", "run", "world", "testing", "errors", "files", "outcome"),

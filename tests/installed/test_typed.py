@@ -15,7 +15,7 @@ from tests.installed.names import FRONT_DOOR
 PROJECT = Path(__file__).with_name("typed")
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_a_strict_project_passes(tmp_path):
     cache = ROOT / ".mypy_cache" / "consumer"
     options = ["--strict", "--config-file", "", "--warn-unused-ignores", "--cache-dir", cache]

@@ -15,7 +15,7 @@ from fireworld.scenario import scenario_names
 from tests.docs.pages import ROOT
 from tests.installed.names import FRONT_DOOR
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.heavy
 
 SHIPPED = {
     "scenarios": {f"{name}.yaml" for name in scenario_names()},

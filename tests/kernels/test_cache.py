@@ -249,7 +249,7 @@ def cut(paths: list[Path]) -> None:
         os.truncate(path, (0, 10, path.stat().st_size - 1)[number % 3])
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_a_damaged_cache_heals(machine):
     machine.warm()
     right, err = machine.digest(machine.start(*RUN))
@@ -267,7 +267,7 @@ def test_a_damaged_cache_heals(machine):
     assert {path: path.stat().st_mtime_ns for path in kept(machine.folder)} == files, "compiled once"
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_a_folder_that_cannot_be_written(machine, tmp_path):
     machine.folder.parent.rmdir()
     machine.folder.parent.write_text("a file\n")
@@ -278,7 +278,7 @@ def test_a_folder_that_cannot_be_written(machine, tmp_path):
     assert sorted(tmp_path.iterdir()) == before, "the temporary folder is removed"
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 @pytest.mark.parametrize("after_seconds", [2, 4, 7])
 def test_ctrl_c_while_kernels_are_compiled(machine, after_seconds):
     process = machine.start(*RUN, "--record", "a.mcap", "--debug")
@@ -301,14 +301,14 @@ def compiled(tmp_path_factory):
     return machine, digests
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_two_first_compilations_at_once(compiled):
     machine, (one, other) = compiled
     assert one == other
     assert kept(machine.folder) == sorted(machine.folder.iterdir())
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_a_kernel_takes_its_inner_functions_from_the_cache(compiled):
     machine, (right, _) = compiled
     (rays,) = machine.folder.glob("rays.count_hits-*")

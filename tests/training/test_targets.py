@@ -147,7 +147,7 @@ def share_of_score(team, scenarios):
     return float(np.mean(shares))
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 def test_learning_is_worth_it():
     """After 1800 fights the greedy team saves far more than the one that has learned nothing."""
     fires = load_curriculum("contested")

@@ -24,7 +24,7 @@ from tests.viewer.pixels import decoded, n_near
 PATIENCE_SECONDS = 60.0
 
 pytestmark = [
-    pytest.mark.slow,
+    pytest.mark.heavy,
     pytest.mark.skipif(
         executable() is None, reason="no browser here; on Debian: apt-get install chromium chromium-driver"
     ),

@@ -24,7 +24,7 @@ PATIENCE_SECONDS = 120.0
 """Drawing by software takes long where others compute too."""
 
 pytestmark = [
-    pytest.mark.slow,
+    pytest.mark.heavy,
     pytest.mark.skipif(
         executable() is None, reason="no browser here; on Debian: apt-get install chromium chromium-driver"
     ),

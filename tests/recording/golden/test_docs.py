@@ -17,7 +17,7 @@ from tests import command_line
 from tests.docs.pages import ROOT, fenced
 from tests.recording.golden.conftest import CACHE
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.heavy
 
 PAGE = ROOT / "docs" / "ci.md"
 POLICY, TESTS = fenced(PAGE, "python")

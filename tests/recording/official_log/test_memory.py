@@ -48,7 +48,7 @@ def big_log(path, *, n_buildings=3000, n_steps=300, agents=40):
         file.write(b"\0\0\0\2" + writer.part(7, b""))
 
 
-@pytest.mark.slow
+@pytest.mark.heavy
 @pytest.mark.skipif(not STATUS.exists(), reason="the system does not say how much memory a process held")
 def test_a_gigabyte_is_imported_in_less_than_300_mb(here):
     path = here / "big.log"
