@@ -13,8 +13,9 @@ from fireworld.scenario import scenario_names
 from tests.docs.pages import PAGES, README, ROOT, anchors, commands, links, page_name
 
 COMMANDS = [words for page in PAGES for words in commands(page)]
-CITATION = re.compile(r"MODEL (?:section )?(\d(?:\.\d)?(?:(?:-| and |, )\d(?:\.\d)?)*)")
-NUMBER = re.compile(r"\d(?:\.\d)?")
+CITATION = re.compile(r"MODEL (?:section )?(\d+(?:\.\d)?(?:(?:-| and |, )\d+(?:\.\d)?)*)")
+NUMBER = re.compile(r"\d+(?:\.\d)?")
+FENCED = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=page_name)
@@ -27,6 +28,13 @@ def test_relative_links_lead_somewhere(page):
         assert target.exists(), link
         if anchor:
             assert anchor in anchors(target), link
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_name)
+def test_no_heading_comes_twice(page):
+    text = FENCED.sub("", page.read_text(encoding="utf-8"))
+    headings = [] if page.name == "CHANGELOG.md" else re.findall(r"^#+ .*$", text, re.MULTILINE)
+    assert sorted(headings) == sorted(set(headings))
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if page.parent.name == "docs"], ids=page_name)
@@ -56,7 +64,7 @@ def test_commands_are_real(words):
 
 def test_the_model_has_every_section_that_code_cites():
     page = (ROOT / "docs" / "model.md").read_text(encoding="utf-8")
-    sections = set(re.findall(r"^#+ (\d(?:\.\d)?)", page, re.MULTILINE))
+    sections = set(re.findall(r"^#+ (\d+(?:\.\d)?)", page, re.MULTILINE))
     sources = [path.read_text(encoding="utf-8") for path in (ROOT / "fireworld").rglob("*.py")]
     cited = {number for text in sources for group in CITATION.findall(text) for number in NUMBER.findall(group)}
     assert cited
