@@ -6,7 +6,17 @@ from fireworld.evaluation.suites import suites
 from tests.docs.suites_table import PAGE, renew
 
 TEXT = PAGE.read_text(encoding="utf-8")
-POLICIES = ("chief", "each-another", "easiest", "random", "paper-cooperative", "best", "planner", "planner:over=best")
+POLICIES = (
+    "chief",
+    "each-another",
+    "easiest",
+    "random",
+    "paper-cooperative",
+    "ppo.npz",
+    "best",
+    "planner",
+    "planner:over=best",
+)
 
 
 def test_its_suites_are_those_that_there_are():
