@@ -83,7 +83,7 @@ check-tests: install  ## Run all tests but the heavy ones; PYTEST=... are furthe
 # The lowest versions that pyproject.toml allows. Pages of the docs are as the newest libraries write them; of what is slow,
 # only what leans on libraries.
 oldest: .venv-oldest/.installed  ## Run the tests of everything but docs and packages with the oldest libraries, in a .venv-oldest.
-	.venv-oldest/bin/python -m pytest --numprocesses $(WORKERS) -m "not slow or libraries and not heavy" --ignore tests/docs --ignore tests/installed $(PYTEST)
+	.venv-oldest/bin/python -m pytest --numprocesses $(WORKERS) -m "not slow or libraries" --ignore tests/docs --ignore tests/installed $(PYTEST)
 
 .venv-oldest/.installed: pyproject.toml constraints-oldest.txt
 	$(PYTHON) -m venv .venv-oldest

@@ -10,12 +10,11 @@ from fireworld.cli import root
 from fireworld.policy.names import BUILT_IN, PLANNERS
 from fireworld.policy.teams import team_names
 from fireworld.scenario import scenario_names
-from tests.docs.pages import PAGES, README, ROOT, anchors, commands, links, page_name
+from tests.docs.pages import FENCED, PAGES, README, ROOT, anchors, commands, links, page_name
 
 COMMANDS = [words for page in PAGES for words in commands(page)]
 CITATION = re.compile(r"MODEL (?:section )?(\d+(?:\.\d)?(?:(?:-| and |, )\d+(?:\.\d)?)*)")
 NUMBER = re.compile(r"\d+(?:\.\d)?")
-FENCED = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=page_name)

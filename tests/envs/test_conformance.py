@@ -25,7 +25,7 @@ if not MISSING:
 
     from fireworld import envs
     from fireworld.envs.check import everything
-    from fireworld.envs.check.checks import COLUMNS, Check, run_check, table_of
+    from fireworld.envs.check.checks import COLUMNS, Check, Checked, run_check, table_of
     from fireworld.envs.check.everything import checks_of
     from fireworld.envs.check.logs import follow
     from fireworld.envs.check.players import PLAYERS, exact, play, randomly
@@ -162,6 +162,9 @@ def test_the_command():
     found = json.loads(done.stdout)
     assert len(found) == len(CHECKS)
     assert all(one["ok"] and one["seconds"] >= 0 for one in found)
+    table = table_of([Checked(**one) for one in found])
+    assert table.endswith(f"{len(CHECKS)} of {len(CHECKS)} checks are passed")
+    assert max(map(len, table.splitlines())) <= 80
 
 
 def test_the_command_prints_a_table(monkeypatch, capsys):
@@ -171,7 +174,9 @@ def test_the_command_prints_a_table(monkeypatch, capsys):
     with pytest.raises(SystemExit) as exit_:
         runpy.run_path(str(Path(everything.__file__).with_name("__main__.py")))
     assert exit_.value.code == 1
-    assert capsys.readouterr().out == table_of([run_check(one) for one in two]) + "\n"
+    assert capsys.readouterr().out.endswith(
+        "1 of 2 checks are passed\nturns: wrong: ZeroDivisionError: division by zero\n"
+    )
 
 
 def test_a_command_that_cannot_check():

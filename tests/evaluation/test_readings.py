@@ -314,6 +314,14 @@ def test_a_study_that_is_stopped_keeps_its_trials(word, small, tmp_path):
     assert tables(tmp_path / "a") == tables(tmp_path / "b")
 
 
+def test_a_curriculum_without_a_stage_alone_is_refused(tmp_path):
+    path = tmp_path / "together.yaml"
+    path.write_text("stages: [{name: one, cooperation: true, scenarios: [quick]}]")
+    with pytest.raises(TrainingError, match=r"stages: expected one without cooperation, got .*one"):
+        fw.try_readings(tmp_path / "a", quick=True, curriculum=path)
+    assert not (tmp_path / "a").exists()
+
+
 @pytest.mark.parametrize(("words", "name"), [({"design": "all"}, "design"), ({"seeds": 0}, "seeds")])
 def test_arguments_are_checked_first(words, name, tmp_path):
     with pytest.raises(FireworldError, match=f"{name}: expected"):

@@ -170,7 +170,8 @@ def measure_readings(
     readings += further(choices) if size.further else []
     trained_in = load_curriculum(curriculum)
     if all(stage.cooperation for stage in trained_in.stages):
-        raise TrainingError(expected(str(curriculum), "stages", "one without cooperation", "none"))
+        names = [stage.name for stage in trained_in.stages]
+        raise TrainingError(expected(str(curriculum), "stages", "one without cooperation", names))
     seeds = range(FIRST_SEED, FIRST_SEED + size.seeds)
     with gentle_interrupt(stop) as asked:
         workers = workers_for(executor, stop=asked)
