@@ -102,6 +102,7 @@ docs: install  ## Renew what is made from the code in docs/, and what the comman
 	$(BIN)/python -m tests.docs.contested_table
 	$(BIN)/python -m tests.docs.suites_table
 	$(BIN)/python -m tests.docs.cli_reference
+	$(BIN)/python -m tests.docs.readings_result
 	$(BIN)/python -m tests.docs.blocks --renew
 
 site: .venv/.site  ## Make docs/ a web site that needs no network, reports/site.

@@ -22,6 +22,7 @@ from fireworld.markdown import escaped
 from fireworld.reproduction.readings.choices import SHIPPED, load_choices, read_as
 from fireworld.reproduction.readings.design import N_BASIC, design, designed, further, generators
 from fireworld.reproduction.readings.effects import (
+    Effect,
     main_effects,
     over_readings,
     over_trainings,
@@ -191,6 +192,13 @@ def test_intervals_of_a_reading_hold_what_is_true_in_95_of_100_studies(n_trainin
         one = over_trainings(values)
         held += one.low <= 0.1 <= one.high
     assert 0.938 <= held / n <= 0.962
+
+
+def test_a_mean_of_zero_has_one_sign_and_ends_keep_theirs():
+    values = np.array([-0.1, 0.0, 0.0999])[:, np.newaxis]
+    assert over_trainings(values).text() == "+0.00 [-0.25, +0.25]"
+    one = Effect(-0.07, -0.13, -0.001)
+    assert one.text() == "-0.07 [-0.13, -0.00]", "below 0"
 
 
 @pytest.mark.parametrize("n_trainings", [1, 2])

@@ -35,8 +35,8 @@ class Effect(Interval):
     def text(self) -> str:
         """Return it for people: "+0.14 [-0.04, +0.31]"."""
         if not self.can_tell:
-            return f"{self.mean:+.2f} [no interval]"
-        return f"{self.mean:+.2f} [{self.low:+.2f}, {self.high:+.2f}]"
+            return f"{self.mean:+z.2f} [no interval]"
+        return f"{self.mean:+z.2f} [{self.low:+.2f}, {self.high:+.2f}]"
 
 
 def main_effects(names: Sequence[str], signs: Array, means: Array) -> list[Effect]:
