@@ -68,9 +68,9 @@ def _section(finding: Finding, beside: Path) -> Iterator[str]:
         yield " · ".join(f"[{escaped(label)}]({_target(path, beside)})" for label, path in finding.links.items())
 
 
-def markdown_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Write a table; the first column is words, the others are numbers."""
-    rule = ["---", *("---:" for _ in heads[1:])]
+def markdown_table(heads: Sequence[str], rows: Sequence[Sequence[str]], *, n_text: int = 1) -> str:
+    """Write a table; the first `n_text` columns are words, the others are numbers."""
+    rule = ["---" if k < n_text else "---:" for k in range(len(heads))]
     cells = [[*map(escaped, heads)], rule, *([*map(escaped, row)] for row in rows)]
     return "\n".join(f"| {' | '.join(line)} |" for line in cells)
 

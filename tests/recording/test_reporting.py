@@ -46,6 +46,7 @@ def test_markdown_shows_words_as_they_are():
     )  # fmt: skip
     assert "@" not in escaped("@somebody")
     assert markdown_table(["", "a|b"], [["x", "1"]]) == "|  | a\\|b |\n| --- | ---: |\n| x | 1 |"
+    assert markdown_table(["a", "b"], [], n_text=2) == "| a | b |\n| --- | --- |"
 
 
 def test_the_cause_comes_first_then_the_difference_then_the_table():

@@ -84,7 +84,7 @@ def markdown_text(study: ReadingsStudy) -> str:
     parts = [
         _size_text(study),
         said,
-        markdown_table(("choice", "ours", "other", *EFFECT_HEADS), rows),
+        markdown_table(("choice", "ours", "other", *EFFECT_HEADS), rows, n_text=3),
         SAID_OF_EFFECTS,
         f"![{SAID_OF_CURVE}]({FIGURE})",
     ]
