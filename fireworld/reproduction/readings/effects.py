@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
+
 from fireworld.draws import below
-from fireworld.evaluation.statistics import Interval
+from fireworld.evaluation.statistics import Interval, mean
 from fireworld.kernels.arrays import Array
 
 TRAININGS_LEAST: Final = 3
@@ -57,8 +59,8 @@ def main_effects(names: Sequence[str], signs: Array, means: Array) -> list[Effec
 
 def over_readings(signs: Array, means: Array) -> Effect:
     """Estimate the mean over all readings, as uncertain as main effects leave it; arguments as of `main_effects`."""
-    mean, half = math.fsum(means.tolist()) / len(means), _half_width(signs, means)
-    return Effect(mean, mean - half, mean + half)
+    middle, half = mean(means), _half_width(signs, means)
+    return Effect(middle, middle - half, middle + half)
 
 
 def over_trainings(values: Array) -> Effect:
@@ -69,25 +71,24 @@ def over_trainings(values: Array) -> Effect:
     Args:
         values: (trainings, seeds).
     """
-    means = [math.fsum(row) / len(row) for row in values.tolist()]
-    n = len(means)
-    mean, half = math.fsum(means) / n, math.inf
+    means = np.array([mean(row) for row in values])
+    n, middle, half = len(means), mean(means), math.inf
     if n >= TRAININGS_LEAST:
-        variance = math.fsum((one - mean) ** 2 for one in means) / (n - 1)
+        variance = math.fsum(((means - middle) ** 2).tolist()) / (n - 1)
         half = student_95(n - 1) * math.sqrt(variance / n)
-    return Effect(mean, mean - half, mean + half)
+    return Effect(middle, middle - half, middle + half)
 
 
 def permutation_p(signs: Array, means: Array) -> float:
     """Return how often shuffled readings have main effects as large, squared and added up: "no reading matters"."""
-    found, n = float((_contrasts(signs, means) ** 2).sum()), len(means)
+    found, n = _size(_contrasts(signs, means)), len(means)
     n_as_large = 0
     for number in range(N_PERMUTATIONS):
         order = list(range(n))
         for place in range(n - 1, 0, -1):
             other = below(n, _PERMUTE, place, number, bound=place + 1)
             order[place], order[other] = order[other], order[place]
-        n_as_large += float((_contrasts(signs, means[order]) ** 2).sum()) >= found - 1e-12
+        n_as_large += _size(_contrasts(signs, means[order])) >= found - 1e-12
     return (1 + n_as_large) / (1 + N_PERMUTATIONS)
 
 
@@ -104,10 +105,14 @@ def student_95(freedom: int) -> float:
     )
 
 
+def _size(effects: Array) -> float:
+    return math.fsum((effects**2).tolist())
+
+
 def _contrasts(signs: Array, means: Array) -> Array:
-    """Return the mean of each choice's other level minus that of ours, (choices,)."""
-    found: Array = signs.T @ (means - means.mean()) * 2.0 / len(means)
-    return found
+    """Return the mean of each choice's other level minus that of ours, (choices,); the same bits on every machine."""
+    off = means - mean(means)
+    return np.array([math.fsum(column) for column in (signs.T * off).tolist()]) * 2.0 / len(means)
 
 
 def _half_width(signs: Array, means: Array) -> float:
@@ -116,6 +121,7 @@ def _half_width(signs: Array, means: Array) -> float:
     left = n_readings - n_choices - 1
     if left <= 0:
         return math.inf
-    fitted = means.mean() + signs @ _contrasts(signs, means) / 2.0
+    parts = [math.fsum(row) for row in (signs * _contrasts(signs, means)).tolist()]
+    fitted = mean(means) + np.array(parts) / 2.0
     spread = math.sqrt(math.fsum(((means - fitted) ** 2).tolist()) / left)
     return student_95(left) * spread / math.sqrt(n_readings)

@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from fireworld.errors import TrainingError, expected
+from fireworld.evaluation.statistics import mean
 from fireworld.executors import AnyExecutor, Workers, workers_for
 from fireworld.interrupt import Interrupted, gentle_interrupt
 from fireworld.kernels.arrays import Array
@@ -131,12 +132,12 @@ class ReadingsStudy:
         return main_effects([choice.name for choice in self.choices], self.signs, self._means(values))
 
     def _means(self, values: Sequence[Array]) -> Array:
-        return np.array([float(one.mean()) for one in values[: self.n_designed]])
+        return np.array([mean(one) for one in values[: self.n_designed]])
 
 
 def best_of(differences: Sequence[Array]) -> list[int]:
     """Return the numbers of the readings in which cooperation adds most, the best first."""
-    return sorted(range(len(differences)), key=lambda n: (-float(differences[n].mean()), n))[:N_BEST]
+    return sorted(range(len(differences)), key=lambda n: (-mean(differences[n]), n))[:N_BEST]
 
 
 def measure_readings(
