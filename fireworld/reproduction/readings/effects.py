@@ -81,14 +81,14 @@ def over_trainings(values: Array) -> Effect:
 
 def permutation_p(signs: Array, means: Array) -> float:
     """Return how often shuffled readings have main effects as large, squared and added up: "no reading matters"."""
-    found, n = _size(_contrasts(signs, means)), len(means)
+    found, n = _sum_of_squares(_contrasts(signs, means)), len(means)
     n_as_large = 0
     for number in range(N_PERMUTATIONS):
         order = list(range(n))
         for place in range(n - 1, 0, -1):
             other = below(n, _PERMUTE, place, number, bound=place + 1)
             order[place], order[other] = order[other], order[place]
-        n_as_large += _size(_contrasts(signs, means[order])) >= found - 1e-12
+        n_as_large += _sum_of_squares(_contrasts(signs, means[order])) >= found - 1e-12
     return (1 + n_as_large) / (1 + N_PERMUTATIONS)
 
 
@@ -105,7 +105,7 @@ def student_95(freedom: int) -> float:
     )
 
 
-def _size(effects: Array) -> float:
+def _sum_of_squares(effects: Array) -> float:
     return math.fsum((effects**2).tolist())
 
 
