@@ -18,6 +18,12 @@ from fireworld.executors.workers import ExecutorError, Workers, n_cores
 
 REACH_SECONDS: Final = 10
 END_SECONDS: Final = 5
+QUIET: Final = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "500ms",
+    "distributed.admin.system-monitor.interval": "5s",
+}
+"""What Dask says of itself takes 2 % of each core where it looks a hundred times a second; nobody looks at it here."""
 AT_LEAST: Final = 4
 """Workers that a cluster is taken to have, which may have none yet and make them when there is work."""
 
@@ -101,14 +107,15 @@ def _library() -> Any:
 @contextmanager
 def _local(library: Any, n: int) -> Iterator[Executor]:
     """Make a cluster on this machine, of processes, that ends with the work."""
-    cluster = library.LocalCluster(
-        n_workers=n,
-        threads_per_worker=1,
-        processes=True,
-        dashboard_address=None,
-        memory_limit=0,
-        silence_logs=logging.CRITICAL,
-    )
+    with import_module("dask").config.set(QUIET):
+        cluster = library.LocalCluster(
+            n_workers=n,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=None,
+            memory_limit=0,
+            silence_logs=logging.CRITICAL,
+        )
     with cluster, library.Client(cluster, set_as_default=False) as client:
         yield DaskPool(client, cluster)
 
