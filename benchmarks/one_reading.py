@@ -34,9 +34,9 @@ def levels_of(words: Sequence[str]) -> dict[str, str]:
 
 @click.command(help=__doc__)
 @click.argument("words", nargs=-1, metavar="[CHOICE=LEVEL]...")
-@click.option("--trainings", default=SCREEN.fresh, show_default=True)
-@click.option("--first-training", default=20_001, show_default=True, help="Seed of the first training.")
-@click.option("--jobs", default=n_cores(), show_default=True)
+@click.option("--trainings", type=click.IntRange(1), default=SCREEN.fresh, show_default=True)
+@click.option("--first-training", default=20_001, show_default=True, help="Seed of the first one.")
+@click.option("--jobs", type=click.IntRange(1), default=n_cores(), show_default=True)
 def main(*, words: tuple[str, ...], trainings: int, first_training: int, jobs: int) -> None:
     """Train, test and print."""
     reading = read_as(load_choices(), levels_of(words))
@@ -45,12 +45,12 @@ def main(*, words: tuple[str, ...], trainings: int, first_training: int, jobs: i
     numbers = range(first_training, first_training + trainings)
     tried = workers.run(
         [Trial(setting, number, seeds, workers.stop) for number in numbers],
-        lambda place, _: click.echo(f"\r{place + 1} of {trainings}", nl=False, err=True),
+        lambda place, _: click.echo(f"training {numbers[place]} is done", err=True),
     )
     if tried is None:
         raise click.Abort
     shares = np.array([one.shares for one in tried])  # (trainings, seeds, 2)
-    click.echo(f"\r{' '.join(words) or 'ours'}: {trainings} trainings from {first_training}, {len(seeds)} seeds a test")
+    click.echo(f"{' '.join(words) or 'ours'}: {trainings} trainings from {first_training}, {len(seeds)} seeds a test")
     for name, values in (
         ("with cooperation", shares[:, :, 0]),
         ("without", shares[:, :, 1]),

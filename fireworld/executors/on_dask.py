@@ -23,7 +23,7 @@ QUIET: Final = {
     "distributed.admin.tick.interval": "500ms",
     "distributed.admin.system-monitor.interval": "5s",
 }
-"""What Dask says of itself takes 2 % of each core where it looks a hundred times a second; nobody looks at it here."""
+"""How Dask looks at itself: as it comes a hundred times a second, which costs some percent of each core."""
 AT_LEAST: Final = 4
 """Workers that a cluster is taken to have, which may have none yet and make them when there is work."""
 

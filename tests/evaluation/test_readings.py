@@ -8,12 +8,10 @@ from importlib import import_module
 from pathlib import Path
 from threading import Event
 
-import click
 import numpy as np
 import pytest
 
 import fireworld as fw
-from benchmarks.one_reading import levels_of
 from fireworld.errors import FireworldError, OutputError, TrainingError
 from fireworld.executors import On
 from fireworld.executors.packing import Packer
@@ -417,14 +415,3 @@ def test_every_level_can_be_tried(level, small):
     shares = Trial(setting_of(reading, load_curriculum(small), METHOD), 1, [1000])().shares
     assert len(shares) == 1
     assert all(0.0 <= share <= 1.0 for share in shares[0])
-
-
-def test_one_reading_takes_levels_of_choices():
-    assert levels_of(["duration=four-steps", "pumps=litres-5000"]) == {"duration": "four-steps", "pumps": "litres-5000"}
-    for word, wanted in (
-        ("pump=litres-5000", "one of epsilon, "),
-        ("pumps=5000", "one of litres-2000, "),
-        ("pumps", "after ="),
-    ):
-        with pytest.raises(click.UsageError, match=wanted):
-            levels_of([word])
