@@ -54,6 +54,7 @@ NotNegative = Annotated[float, Limits("a number >= 0", 0.0)]
 Positive = Annotated[float, Limits("a number > 0", 0.0, above=True)]
 PositiveShare = Annotated[float, Limits("a number above 0, at most 1", 0.0, 1.0, above=True)]
 Count = Annotated[int, Limits(f"a whole number from 1 to {COUNT_MAX}", 1, COUNT_MAX)]
+CountOrNone = Annotated[int, Limits(f"a whole number from 0 to {COUNT_MAX}", 0, COUNT_MAX)]
 
 
 @dataclass(frozen=True, kw_only=True)

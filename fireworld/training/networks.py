@@ -50,7 +50,7 @@ class NetworkMethod(GenerationMethod):
     @property
     @abstractmethod
     def start(self) -> str:
-        """The network before the first generation: `best-2026` values targets as that ranking, `none` all of them 0."""
+        """The shipped team as which the network values targets before the first generation; `none`: all of them 0."""
 
     @property
     def n_checks(self) -> int:
@@ -63,13 +63,15 @@ class NetworkMethod(GenerationMethod):
         """How many features the network reads, and the outputs of its layers; relu comes after all but the last."""
 
     @abstractmethod
-    def first_numbers(self, ranking: Array | None, seed: int) -> Array:
+    def first_numbers(self, start: Team | None, seed: int) -> Array:
         """Return the numbers before the first generation.
 
         Args:
-            ranking: (13,) float64, weights of the features of a target by which the network values targets; None: it
-                values all of them 0.
+            start: as which the network values targets; None: it values all of them 0.
             seed: of what is drawn.
+
+        Raises:
+            TrainingError: no network of this method values targets as this team.
         """
 
     @abstractmethod
@@ -98,23 +100,32 @@ class LayeredMethod(NetworkMethod):
         """26 features, the hidden layer if there is one, the value."""
         return (len(self.features), *([self.hidden] if self.hidden else []), 1)
 
-    def first_numbers(self, ranking: Array | None, seed: int) -> Array:
+    def first_numbers(self, start: Team | None, seed: int) -> Array:
         """Return the numbers before the first generation; see `NetworkMethod.first_numbers`.
 
-        Weights of hidden units that do not compute the ranking are drawn; what they say counts 0.
+        Weights of hidden units that the start does not need are drawn; what they say counts 0.
         """
-        weighed = np.zeros(len(self.features))
-        if ranking is not None:
-            weighed[:N_TARGET_FEATURES] = ranking
+        n = len(self.features)
         if not self.hidden:
+            weighed = np.zeros(n)
+            if start is not None:
+                weighed[:N_TARGET_FEATURES] = weights_of(start)
             return pack([Layer(weighed[:, np.newaxis], np.zeros(1))], (), self.features).number
-        weights, values = np.zeros((len(weighed), self.hidden)), np.zeros((self.hidden, 1))
-        fill_normals(seed, BEGINNING, 0, weights)
-        weights /= math.sqrt(len(weighed))
-        if ranking is not None:
-            weights[:, 0], weights[:, 1], values[0], values[1] = weighed, -weighed, 1.0, -1.0
-        layers = [Layer(weights, np.zeros(self.hidden)), Layer(values, np.zeros(1))]
-        return pack(layers, (ACTIVATION,), self.features).number
+        hidden, value = (
+            Layer(np.zeros((n, self.hidden)), np.zeros(self.hidden)),
+            Layer(np.zeros((self.hidden, 1)), np.zeros(1)),
+        )
+        fill_normals(seed, BEGINNING, 0, hidden.weights)
+        hidden.weights[:] /= math.sqrt(n)
+        if start is not None:
+            of_start, its_value = _hidden_of(start, n)
+            k = len(of_start.biases)
+            if k > self.hidden:
+                wanted = f"at least {k}, which the start {self.start} has"
+                raise TrainingError(expected("method", "hidden", wanted, self.hidden))
+            hidden.weights[:, :k], hidden.biases[:k] = of_start.weights, of_start.biases
+            value.weights[:k], value.biases[:] = its_value.weights, its_value.biases
+        return pack([hidden, value], (ACTIVATION,), self.features).number
 
     def layers_of(self, numbers: Array) -> tuple[Layer, ...]:
         """Return the layers whose biases and weights the numbers are."""
@@ -137,7 +148,7 @@ class NetworkTrainer(GenerationTrainer[AMethod, AReport]):
         self._activations = (ACTIVATION,) * (len(method.widths) - 2)
         self._conditions = _conditions(curriculum)
         self._start = None if method.start == "none" else load_team(method.start)
-        self._first = method.first_numbers(None if self._start is None else _weights_of(self._start), seed)
+        self._first = method.first_numbers(self._start, seed)
 
     @property
     @abstractmethod
@@ -233,8 +244,22 @@ def _conditions(curriculum: Curriculum) -> dict[str, range]:
     return found
 
 
-def _weights_of(start: Team) -> Array:
-    """Return what the shipped ranking weighs the features of a target by, (13,) float64."""
+def weights_of(start: Team) -> Array:
+    """Return what a shipped ranking weighs the features of a target by, (13,) float64."""
     if not isinstance(start, RankingTeam) or not start.own_targets or len(start.weights) != 1:
         raise TrainingError(expected("method", "start", "one ranking of own targets", start.summary))
     return start.weights[0, :N_TARGET_FEATURES]
+
+
+def _hidden_of(start: Team, n: int) -> tuple[Layer, Layer]:
+    """Return the hidden layer of n features, and the value, by which a network values targets as a shipped team."""
+    if isinstance(start, NetworkTeam):
+        if start.features != OWN_SEEN or start.activations != (ACTIVATION,) or not start.own_targets:
+            wanted = f"a network of own targets with one hidden layer, {ACTIVATION}"
+            raise TrainingError(expected("method", "start", wanted, start.summary))
+        hidden, value = start.layers
+        return hidden, value
+    weighed = np.zeros((n, 1))
+    weighed[:N_TARGET_FEATURES, 0] = weights_of(start)
+    both = Layer(np.concatenate([weighed, -weighed], axis=1), np.zeros(N_OF_RANKING))
+    return both, Layer(np.array([[1.0], [-1.0]]), np.zeros(1))

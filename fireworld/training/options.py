@@ -12,6 +12,7 @@ from fireworld.draws import MOMENT, OPTION, ROLLOUT, hash_key, uniform
 from fireworld.kernels.addresses import address_row
 from fireworld.kernels.arrays import Array, WorldState
 from fireworld.kernels.choice import GIVEN
+from fireworld.kernels.network import value_by_network, widest
 from fireworld.planning.planner import FIRST_SEED, worth_of
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
@@ -34,6 +35,7 @@ class Trial:
         share: of the first 12 steps in which some are; of later steps a third of it.
         n_brigades: that are asked in such a step.
         n_options: targets of a brigade that are tried, its own choice among them.
+        n_likely: so many of the others are those that the team values next; the rest is drawn.
         n_rollouts: of each.
         commit: steps for which the brigade goes for the target, while that burns.
         horizon: steps of a rollout.
@@ -42,6 +44,7 @@ class Trial:
     share: float
     n_brigades: int
     n_options: int
+    n_likely: int
     n_rollouts: int
     commit: int
     horizon: int
@@ -78,7 +81,7 @@ def try_options(world: World, policy: KernelPolicy, trial: Trial, stop: Event) -
             world.step(policy)
             continue
         order = sorted(range(world.n_brigades), key=lambda brigade: hash_key(world.seed, OPTION, brigade, step))
-        asking = _Asking(policy, order[: trial.n_brigades])
+        asking = _Asking(policy, order[: trial.n_brigades], trial.n_likely)
         before = copy_world(world.state)
         world.step(asking)
         found += [rollouts.tried(before, step, asked) for asked in asking.asked if len(asked.targets) > 1]
@@ -87,7 +90,7 @@ def try_options(world: World, policy: KernelPolicy, trial: Trial, stop: Event) -
 
 @dataclass(frozen=True)
 class _Asked:
-    """What a brigade could choose from; the first is what it chose."""
+    """What a brigade could choose from, in the order in which it is tried; the first is what it chose."""
 
     brigade: int
     targets: list[int]
@@ -97,8 +100,9 @@ class _Asked:
 class _Asking(Policy):
     """Decides as a team does, and notes what some brigades could choose from."""
 
-    def __init__(self, policy: KernelPolicy, brigades: list[int]) -> None:
-        self._policy, self._brigades = policy, brigades
+    def __init__(self, policy: KernelPolicy, brigades: list[int], n_likely: int) -> None:
+        self._policy, self._brigades, self._n_likely = policy, brigades, n_likely
+        self._work = np.zeros((2, widest(policy.network)))
         self.asked: list[_Asked] = []
 
     def decide(self, observation: Observation) -> Decision:
@@ -107,11 +111,10 @@ class _Asking(Policy):
             targets, seen = seen_targets(observation)
             own = targets.index(int(decision.target if decision.target is not None else -1))
             n, seed, step = len(observation.known_targets), observation.seed, observation.step
-            others = sorted(
-                (k for k in range(len(targets)) if k != own),
-                key=lambda k: hash_key(seed, OPTION, n + targets[k], step),
-            )
-            places = [own, *others]
+            values = [value_by_network(self._policy.network, one, self._work) for one in seen]
+            others = sorted((k for k in range(len(targets)) if k != own), key=lambda k: -values[k])
+            likely, rest = others[: self._n_likely], others[self._n_likely :]
+            places = [own, *likely, *sorted(rest, key=lambda k: hash_key(seed, OPTION, n + targets[k], step))]
             self.asked.append(_Asked(observation.brigade, [targets[k] for k in places], seen[places]))
         return decision
 

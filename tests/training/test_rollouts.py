@@ -227,7 +227,7 @@ def test_what_is_preferred_gains_its_worth(make):
     ("changes", "message"),
     [
         ({"hidden": 1}, r"hidden: expected 0, or at least 2, which a ranking takes \(start best-2026\), got 1"),
-        ({"start": "paper"}, "start: expected one of best-2026, none, got 'paper'"),
+        ({"start": "paper"}, "start: expected one of best-2026, best-2026-2, none, got 'paper'"),
         ({"share": 0.0}, "share: expected a number above 0, at most 1, got 0.0"),
         ({"n_fights": 0}, "n_fights: expected a whole number from 1"),
         ({"horizon": 0}, "horizon: "),

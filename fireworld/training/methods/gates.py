@@ -10,8 +10,10 @@ import numpy as np
 
 from fireworld.kernels.arrays import Array
 from fireworld.policy.teams.network_layers import FEATURES, NUMBER_MAX, Layer
+from fireworld.policy.teams.team import Team
 from fireworld.training.method import Limits
 from fireworld.training.methods.evolution import EvolutionStrategy
+from fireworld.training.networks import weights_of
 
 N_MAX: Final = 4
 SITUATION: Final = ("sprays_left", "site_burning", "site_steps", "site_kindling", "sites", "site_others")
@@ -43,12 +45,12 @@ class Gates(EvolutionStrategy):
         n = self.n_rankings
         return (len(self.features), N_TARGET + n * (n - 1), 2 * n, 1)
 
-    def first_numbers(self, ranking: Array | None, seed: int) -> Array:
-        """Return the numbers before the first generation: every ranking is this one, or 0, and the gates are equal."""
+    def first_numbers(self, start: Team | None, seed: int) -> Array:
+        """Return the numbers before the first generation: every ranking is the start, or 0, and the gates are equal."""
         del seed
         rankings = np.zeros((self.n_rankings, N_TARGET))
-        if ranking is not None:
-            rankings[:] = ranking
+        if start is not None:
+            rankings[:] = weights_of(start)
         return np.concatenate([rankings.ravel(), np.zeros(self.n_rankings * N_GATE)])
 
     def rankings_and_gates(self, numbers: Array) -> tuple[Array, Array]:

@@ -23,7 +23,7 @@ from fireworld.simulation.built import CityCache
 from fireworld.simulation.state import fresh_target_learner
 from fireworld.training.curriculum import Curriculum
 from fireworld.training.log.records import Improved
-from fireworld.training.method import Count, Positive, PositiveShare, Report
+from fireworld.training.method import Count, CountOrNone, Positive, PositiveShare, Report
 from fireworld.training.networks import Hidden, LayeredMethod, NetworkTrainer
 from fireworld.training.options import Trial, TriedDecision, try_options
 from fireworld.training.seeds import fight_seed
@@ -39,8 +39,8 @@ class Rollouts(LayeredMethod):
 
     hidden: Hidden = 24
     """Numbers of the layer between the 26 features and the value, relu; 0: the value is one weighted sum."""
-    start: Literal["best-2026", "none"] = "best-2026"
-    """The network before the first generation: it values targets as the ranking `best-2026`, or all of them 0."""
+    start: Literal["best-2026", "best-2026-2", "none"] = "best-2026"
+    """The network before the first generation: it values targets as this team does; `none`: all of them 0."""
     n_generations: Count = 4
     n_averaged: Count = 3
     """Networks that the team is the mean of: those after the last generations, and the first one before them."""
@@ -54,6 +54,8 @@ class Rollouts(LayeredMethod):
     """Brigades whose options are tried out in such a step."""
     n_options: Count = 7
     """Targets that are tried out of each, its own choice among them."""
+    n_likely: CountOrNone = 0
+    """Of the others so many are those that the network values next; the rest is drawn."""
     n_rollouts: Count = 2
     """Rollouts of each target; the same random draws for all."""
     commit: Count = 6
@@ -110,7 +112,15 @@ class Rollouts(LayeredMethod):
     @property
     def trial(self) -> Trial:
         """How options are tried out."""
-        return Trial(self.share, self.n_brigades, self.n_options, self.n_rollouts, self.commit, self.horizon)
+        return Trial(
+            share=self.share,
+            n_brigades=self.n_brigades,
+            n_options=self.n_options,
+            n_likely=self.n_likely,
+            n_rollouts=self.n_rollouts,
+            commit=self.commit,
+            horizon=self.horizon,
+        )
 
 
 METHOD: Final = Rollouts()
