@@ -121,7 +121,7 @@ class LayeredMethod(NetworkMethod):
             of_start, its_value = _hidden_of(start, n)
             k = len(of_start.biases)
             if k > self.hidden:
-                wanted = f"at least {k}, which the start {self.start} has"
+                wanted = f"at least {k} (start {self.start})"
                 raise TrainingError(expected("method", "hidden", wanted, self.hidden))
             hidden.weights[:, :k], hidden.biases[:k] = of_start.weights, of_start.biases
             value.weights[:k], value.biases[:] = its_value.weights, its_value.biases

@@ -17,6 +17,7 @@ from fireworld.policy.teams.network_team import NetworkTeam
 from fireworld.policy.teams.team import load_team
 from fireworld.scenario import load_scenario
 from fireworld.training.methods.evolution import Evolution, centred_ranks
+from tests.networks import make_network
 from tests.training.generations import CONDITIONS, SHORT_EVOLUTION, decisions, maker, read
 from tests.training.test_search import SetAfter
 
@@ -73,11 +74,23 @@ def test_without_a_start_all_targets_are_worth_the_same(make):
     assert make().identity["start"] == load_team("best-2026").digest
 
 
-def test_a_start_that_is_no_ranking(make, monkeypatch):
-    network = make().team()
-    monkeypatch.setattr("fireworld.training.networks.load_team", lambda _: network)
-    with pytest.raises(TrainingError, match=r"^method: start: expected one ranking of own targets, got a net"):
-        make()
+@pytest.mark.parametrize(
+    ("start", "hidden", "wanted"),
+    [
+        (make_network(own_targets=True), 0, "start: expected one ranking of own targets, got a net"),
+        (
+            make_network(own_targets=True),
+            12,
+            "start: expected a network of own targets with one hidden layer, relu, got a",
+        ),
+        (load_team("paper-cooperative"), 12, "start: expected one ranking of own targets, got "),
+        (load_team("best-2026-2"), 12, r"hidden: expected at least 72 \(start best-2026\), got 12"),
+    ],
+)
+def test_a_start_that_no_such_network_can_be(make, monkeypatch, start, hidden, wanted):
+    monkeypatch.setattr("fireworld.training.networks.load_team", lambda _: start)
+    with pytest.raises(TrainingError, match=f"^method: {wanted}"):
+        make(hidden=hidden)
 
 
 @pytest.mark.parametrize("n_threads", [1, 2])

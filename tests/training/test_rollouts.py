@@ -122,6 +122,28 @@ def test_what_was_chosen_comes_first_and_is_worth_nothing_more(make):
     assert any(decision.worth.any() for decision in found)
 
 
+def test_likely_options_are_those_that_the_team_values_next(make):
+    _, drawn = tried_in(make)
+    _, likely = tried_in(make, n_likely=2)
+    weights = load_team("best-2026").weights[0, :13]
+    values = [decision.seen[:, :13] @ weights for decision in likely]
+    assert all((one[:-1] >= one[1:] - 1e-9).all() for one in (value[:3] for value in values))
+    assert any(one[3:].size and one[3] < one[2] for one in values)
+    assert len(drawn) == len(likely)
+    assert any(not np.array_equal(one.seen, other.seen) for one, other in zip(drawn, likely, strict=True))
+
+
+@pytest.mark.parametrize("hidden", [72, 80])
+def test_it_may_start_with_a_shipped_network(make, hidden):
+    trainer, team = make(start="best-2026-2", hidden=hidden, n_averaged=1), load_team("best-2026-2")
+    assert trainer.team().widths == (26, hidden, 1)
+    assert trainer.identity["start"] == team.digest
+    seen = np.random.default_rng(1).normal(size=(50, 26))
+    assert by_layers(trainer.team().layers, seen) == pytest.approx(by_layers(team.layers, seen))
+    if hidden == 72:
+        assert trainer.team().digest == team.digest
+
+
 def test_a_target_that_is_chosen_anyway_is_worth_the_same(make, monkeypatch):
     """Forced to do for one step what it does by itself, a brigade comes to what the team comes to."""
     trainer = make(share=1.0, commit=1)
