@@ -1,4 +1,4 @@
-"""The benchmark that says how far rollouts must look: two rollouts of every option, the same options at all horizons."""
+"""The benchmark that says how far rollouts must look: two rollouts of every option, the same options each time."""
 
 from __future__ import annotations
 
