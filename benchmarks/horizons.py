@@ -1,6 +1,6 @@
 """How far rollouts must look: what options come to after more and more steps, and how much of that is chance.
 
-    python -m benchmarks.horizons [--team best-2026-2] [--fights 130] [--horizons 25,50,100,200] [--seed 31]
+    python -m benchmarks.horizons [--team best] [--fights 130] [--horizons 25,50,100,200] [--seed 31]
 
 Options of a team's decisions are tried out in fights of the curriculum `conditions`, in two rollouts each with other
 random draws. What two rollouts of one option share is what it is worth; what they do not share is chance. Another
@@ -76,7 +76,7 @@ def two_rollouts(
 def main() -> None:
     """Measure each horizon, and print the table."""
     parser = argparse.ArgumentParser(description="How far rollouts must look.")
-    parser.add_argument("--team", default="best-2026-2", help="a team with a network, whose decisions are tried out")
+    parser.add_argument("--team", default="best", help="a team with a network, whose decisions are tried out")
     parser.add_argument("--fights", type=int, default=130)
     parser.add_argument("--horizons", default="25,50,100,200", help="steps, rising")
     parser.add_argument("--seed", type=int, default=31)

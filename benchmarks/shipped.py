@@ -16,9 +16,11 @@ from typing import Final
 
 import click
 
+from fireworld.errors import TrainingError
 from fireworld.policy.teams import team_path
 from fireworld.policy.teams.table_team import TableTeam
 from fireworld.policy.teams.team import Team, load_team
+from fireworld.training.training import check_same
 
 COMMANDS: Final[Mapping[str, tuple[str, ...]]] = {
     "paper-cooperative": ("train", "paper", "--seed", "1"),
@@ -45,12 +47,16 @@ def train_all(folder: Path, names: Sequence[str] = tuple(COMMANDS)) -> dict[str,
     return {name: load_team(folder / f"{name}.npz") for name in started}
 
 
-def same(team: Team, other: Team) -> bool:
-    """Return whether two teams have learned the same from the same; the version of fireworld may be another."""
-    origins = [{**one.provenance, "fireworld": ""} for one in (team, other)]
-    if isinstance(team, TableTeam) and isinstance(other, TableTeam) and (team.visits != other.visits).any():
+def same(team: Team, shipped: Team) -> bool:
+    """Return whether a team has learned what a shipped one has, from the same; the version may be another."""
+    origin = {key: value for key, value in team.provenance.items() if key != "fireworld"}
+    try:
+        check_same(shipped.provenance, origin, Path())
+    except TrainingError:
         return False
-    return team.digest == other.digest and origins[0] == origins[1]
+    if isinstance(team, TableTeam) and isinstance(shipped, TableTeam) and (team.visits != shipped.visits).any():
+        return False
+    return team.digest == shipped.digest
 
 
 @click.command()

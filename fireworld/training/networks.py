@@ -18,7 +18,7 @@ from fireworld.kernels.arrays import Array, NetworkArrays
 from fireworld.kernels.draws import fill_normals
 from fireworld.kernels.ranking import N_TARGET_FEATURES
 from fireworld.policy.kernel import KernelPolicy, from_network
-from fireworld.policy.teams.network_layers import OWN_SEEN, Layer, pack, unpack
+from fireworld.policy.teams.network_layers import OF_OTHERS, OWN_SEEN, Layer, pack, unpack
 from fireworld.policy.teams.network_team import NetworkTeam
 from fireworld.policy.teams.npz import check_arrays, check_finite
 from fireworld.policy.teams.ranking_team import RankingTeam
@@ -40,12 +40,15 @@ class NetworkMethod(GenerationMethod):
     """A method that improves a network, whose layers follow from (k,) float64 numbers.
 
     Attributes:
-        features: what the network reads of a target.
         is_packed: the numbers are biases and weights of the layers, as `pack` puts them.
     """
 
-    features: ClassVar[tuple[str, ...]] = OWN_SEEN
     is_packed: ClassVar[bool] = False
+
+    @property
+    @abstractmethod
+    def features(self) -> tuple[str, ...]:
+        """What the network reads of a target."""
 
     @property
     @abstractmethod
@@ -86,7 +89,9 @@ class LayeredMethod(NetworkMethod):
     is_packed: ClassVar[bool] = True
 
     hidden: Hidden
-    """Numbers of the layer between the 26 features and the value, relu; 0: the value is one weighted sum."""
+    """Numbers of the layer between features and value, relu; 0: the value is one weighted sum."""
+    cooperation: bool = True
+    """Brigades see what the others go for."""
 
     def __post_init__(self) -> None:
         """Raise TrainingError if a hyperparameter is not what it may be."""
@@ -96,8 +101,13 @@ class LayeredMethod(NetworkMethod):
             raise TrainingError(expected("method", "hidden", wanted, self.hidden))
 
     @property
+    def features(self) -> tuple[str, ...]:
+        """What the network reads of a target: all that there is, or what a team without cooperation sees."""
+        return tuple(name for name in OWN_SEEN if self.cooperation or name not in OF_OTHERS)
+
+    @property
     def widths(self) -> tuple[int, ...]:
-        """26 features, the hidden layer if there is one, the value."""
+        """The features, the hidden layer if there is one, the value."""
         return (len(self.features), *([self.hidden] if self.hidden else []), 1)
 
     def first_numbers(self, start: Team | None, seed: int) -> Array:
@@ -105,25 +115,22 @@ class LayeredMethod(NetworkMethod):
 
         Weights of hidden units that the start does not need are drawn; what they say counts 0.
         """
-        n = len(self.features)
+        n, rows = len(self.features), [OWN_SEEN.index(name) for name in self.features]
         if not self.hidden:
-            weighed = np.zeros(n)
+            weighed = np.zeros(len(OWN_SEEN))
             if start is not None:
                 weighed[:N_TARGET_FEATURES] = weights_of(start)
-            return pack([Layer(weighed[:, np.newaxis], np.zeros(1))], (), self.features).number
-        hidden, value = (
-            Layer(np.zeros((n, self.hidden)), np.zeros(self.hidden)),
-            Layer(np.zeros((self.hidden, 1)), np.zeros(1)),
-        )
+            return pack([Layer(weighed[rows, np.newaxis], np.zeros(1))], (), self.features).number
+        hidden = Layer(np.zeros((n, self.hidden)), np.zeros(self.hidden))
+        value = Layer(np.zeros((self.hidden, 1)), np.zeros(1))
         fill_normals(seed, BEGINNING, 0, hidden.weights)
         hidden.weights[:] /= math.sqrt(n)
         if start is not None:
-            of_start, its_value = _hidden_of(start, n)
+            of_start, its_value = _hidden_of(start)
             k = len(of_start.biases)
             if k > self.hidden:
-                wanted = f"at least {k} (start {self.start})"
-                raise TrainingError(expected("method", "hidden", wanted, self.hidden))
-            hidden.weights[:, :k], hidden.biases[:k] = of_start.weights, of_start.biases
+                raise TrainingError(expected("method", "hidden", f"at least {k} (start {self.start})", self.hidden))
+            hidden.weights[:, :k], hidden.biases[:k] = of_start.weights[rows], of_start.biases
             value.weights[:k], value.biases[:] = its_value.weights, its_value.biases
         return pack([hidden, value], (ACTIVATION,), self.features).number
 
@@ -251,15 +258,15 @@ def weights_of(start: Team) -> Array:
     return start.weights[0, :N_TARGET_FEATURES]
 
 
-def _hidden_of(start: Team, n: int) -> tuple[Layer, Layer]:
-    """Return the hidden layer of n features, and the value, by which a network values targets as a shipped team."""
+def _hidden_of(start: Team) -> tuple[Layer, Layer]:
+    """Return the hidden layer of all features, and the value, by which a network values targets as a shipped team."""
     if isinstance(start, NetworkTeam):
         if start.features != OWN_SEEN or start.activations != (ACTIVATION,) or not start.own_targets:
             wanted = f"a network of own targets with one hidden layer, {ACTIVATION}"
             raise TrainingError(expected("method", "start", wanted, start.summary))
         hidden, value = start.layers
         return hidden, value
-    weighed = np.zeros((n, 1))
+    weighed = np.zeros((len(OWN_SEEN), 1))
     weighed[:N_TARGET_FEATURES, 0] = weights_of(start)
     both = Layer(np.concatenate([weighed, -weighed], axis=1), np.zeros(N_OF_RANKING))
     return both, Layer(np.array([[1.0], [-1.0]]), np.zeros(1))

@@ -373,6 +373,8 @@ SINCE: Final[Mapping[str, Any]] = {
     "epsilon_schedule": "scenario",
     "untried": "best",
     "draw_last": False,
+    "cooperation": True,
+    "n_likely": 0,
 }
 """Hyperparameters that older files do not have, and what they were by then."""
 

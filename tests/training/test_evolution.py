@@ -84,7 +84,7 @@ def test_without_a_start_all_targets_are_worth_the_same(make):
             "start: expected a network of own targets with one hidden layer, relu, got a",
         ),
         (load_team("paper-cooperative"), 12, "start: expected one ranking of own targets, got "),
-        (load_team("best-2026-2"), 12, r"hidden: expected at least 72 \(start best-2026\), got 12"),
+        (load_team("best"), 12, r"hidden: expected at least 72 \(start best-2026\), got 12"),
     ],
 )
 def test_a_start_that_no_such_network_can_be(make, monkeypatch, start, hidden, wanted):

@@ -18,7 +18,7 @@ def fires(tmp_path_factory):
 
 
 def test_two_rollouts_of_every_option(fires):
-    network = load_team("best-2026-2").policy().network
+    network = load_team("best").policy().network
     near, far = (two_rollouts(fires, network, horizon, 4, 1)[0] for horizon in (7, 20))
     assert near.shape == far.shape
     assert len(near) > 20

@@ -12,7 +12,7 @@ import pytest
 from fireworld.errors import TrainingError
 from fireworld.executors import threads
 from fireworld.kernels.fitting import fit_once, gain
-from fireworld.policy.teams.network_layers import OWN_SEEN
+from fireworld.policy.teams.network_layers import OF_OTHERS, OWN_SEEN
 from fireworld.policy.teams.team import load_team
 from fireworld.simulation.state import score_of
 from fireworld.training.methods.rollouts import Rollouts
@@ -135,13 +135,26 @@ def test_likely_options_are_those_that_the_team_values_next(make):
 
 @pytest.mark.parametrize("hidden", [72, 80])
 def test_it_may_start_with_a_shipped_network(make, hidden):
-    trainer, team = make(start="best-2026-2", hidden=hidden, n_averaged=1), load_team("best-2026-2")
+    trainer, team = make(start="best", hidden=hidden, n_averaged=1), load_team("best")
     assert trainer.team().widths == (26, hidden, 1)
     assert trainer.identity["start"] == team.digest
     seen = np.random.default_rng(1).normal(size=(50, 26))
     assert by_layers(trainer.team().layers, seen) == pytest.approx(by_layers(team.layers, seen))
     if hidden == 72:
         assert trainer.team().digest == team.digest
+
+
+@pytest.mark.parametrize("hidden", [3, 0])
+def test_without_cooperation_nobody_sees_what_others_go_for(make, hidden):
+    trainer = make(cooperation=False, hidden=hidden)
+    assert {*OWN_SEEN} > OF_OTHERS
+    assert trainer.team().features == tuple(name for name in OWN_SEEN if name not in OF_OTHERS)
+    ranking = dict(zip(OWN_SEEN, load_team("best-2026").weights[0, :13], strict=False))
+    seen = np.random.default_rng(1).normal(size=(50, 21))
+    wanted = seen @ [ranking.get(name, 0.0) for name in trainer.team().features]
+    assert by_layers(trainer.team().layers, seen) == pytest.approx(wanted)
+    assert improved(trainer)[0] != improved(make(hidden=hidden))[0]
+    assert trainer.team().features == trainer.method.features
 
 
 def test_a_target_that_is_chosen_anyway_is_worth_the_same(make, monkeypatch):
@@ -249,7 +262,7 @@ def test_what_is_preferred_gains_its_worth(make):
     ("changes", "message"),
     [
         ({"hidden": 1}, r"hidden: expected 0, or at least 2, which a ranking takes \(start best-2026\), got 1"),
-        ({"start": "paper"}, "start: expected one of best-2026, best-2026-2, none, got 'paper'"),
+        ({"start": "paper"}, "start: expected one of best-2026, best, none, got 'paper'"),
         ({"share": 0.0}, "share: expected a number above 0, at most 1, got 0.0"),
         ({"n_fights": 0}, "n_fights: expected a whole number from 1"),
         ({"horizon": 0}, "horizon: "),

@@ -39,7 +39,7 @@ def test_the_papers_teams_are_there():
 def test_the_best_come_from_the_shipped_curricula(name, method, curriculum, seed):
     team = load_team(name)
     wanted = method.trainer(load_curriculum(curriculum), seed=seed).identity
-    assert {key: team.provenance[key] for key in wanted} == wanted
+    check_same(team.provenance, wanted, team_path(name))
     assert team.provenance["generations_done"] == method.n_generations
     assert team.own_targets
 

@@ -7,13 +7,13 @@ import pytest
 
 from fireworld.errors import TrainingError
 from fireworld.executors import threads
-from fireworld.policy.teams.network_layers import pack
+from fireworld.policy.teams.network_layers import OF_OTHERS, pack
 from fireworld.policy.teams.network_team import NetworkTeam
 from fireworld.policy.teams.team import load_team
 from fireworld.simulation.built import build_scenario
 from fireworld.training.curriculum import load_curriculum
 from fireworld.training.log.reader import open_training
-from fireworld.training.methods.targets import OF_OTHERS, Targets
+from fireworld.training.methods.targets import Targets
 from fireworld.training.train import train
 
 SHORT = {"n_lessons": 3, "n_fights": 4, "n_steps_max": 12, "hidden": 3}

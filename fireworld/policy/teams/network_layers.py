@@ -21,6 +21,8 @@ SEEN: Final = tuple(weight.name for weight in (*WEIGHTS, *AROUND))
 """What a network may read of a target: what a ranking weighs, in its order, and what is around it."""
 OWN_SEEN: Final = tuple(name for name in SEEN if name not in {weight.name for weight in OF_ACTION})
 """The same where brigades name targets of their own: no action names them."""
+OF_OTHERS: Final = frozenset({"others_here", "others_near", "enough", "side_others", "site_others"})
+"""What a team without cooperation does not see."""
 FEATURES: Final = SEEN[:N_TARGET_WEIGHTS]
 """The features of a target: what a network reads if nothing else is said."""
 N_LAYERS_MAX: Final = 8

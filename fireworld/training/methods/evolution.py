@@ -66,7 +66,7 @@ class Evolution(EvolutionStrategy, LayeredMethod):
     name: ClassVar[str] = "evolution"
 
     hidden: Hidden = 12
-    """Numbers of the layer between the 26 features and the value, relu; 0: the value is one weighted sum."""
+    """Numbers of the layer between features and value, relu; 0: the value is one weighted sum."""
 
     def drop_idle(self, noise: Array) -> None:
         """Take out the noise of the last bias, which all targets get alike."""

@@ -34,10 +34,14 @@ class Gates(EvolutionStrategy):
     """
 
     name: ClassVar[str] = "gates"
-    features: ClassVar[tuple[str, ...]] = (*FEATURES, *SITUATION)
 
     n_rankings: Annotated[int, Limits(f"a whole number from 2 to {N_MAX}", 2, N_MAX)] = 2
     """Rankings, each with a gate."""
+
+    @property
+    def features(self) -> tuple[str, ...]:
+        """What rankings read of a target, and what gates read."""
+        return (*FEATURES, *SITUATION)
 
     @property
     def widths(self) -> tuple[int, ...]:

@@ -38,8 +38,8 @@ class Rollouts(LayeredMethod):
     is_packed: ClassVar[bool] = False
 
     hidden: Hidden = 24
-    """Numbers of the layer between the 26 features and the value, relu; 0: the value is one weighted sum."""
-    start: Literal["best-2026", "best-2026-2", "none"] = "best-2026"
+    """Numbers of the layer between features and value, relu; 0: the value is one weighted sum."""
+    start: Literal["best-2026", "best", "none"] = "best-2026"
     """The network before the first generation: it values targets as this team does; `none`: all of them 0."""
     n_generations: Count = 4
     n_averaged: Count = 3
@@ -82,7 +82,7 @@ class Rollouts(LayeredMethod):
 
     @property
     def widths(self) -> tuple[int, ...]:
-        """Of the team: 26 features, the hidden layers of all networks side by side if there are any, the value."""
+        """Of the team: the features, the hidden layers of all networks side by side if there are any, the value."""
         n_in, *hidden, n_out = super().widths
         return (n_in, *(n * self.n_averaged for n in hidden), n_out)
 

@@ -16,7 +16,7 @@ from fireworld.kernels.arrays import Array, Learner, NetworkArrays
 from fireworld.kernels.draws import fill_normals
 from fireworld.kernels.situation import N_SEEN
 from fireworld.policy.kernel import NO_TABLES, from_network
-from fireworld.policy.teams.network_layers import pack, unpack
+from fireworld.policy.teams.network_layers import OF_OTHERS, pack, unpack
 from fireworld.policy.teams.network_team import NetworkTeam
 from fireworld.policy.teams.npz import check_arrays, check_finite
 from fireworld.policy.teams.ranking_words import AROUND, OF_BRIGADE, OF_BUILDING, OF_TEAM
@@ -28,8 +28,6 @@ from fireworld.training.log.records import Lesson
 from fireworld.training.method import Count, Limits, Method, Positive, Report, Share, Trainer
 from fireworld.training.seeds import fight_seed
 
-OF_OTHERS: Final = frozenset({"others_here", "others_near", "enough", "side_others", "site_others"})
-"""What a team without cooperation does not see."""
 HIDDEN_MAX: Final = 256
 Hidden = Annotated[int, Limits(f"a whole number from 0 to {HIDDEN_MAX}", 0, HIDDEN_MAX)]
 Steps = Annotated[int, Limits("a whole number from 1 to 1000", 1, 1000)]
