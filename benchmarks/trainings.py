@@ -1,0 +1,92 @@
+"""How a method fares over several trainings, in suites that nobody learned in: a table in Markdown for the docs.
+
+    python -m benchmarks.trainings t-*.npz [--than OTHER...] [--suites contested,larger] [--seeds 20] [--first-seed 1]
+
+A row a suite: the mean over the trainings with its 95 % interval, where trainings and fires are both drawn anew (where
+there are fewer than ten fires, trainings and seeds); the worst and the best training; and how many trainings are below
+.9. With `--than` it says how much more is saved than by other teams: as many trainings, taken in pairs, or one policy.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+import click
+import numpy as np
+
+from fireworld.evaluation.runs import evaluate_each
+from fireworld.evaluation.statistics import Estimate, estimate, paired_difference
+from fireworld.evaluation.suites import suite
+from fireworld.executors import On, workers_for
+from fireworld.kernels.arrays import Array
+from fireworld.markdown import markdown_table
+from fireworld.policy.kernel import KernelPolicy
+from fireworld.policy.names import find_policy
+from fireworld.simulation.built import BuiltScenario, CityCache
+
+SUITES = "tests,contested,larger,scarce-water,two-sites,few-brigades,many-brigades"
+FEW = 10
+"""With fewer fires than that the seeds are drawn anew in place of the fires."""
+LOW = 0.9
+
+
+def shares(fires: Sequence[BuiltScenario], teams: Sequence[KernelPolicy], seeds: Sequence[int]) -> Array:
+    """Return the share of the greatest score in every run, (teams, fires, seeds)."""
+    found = []
+    for team in teams:
+        outcomes = evaluate_each([(built, team) for built in fires], seeds, workers=workers_for(On("threads")))
+        found.append([of_fire.score_share for of_fire in outcomes])
+    return np.array(found)
+
+
+def table_of(runs: Array) -> Array:
+    """Return means as (teams, fires), or (teams, seeds) if there are few fires, of (teams, fires, seeds)."""
+    means: Array = runs.mean(axis=1) if runs.shape[1] < FEW else runs.mean(axis=2)
+    return means
+
+
+def row_of(name: str, runs: Array, others: Array | None) -> list[str]:
+    """Return what the table says of a suite."""
+    table, by_team = table_of(runs), runs.mean(axis=(1, 2))
+    cells = [_text(estimate(table)), *(f"{one:.2f}" for one in (by_team.min(), by_team.max()))]
+    cells.append(f"{(by_team < LOW).sum()} of {len(by_team)}")
+    if others is not None:
+        cells.append(_text(paired_difference(table, table_of(others)), sign=True))
+    return [f"{name} ({runs.shape[1]})", *cells]
+
+
+def _text(one: Estimate, *, sign: bool = False) -> str:
+    return one.text(digits=3, sign=sign)
+
+
+def main() -> None:
+    """Run all teams in every suite, and print the table."""
+    parser = argparse.ArgumentParser(description="How a method fares over several trainings.")
+    parser.add_argument("teams", nargs="+", metavar="TEAM", help="a policy that kernels follow, or a team file")
+    parser.add_argument("--than", nargs="+", metavar="TEAM", default=[], help="as many others, or one")
+    parser.add_argument("--suites", default=SUITES)
+    parser.add_argument("--seeds", type=int, default=20, help="runs of each fire")
+    parser.add_argument("--first-seed", type=int, default=1)
+    given = parser.parse_args()
+    if len(given.than) not in (0, 1, len(given.teams)):
+        parser.error(f"--than: expected 1 or {len(given.teams)} teams, got {len(given.than)}")
+    policies = {name: find_policy(name).policy for name in (*given.teams, *given.than)}
+    if odd := [name for name, policy in policies.items() if not isinstance(policy, KernelPolicy)]:
+        parser.error(f"{odd[0]}: not a policy that kernels follow")
+    cities, seeds, rows = CityCache(), range(given.first_seed, given.first_seed + given.seeds), []
+    names = given.suites.split(",")
+    with click.progressbar(names, label="suites", file=sys.stderr) as bar:
+        for name in bar:
+            fires = [cities.build(one) for one in suite(name).scenarios]
+            runs = shares(fires, [policies[one] for one in given.teams], seeds)
+            others = shares(fires, [policies[one] for one in given.than], seeds) if given.than else None
+            rows.append(row_of(name, runs, others))
+    head = ["suite (fires)", f"mean of {len(given.teams)}", "worst", "best", f"below {LOW}"]
+    more = [f"more than {'the others' if len(given.than) > 1 else given.than[0]}"] if given.than else []
+    print(markdown_table([*head, *more], rows))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,55 @@
+"""The benchmark of several trainings of a method: what its table says, of few fires and of many."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.trainings import main, row_of, table_of
+
+
+def test_fires_are_drawn_anew_or_seeds_where_fires_are_few():
+    runs = np.random.default_rng(1).random((3, 12, 5))
+    assert table_of(runs) == pytest.approx(runs.mean(axis=2))
+    assert table_of(runs[:, :9]) == pytest.approx(runs[:, :9].mean(axis=1))
+
+
+def test_a_row():
+    runs = np.full((4, 10, 2), 0.95)
+    runs[3] = 0.75
+    name, mean, worst, best, low, more = row_of("larger", runs, runs - 0.1)
+    assert (name, worst, best, low) == ("larger (10)", "0.75", "0.95", "1 of 4")
+    assert mean.startswith("0.900 [0.")
+    assert more == "+0.100 [+0.100, +0.100]"
+    assert row_of("larger", runs, runs[:1])[-1].startswith("-0.050 [")
+    assert len(row_of("larger", runs, None)) == 5
+
+
+def test_the_table(monkeypatch, capsys):
+    monkeypatch.setattr(
+        "sys.argv", ["trainings", "chief", "random", "--than", "easiest", "--suites", "tests", "--seeds", "1"]
+    )
+    main()
+    head, _, row = capsys.readouterr().out.strip().splitlines()
+    assert [cell.strip() for cell in head.strip("|").split("|")][1:] == [
+        "mean of 2",
+        "worst",
+        "best",
+        "below 0.9",
+        "more than easiest",
+    ]
+    assert row.startswith("| tests (3) | 0.")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["chief", "random", "easiest", "--than", "chief", "random"], "--than: expected 1 or 3 teams, got 2"),
+        (["planner"], "planner: not a policy that kernels follow"),
+    ],
+)
+def test_what_it_does_not_take(monkeypatch, capsys, words, message):
+    monkeypatch.setattr("sys.argv", ["trainings", *words])
+    with pytest.raises(SystemExit):
+        main()
+    assert message in capsys.readouterr().err
