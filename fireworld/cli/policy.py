@@ -29,7 +29,7 @@ SHOWN_OPTION = click.option(
 
 @click.group()
 def command() -> None:
-    """List the policies; show what a trained team does and why, or how two teams differ; import a network.
+    """List the policies; show what a team does and why, how two differ; import a network, take the mean of several.
 
     A team is a team file, or the name of a team that comes with fireworld.
     """
@@ -164,6 +164,36 @@ def import_network(*, model: Path, output: Path, features: str | None, own_targe
     check_outputs([output], force=force, inputs=[model])
     reads = FEATURES if features is None else [name.strip() for name in features.split(",")]
     team = NetworkTeam.from_onnx(model, features=reads, own_targets=own_targets)
+    team.save(output, force=force)
+    click.echo(f"{output}: {team.summary}, digest {team.digest[:12]}")
+
+
+@command.command()
+@click.argument("teams", metavar="TEAM...", nargs=-1, required=True)
+@click.option(
+    "-o", "--output", metavar="TEAM.npz", required=True, type=click.Path(path_type=Path), help="Team file to write."
+)
+@click.option("--force", is_flag=True, help="Replace an existing file.")
+def mean(*, teams: tuple[str, ...], output: Path, force: bool) -> None:
+    """Make a team of several networks, which values a target by the mean of what they value it by.
+
+    Trainings of one method differ by chance, and their mean has less of it. It is one network, whose hidden layers have
+    the units of all, so it takes as long as all of them. The networks read the same features, with the same
+    activations. Values count as they are: a network whose values are farther apart has more say.
+
+    \b
+    fireworld train --method targets --repetitions 3 -o t.npz
+    fireworld policy mean t-1.npz t-2.npz t-3.npz -o mean.npz
+    fireworld compare t-1.npz mean.npz --scenarios contested
+
+    Exit code: 0 written, 2 there is no such mean.
+    """
+    from fireworld.files import check_outputs
+    from fireworld.policy.teams.network_team import NetworkTeam
+    from fireworld.policy.teams.team import load_team
+
+    check_outputs([output], force=force, inputs=[Path(team) for team in teams])
+    team = NetworkTeam.mean_of([load_team(team) for team in teams], names=teams)
     team.save(output, force=force)
     click.echo(f"{output}: {team.summary}, digest {team.digest[:12]}")
 

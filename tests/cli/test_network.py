@@ -99,9 +99,28 @@ def test_a_model_imported(here, fireworld):
     }
 
 
+def test_a_mean_of_networks(here, fireworld):
+    make_network(seed=3).save(here / "second.npz")
+    done = fireworld("policy", "mean", "mine.npz", "second.npz", "-o", "mean.npz")
+    team = NetworkTeam.mean_of([make_network(), make_network(seed=3)])
+    assert lines(done) == [f"mean.npz: a network of 13-14-10-1 for the paper's actions, digest {team.digest[:12]}"]
+    assert load_team(here / "mean.npz").digest == team.digest
+    shown = lines(fireworld("policy", "show", "mean.npz"))
+    assert shown[1:3] == [f"mean of {make_network(seed=seed).digest[:12]}" for seed in (8, 3)]
+    assert fireworld("run", "quick", "--policy", "mean.npz", "--steps", 3).code == 0
+    done = fireworld("policy", "mean", "mine.npz", "second.npz", "-o", "mean.npz")
+    assert (done.code, "expected a name that is free" in done.err) == (2, True)
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
+        (("mean", "mine.npz", "best-2026", "-o", "a.npz"), "fireworld: best-2026: expected a network, got a ranking"),
+        (
+            ("mean", "mine.npz", "own.npz", "-o", "a.npz"),
+            "fireworld: own.npz: features: expected as in mine.npz, ['temp",
+        ),
+        (("mean", "mine.npz", "-o", "mine.npz", "--force"), "mine.npz"),
         (("show", "mine.npz", "1193"), "fireworld: STATE: expected none: a network has no states, got '1193'"),
         (
             ("diff", "mine.npz", "best-2026"),

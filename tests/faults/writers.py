@@ -128,6 +128,7 @@ WRITERS: Final[dict[str, Writer]] = {
         {"net.onnx": "net.onnx"},
         ("--force",),
     ),
+    "policy mean": Writer(("policy", "mean", "best", "best", "-o", "t.npz"), ("t.npz",), again=("--force",)),
     "compare, results": Writer((*COMPARE, "--results", "r.parquet"), ("r.parquet",), whole=whole.results),
     "compare, more results": Writer(
         (*COMPARE, "--results", "r.parquet"), ("r.parquet",), {"r.parquet": "known.parquet"}, whole=whole.results

@@ -9,6 +9,7 @@ from fireworld_viewer.story.narration import decision_lines
 from fireworld_viewer.story.series import choices_of
 
 import fireworld as fw
+from fireworld.errors import TrainingError
 from fireworld.kernels.ranking import N_WEIGHTS
 from fireworld.policy.names import find_policy, note_on_team
 from fireworld.policy.teams.network_layers import FEATURES, SEEN
@@ -190,3 +191,71 @@ def test_it_is_a_policy_by_its_path(tmp_path):
     assert (named.name, named.digest, named.trained_choices) == ("mine.npz", team.policy().digest, "")
     assert named.attachments == {"policy.npz": path.read_bytes()}
     assert note_on_team(named, 5) == "", "one network is for all"
+
+
+def values_of(team, seen):
+    """What a network makes of targets, by its layers as they are."""
+    after = {"relu": lambda x: np.maximum(x, 0.0), "tanh": np.tanh}
+    for layer, name in zip(team.layers, [*team.activations, None], strict=True):
+        seen = seen @ layer.weights + layer.biases
+        seen = after[name](seen) if name else seen
+    return seen[:, 0]
+
+
+@pytest.mark.parametrize("widths", [(13, 1), (13, 4, 1), (13, 6, 4, 1), (13, 3, 5, 2, 1)])
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_a_mean_values_targets_by_the_mean(widths, n):
+    teams = [make_network(*widths, seed=seed) for seed in range(n)]
+    mean, seen = NetworkTeam.mean_of(teams), np.random.default_rng(1).normal(size=(40, 13))
+    assert mean.widths == (13, *(n * width for width in widths[1:-1]), 1)
+    assert values_of(mean, seen) == pytest.approx(sum(values_of(team, seen) for team in teams) / n)
+    if n == 1:
+        assert mean.digest == teams[0].digest
+    assert [one["digest"] for one in mean.provenance["mean_of"]] == [team.digest for team in teams]
+
+
+def test_where_a_mean_comes_from():
+    mean = NetworkTeam.mean_of(
+        [
+            load_team("best"),
+            make_network(26, 4, 1, features=load_team("best").features, activation="relu", own_targets=True),
+        ]
+    )
+    lines = mean.origin
+    assert lines[0] == f"mean of {load_team('best').digest[:12]}"
+    assert lines[1].startswith("  trained in conditions, ")
+    assert len(mean.short_provenance["mean_of"][0]["curriculum"]) == 2
+    again = NetworkTeam.mean_of([mean])
+    assert again.origin[1:] == [f"  {line}" for line in lines]
+
+
+@pytest.mark.parametrize("found", [3, [3], [], "mean", None])
+def test_a_mean_of_strangers_is_not_taken_for_one(found):
+    team = make_network(provenance={"mean_of": found})
+    assert team.origin == []
+    assert team.short_provenance == {"mean_of": found}
+    assert repr(team)
+
+
+@pytest.mark.parametrize(
+    ("others", "message"),
+    [
+        ([], r"teams\[1\]: expected a network, got a ranking of targets"),
+        (
+            [make_network(activation="relu")],
+            r"teams\[1\]: activations: expected as in teams\[0\], \['tanh', 'tanh'\], got ",
+        ),
+        ([make_network(own_targets=True)], r"teams\[1\]: own_targets: expected as in teams\[0\], False, got True"),
+    ],
+)
+def test_what_has_no_mean(others, message):
+    teams = [make_network(), *(others or [load_team("best-2026")])]
+    with pytest.raises(TrainingError, match=f"^{message}"):
+        NetworkTeam.mean_of(teams)
+
+
+def test_means_of_nothing_and_too_wide_ones():
+    with pytest.raises(TrainingError, match=r"^mean: teams: expected one at least, got 0"):
+        NetworkTeam.mean_of([])
+    with pytest.raises(TrainingError, match=r"^mean: weights_0: "):
+        NetworkTeam.mean_of([make_network(13, 600, 1), make_network(13, 600, 1)])

@@ -162,3 +162,31 @@ def pack(layers: Sequence[Layer], activations: Sequence[str], features: Sequence
         place += biases.size + weights.size
     reads = [SEEN.index(name) for name in features]
     return NetworkArrays(np.array(reads, dtype=np.int64), np.array(rows, dtype=np.int64), np.concatenate(numbers))
+
+
+def mean_of_networks(networks: Sequence[Sequence[Layer]]) -> tuple[Layer, ...]:
+    """Return the layers of a network whose value is the mean of those of others, but for rounding.
+
+    They have as many layers each, with the same activations. The hidden layers of the mean have the units of all, side
+    by side; nothing leads from the units of one to those of another.
+    """
+    n, (*hidden, values) = len(networks), zip(*networks, strict=True)
+    biases = sum(one.biases for one in values) / n
+    if not hidden:
+        return (Layer(sum(one.weights for one in values) / n, biases),)
+    first, *further = hidden
+    layers = [Layer(np.concatenate([one.weights for one in first], axis=1), _in_a_row(first))]
+    for layer in further:
+        apart = np.zeros(tuple(np.sum([one.weights.shape for one in layer], axis=0)))
+        row = column = 0
+        for weights, _ in layer:
+            n_in, n_out = weights.shape
+            apart[row : row + n_in, column : column + n_out] = weights
+            row, column = row + n_in, column + n_out
+        layers.append(Layer(apart, _in_a_row(layer)))
+    return (*layers, Layer(np.concatenate([one.weights for one in values]) / n, biases))
+
+
+def _in_a_row(layers: Sequence[Layer]) -> Array:
+    """Return the biases of layers, one after another."""
+    return np.concatenate([one.biases for one in layers])

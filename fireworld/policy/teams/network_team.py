@@ -20,13 +20,14 @@ from fireworld.policy.teams.network_layers import (
     check_layers,
     check_reading,
     floats_of,
+    mean_of_networks,
     pack,
     plain_provenance,
 )
 from fireworld.policy.teams.network_words import NetworkDifference
 from fireworld.policy.teams.npz import check_arrays
 from fireworld.policy.teams.ranking_words import AROUND, WEIGHTS, targets_in_words
-from fireworld.policy.teams.team import Team, no_states
+from fireworld.policy.teams.team import MEAN_OF, Team, no_states
 from fireworld.shown import SHOWN_MAX, Block, TextTable
 
 
@@ -100,6 +101,38 @@ class NetworkTeam(Team):
         model = read_onnx(path)
         origin = {"producer": model.producer, **(provenance or {})}
         return cls._made(model.layers, model.activations, features, own_targets, origin, source=os.fspath(path))
+
+    @classmethod
+    def mean_of(cls, teams: Sequence[Team], *, names: Sequence[str] = ()) -> Self:
+        """Make a team that values a target by the mean of what other teams value it by; each has the same weight.
+
+        Trainings of one method differ by chance; their mean has less of it. It is one network, whose hidden layers have
+        the units of all. Values count as they are: a network whose values are farther apart has more say.
+
+        Args:
+            teams: networks that read the same features, have the same activations, and value the same targets.
+            names: what errors call them; `teams[0]` and so on if left out.
+
+        Raises:
+            TrainingError: there is none, or one of them is no such network; or the mean would be too wide.
+        """
+        called = names or [f"teams[{k}]" for k in range(len(teams))]
+        networks = list[Self]()
+        for name, team in zip(called, teams, strict=True):
+            if not isinstance(team, cls):
+                raise TrainingError(expected(name, "", cls.what, team.what))
+            networks.append(team)
+            first, own = networks[0].header(), team.header()
+            if key := next((key for key in first if first[key] != own[key]), ""):
+                wanted = f"as in {called[0]}, {shown(first[key])}"
+                raise TrainingError(expected(name, key, wanted, own[key]))
+        if not networks:
+            raise TrainingError(expected("mean", "teams", "one at least", 0))
+        layers = mean_of_networks([one.layers for one in networks])
+        one = networks[0]
+        checked = check_layers(layers, n_inputs=len(one.features), source="mean")
+        origin = {MEAN_OF: [{"digest": team.digest, **team.provenance} for team in networks]}
+        return cls(checked, one.activations, one.features, one.own_targets, origin)
 
     @classmethod
     def _made(

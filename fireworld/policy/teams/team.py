@@ -25,6 +25,8 @@ KIND_OF_OLD_FORMAT: Final = {"fireworld-team/1": "tables", "fireworld-ranking/1"
 OLD_METHOD: Final = "paper"
 """The method of teams whose file does not name one."""
 
+MEAN_OF: Final = "mean_of"
+"""The key of a provenance under which are those of the networks that a team is the mean of."""
 KINDS: Final[dict[str, type[Team]]] = {}
 """Kinds of teams by name; a subclass of `Team` enters itself."""
 
@@ -115,24 +117,12 @@ class Team(Shown):
     @property
     def origin(self) -> list[str]:
         """Where the team comes from, in lines, as far as it is known."""
-        curriculum = self.provenance.get("curriculum")
-        lines = []
-        if isinstance(curriculum, dict):
-            done = [f"{n} {key.removesuffix('_done')}" for key, n in self.provenance.items() if key.endswith("_done")]
-            words = [f"trained in {curriculum.get('name')}", *done, f"seed {self.provenance.get('seed')}"]
-            lines.append(", ".join(words))
-        if self._method:
-            lines.append("method " + ", ".join(f"{key} {value}" for key, value in self._method.items()))
-        return lines
+        return _origin(self.provenance)
 
     @property
     def short_provenance(self) -> dict[str, Any]:
-        """Where the team comes from, the curriculum by its name and digest alone."""
-        short = dict(self.provenance)
-        curriculum = short.get("curriculum")
-        if isinstance(curriculum, dict):
-            short["curriculum"] = {key: curriculum.get(key) for key in ("name", "digest")}
-        return short
+        """Where the team comes from, curricula by their names and digests alone."""
+        return _short(self.provenance)
 
     def save(self, path: Path | str, *, force: bool = False) -> None:
         """Write the team file, beside its place and renamed; equal teams give equal bytes.
@@ -259,3 +249,34 @@ def _parse(content: bytes, *, source: str) -> tuple[Team, dict[str, Array]]:
         is_later = isinstance(form, str) and form.startswith(("fireworld-team/", "fireworld-ranking/"))
         raise TrainingError(expected(source, "format", FORMAT, form, "made by a later fireworld?" if is_later else ""))
     return known[kind].from_file(header, arrays, provenance=provenance, source=source), arrays
+
+
+def _origin(provenance: Mapping[str, Any]) -> list[str]:
+    """Return where a team comes from, in lines, as far as it is known."""
+    lines, curriculum, method = list[str](), provenance.get("curriculum"), provenance.get("method")
+    if isinstance(curriculum, dict):
+        done = [f"{n} {key.removesuffix('_done')}" for key, n in provenance.items() if key.endswith("_done")]
+        lines.append(", ".join([f"trained in {curriculum.get('name')}", *done, f"seed {provenance.get('seed')}"]))
+    if isinstance(method, Mapping) and method:
+        lines.append("method " + ", ".join(f"{key} {value}" for key, value in method.items()))
+    for one in _meant(provenance):
+        lines += [f"mean of {str(one.get('digest'))[:12]}", *(f"  {line}" for line in _origin(one))]
+    return lines
+
+
+def _short(provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """Return where a team comes from, curricula by their names and digests alone."""
+    short = dict(provenance)
+    curriculum = short.get("curriculum")
+    if isinstance(curriculum, dict):
+        short["curriculum"] = {key: curriculum.get(key) for key in ("name", "digest")}
+    if meant := _meant(provenance):
+        short[MEAN_OF] = [_short(one) for one in meant]
+    return short
+
+
+def _meant(provenance: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return where the networks come from that a team is the mean of; nothing if it is none."""
+    found = provenance.get(MEAN_OF)
+    is_mean = isinstance(found, list) and all(isinstance(one, dict) for one in found)
+    return found if isinstance(found, list) and is_mean else []

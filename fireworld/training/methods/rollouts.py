@@ -17,7 +17,7 @@ from fireworld.kernels.arrays import Array, NetworkArrays
 from fireworld.kernels.fitting import Fitting, fit_once, gain
 from fireworld.kernels.network import widest
 from fireworld.kernels.situation import N_SEEN
-from fireworld.policy.teams.network_layers import WIDTH_MAX, Layer, unpack
+from fireworld.policy.teams.network_layers import WIDTH_MAX, Layer, mean_of_networks, unpack
 from fireworld.policy.teams.team import Team
 from fireworld.simulation.built import CityCache
 from fireworld.simulation.state import fresh_target_learner
@@ -93,17 +93,7 @@ class Rollouts(LayeredMethod):
         """
         widths = super().widths
         n_numbers = sum(n_out * (1 + n_in) for n_in, n_out in pairwise(widths))
-        networks = [unpack(one, widths) for one in numbers.reshape(-1, n_numbers)]
-        n, (*hidden, values) = len(networks), zip(*networks, strict=True)
-        biases = sum(one.biases for one in values) / n
-        if not self.hidden:
-            return (Layer(sum(one.weights for one in values) / n, biases),)
-        (sides,) = hidden
-        side_by_side = np.concatenate([one.weights for one in sides], axis=1)
-        return (
-            Layer(side_by_side, np.concatenate([one.biases for one in sides])),
-            Layer(np.concatenate([one.weights for one in values]) / n, biases),
-        )
+        return mean_of_networks([unpack(one, widths) for one in numbers.reshape(-1, n_numbers)])
 
     def trainer(self, curriculum: Curriculum, *, seed: int, cities: CityCache | None = None) -> RolloutsTrainer:
         """Return what trains one team; see `Method.trainer`."""
