@@ -75,7 +75,7 @@ def two_rollouts(
 
 def main() -> None:
     """Measure each horizon, and print the table."""
-    parser = argparse.ArgumentParser(description="How far rollouts must look.")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--team", default="best", help="a team with a network, whose decisions are tried out")
     parser.add_argument("--fights", type=int, default=130)
     parser.add_argument("--horizons", default="25,50,100,200", help="steps, rising")
