@@ -6,12 +6,10 @@ trained in its place. With names it is these: `best` takes more than an hour on 
 
 from __future__ import annotations
 
-import shlex
 import shutil
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
@@ -24,28 +22,29 @@ from fireworld.policy.teams.table_team import TableTeam
 from fireworld.policy.teams.team import Team, load_team
 from fireworld.training.training import check_same
 
-PROGRAM: Final = (sys.executable, "-c", "from fireworld.cli import main; main()")
-COMMANDS: Final[Mapping[str, Sequence[str]]] = {
-    "paper-cooperative": ("train paper --seed 1 -o paper-cooperative.npz",),
-    "paper-noncooperative": ("train paper --stages alone --seed 1 -o paper-noncooperative.npz",),
-    "best-2026": ("train contested --method search --seed 1 -o best-2026.npz",),
-    "best": ("train conditions --method rollouts --seed 2026 -o best.npz",),
+COMMANDS: Final[Mapping[str, tuple[str, ...]]] = {
+    "paper-cooperative": ("train", "paper", "--seed", "1"),
+    "paper-noncooperative": ("train", "paper", "--stages", "alone", "--seed", "1"),
+    "best-2026": ("train", "contested", "--method", "search", "--seed", "1"),
+    "best": ("train", "conditions", "--method", "rollouts", "--seed", "2026"),
 }
-"""How each team is made, NAME.npz: the words after `fireworld` of one command after another."""
+"""How each team is trained: the words after `fireworld`, `-o TEAM.npz` apart."""
 
 
-def make_all(folder: Path, names: Sequence[str] = tuple(COMMANDS)) -> dict[str, Team]:
-    """Make teams by their commands, side by side; files go to the folder."""
-
-    def make(name: str) -> Team:
-        for words in COMMANDS[name]:
-            done = subprocess.run([*PROGRAM, *shlex.split(words)], cwd=folder, capture_output=True, check=False)
-            if done.returncode != 0:
-                raise click.ClickException(f"{name}: fireworld {words}: exit code {done.returncode}")
-        return load_team(folder / f"{name}.npz")
-
-    with ThreadPoolExecutor(len(names)) as pool:
-        return dict(zip(names, pool.map(make, names), strict=True))
+def train_all(folder: Path, names: Sequence[str] = tuple(COMMANDS)) -> dict[str, Team]:
+    """Train teams by their commands, side by side; files go to the folder."""
+    program = [sys.executable, "-c", "from fireworld.cli import main; main()"]
+    started = {
+        name: subprocess.Popen(
+            [*program, *words, "-o", f"{name}.npz"], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        for name, words in COMMANDS.items()
+        if name in names
+    }
+    for name, process in started.items():
+        if process.wait() != 0:
+            raise click.ClickException(f"{name}: fireworld {' '.join(COMMANDS[name])}: exit code {process.returncode}")
+    return {name: load_team(folder / f"{name}.npz") for name in started}
 
 
 def same(team: Team, shipped: Team) -> bool:
@@ -68,7 +67,7 @@ def main(context: click.Context, *, names: tuple[str, ...], write: bool) -> None
     """Train the shipped teams again, or those named; exit code 1 if one comes out differently."""
     n_others = 0
     with TemporaryDirectory() as folder:
-        for name, team in make_all(Path(folder), names or tuple(COMMANDS)).items():
+        for name, team in train_all(Path(folder), names or tuple(COMMANDS)).items():
             path = team_path(name)
             unchanged = path.is_file() and same(team, load_team(path))
             if not unchanged and write:
