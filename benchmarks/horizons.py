@@ -69,7 +69,7 @@ def two_rollouts(
         )
         found, seconds = tried_out(fires, network, trial, n_fights, seed)
         worths.append(np.concatenate([one.worth[1:] for one in found]))
-    first, mean = worths
+    first, mean = worths  # rollouts are numbered: the first of two is the one made alone
     return np.column_stack([first, 2.0 * mean - first]), seconds
 
 

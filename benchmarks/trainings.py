@@ -11,34 +11,23 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
 
 import click
 import numpy as np
 
-from fireworld.evaluation.runs import evaluate_each
+from benchmarks.learning_fires import shares
 from fireworld.evaluation.statistics import Estimate, estimate, paired_difference
 from fireworld.evaluation.suites import suite
-from fireworld.executors import On, workers_for
 from fireworld.kernels.arrays import Array
 from fireworld.markdown import markdown_table
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.names import find_policy
-from fireworld.simulation.built import BuiltScenario, CityCache
+from fireworld.simulation.built import CityCache
 
 SUITES = "tests,contested,larger,scarce-water,two-sites,few-brigades,many-brigades"
 FEW = 10
 """With fewer fires than that the seeds are drawn anew in place of the fires."""
 LOW = 0.9
-
-
-def shares(fires: Sequence[BuiltScenario], teams: Sequence[KernelPolicy], seeds: Sequence[int]) -> Array:
-    """Return the share of the greatest score in every run, (teams, fires, seeds)."""
-    found = []
-    for team in teams:
-        outcomes = evaluate_each([(built, team) for built in fires], seeds, workers=workers_for(On("threads")))
-        found.append([of_fire.score_share for of_fire in outcomes])
-    return np.array(found)
 
 
 def table_of(runs: Array) -> Array:
@@ -80,9 +69,10 @@ def main() -> None:
     with click.progressbar(names, label="suites", file=sys.stderr) as bar:
         for name in bar:
             fires = [cities.build(one) for one in suite(name).scenarios]
-            runs = shares(fires, [policies[one] for one in given.teams], seeds)
-            others = shares(fires, [policies[one] for one in given.than], seeds) if given.than else None
-            rows.append(row_of(name, runs, others))
+            runs, others = (
+                np.array([shares(fires, policies[one], seeds) for one in some]) for some in (given.teams, given.than)
+            )
+            rows.append(row_of(name, runs, others if given.than else None))
     head = ["suite (fires)", f"mean of {len(given.teams)}", "worst", "best", f"below {LOW}"]
     more = [f"more than {'the others' if len(given.than) > 1 else given.than[0]}"] if given.than else []
     print(markdown_table([*head, *more], rows))

@@ -25,6 +25,9 @@ SHOWN_OPTION = click.option(
     metavar="N",
     help="List N states, or weights that differ, at most.",
 )
+OUTPUT_OPTION = click.option(
+    "-o", "--output", metavar="TEAM.npz", required=True, type=click.Path(path_type=Path), help="Team file to write."
+)
 
 
 @click.group()
@@ -138,9 +141,7 @@ def diff(context: click.Context, *, first: str, second: str, actions_only: bool,
 
 @command.command("import")
 @click.argument("model", metavar="NET.onnx", type=click.Path(path_type=Path))
-@click.option(
-    "-o", "--output", metavar="TEAM.npz", required=True, type=click.Path(path_type=Path), help="Team file to write."
-)
+@OUTPUT_OPTION
 @click.option("--features", metavar="NAME,...", help="What its inputs are.  [default: the 13 features of a target]")
 @click.option("--own-targets", is_flag=True, help="Value all burning buildings of the site, not only the four named.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
@@ -164,15 +165,12 @@ def import_network(*, model: Path, output: Path, features: str | None, own_targe
     check_outputs([output], force=force, inputs=[model])
     reads = FEATURES if features is None else [name.strip() for name in features.split(",")]
     team = NetworkTeam.from_onnx(model, features=reads, own_targets=own_targets)
-    team.save(output, force=force)
-    click.echo(f"{output}: {team.summary}, digest {team.digest[:12]}")
+    _write(team, output, force=force)
 
 
 @command.command()
 @click.argument("teams", metavar="TEAM...", nargs=-1, required=True)
-@click.option(
-    "-o", "--output", metavar="TEAM.npz", required=True, type=click.Path(path_type=Path), help="Team file to write."
-)
+@OUTPUT_OPTION
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def mean(*, teams: tuple[str, ...], output: Path, force: bool) -> None:
     """Make a team of several networks, which values a target by the mean of what they value it by.
@@ -194,6 +192,11 @@ def mean(*, teams: tuple[str, ...], output: Path, force: bool) -> None:
 
     check_outputs([output], force=force, inputs=[Path(team) for team in teams])
     team = NetworkTeam.mean_of([load_team(team) for team in teams], names=teams)
+    _write(team, output, force=force)
+
+
+def _write(team: Team, output: Path, *, force: bool) -> None:
+    """Write a team file, and say what it is."""
     team.save(output, force=force)
     click.echo(f"{output}: {team.summary}, digest {team.digest[:12]}")
 

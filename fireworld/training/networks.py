@@ -117,9 +117,7 @@ class LayeredMethod(NetworkMethod):
         """
         n, rows = len(self.features), [OWN_SEEN.index(name) for name in self.features]
         if not self.hidden:
-            weighed = np.zeros(len(OWN_SEEN))
-            if start is not None:
-                weighed[:N_TARGET_FEATURES] = weights_of(start)
+            weighed = np.zeros(len(OWN_SEEN)) if start is None else _weights_of_all(start)
             return pack([Layer(weighed[rows, np.newaxis], np.zeros(1))], (), self.features).number
         hidden = Layer(np.zeros((n, self.hidden)), np.zeros(self.hidden))
         value = Layer(np.zeros((self.hidden, 1)), np.zeros(1))
@@ -258,6 +256,11 @@ def weights_of(start: Team) -> Array:
     return start.weights[0, :N_TARGET_FEATURES]
 
 
+def _weights_of_all(start: Team) -> Array:
+    """Return what a shipped ranking weighs all features by, (26,) float64: 0 for those that it does not read."""
+    return np.pad(weights_of(start), (0, len(OWN_SEEN) - N_TARGET_FEATURES))
+
+
 def _hidden_of(start: Team) -> tuple[Layer, Layer]:
     """Return the hidden layer of all features, and the value, by which a network values targets as a shipped team."""
     if isinstance(start, NetworkTeam):
@@ -266,7 +269,6 @@ def _hidden_of(start: Team) -> tuple[Layer, Layer]:
             raise TrainingError(expected("method", "start", wanted, start.summary))
         hidden, value = start.layers
         return hidden, value
-    weighed = np.zeros((len(OWN_SEEN), 1))
-    weighed[:N_TARGET_FEATURES, 0] = weights_of(start)
-    both = Layer(np.concatenate([weighed, -weighed], axis=1), np.zeros(N_OF_RANKING))
+    weighed = _weights_of_all(start)
+    both = Layer(np.column_stack([weighed, -weighed]), np.zeros(N_OF_RANKING))
     return both, Layer(np.array([[1.0], [-1.0]]), np.zeros(1))

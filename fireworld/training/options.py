@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from heapq import nlargest
 from threading import Event
 from typing import Final
 
@@ -111,12 +112,16 @@ class _Asking(Policy):
             targets, seen = seen_targets(observation)
             own = targets.index(int(decision.target if decision.target is not None else -1))
             n, seed, step = len(observation.known_targets), observation.seed, observation.step
-            values = [value_by_network(self._policy.network, one, self._work) for one in seen]
-            others = sorted((k for k in range(len(targets)) if k != own), key=lambda k: -values[k])
-            likely, rest = others[: self._n_likely], others[self._n_likely :]
+            others = [k for k in range(len(targets)) if k != own]
+            likely = nlargest(self._n_likely, others, key=lambda k: self._value(seen[k]))
+            rest = (k for k in others if k not in likely)
             places = [own, *likely, *sorted(rest, key=lambda k: hash_key(seed, OPTION, n + targets[k], step))]
             self.asked.append(_Asked(observation.brigade, [targets[k] for k in places], seen[places]))
         return decision
+
+    def _value(self, seen: Array) -> float:
+        """Return what the team values a target by, of which a brigade sees (30,) float64."""
+        return float(value_by_network(self._policy.network, seen, self._work))
 
 
 class _Rollouts:

@@ -122,17 +122,15 @@ class NetworkTeam(Team):
             if not isinstance(team, cls):
                 raise TrainingError(expected(name, "", cls.what, team.what))
             networks.append(team)
-            first, own = networks[0].header(), team.header()
-            if key := next((key for key in first if first[key] != own[key]), ""):
-                wanted = f"as in {called[0]}, {shown(first[key])}"
-                raise TrainingError(expected(name, key, wanted, own[key]))
+            wanted, own = networks[0].header(), team.header()
+            if key := next((key for key in wanted if wanted[key] != own[key]), ""):
+                raise TrainingError(expected(name, key, f"as in {called[0]}, {shown(wanted[key])}", own[key]))
         if not networks:
             raise TrainingError(expected("mean", "teams", "one at least", 0))
-        layers = mean_of_networks([one.layers for one in networks])
-        one = networks[0]
-        checked = check_layers(layers, n_inputs=len(one.features), source="mean")
-        origin = {MEAN_OF: [{"digest": team.digest, **team.provenance} for team in networks]}
-        return cls(checked, one.activations, one.features, one.own_targets, origin)
+        first, layers = networks[0], mean_of_networks([one.layers for one in networks])
+        checked = check_layers(layers, n_inputs=len(first.features), source="mean")
+        origin = {MEAN_OF: [{"digest": one.digest, **one.provenance} for one in networks]}
+        return cls(checked, first.activations, first.features, first.own_targets, origin)
 
     @classmethod
     def _made(

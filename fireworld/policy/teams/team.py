@@ -278,5 +278,4 @@ def _short(provenance: Mapping[str, Any]) -> dict[str, Any]:
 def _meant(provenance: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return where the networks come from that a team is the mean of; nothing if it is none."""
     found = provenance.get(MEAN_OF)
-    is_mean = isinstance(found, list) and all(isinstance(one, dict) for one in found)
-    return found if isinstance(found, list) and is_mean else []
+    return found if isinstance(found, list) and all(isinstance(one, dict) for one in found) else []
