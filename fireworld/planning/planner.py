@@ -188,13 +188,15 @@ class Planner(Policy):
             identity += ("" if self._followed is None else self._followed.digest, self._milliseconds)
         self.digest = hashlib.sha256(repr(identity).encode()).hexdigest()
         self._room: WorldState | None = None
-        self._planned_at = -1
+        self.planned_at = -1
+        """The step in which the last plan was made, -1 before the first."""
         self._plan: Assignment = ()
-        self._values: tuple[dict[int, float], ...] = ()
+        self.values: tuple[dict[int, float], ...] = ()
+        """(b,) of each brigade what every option is worth in that step, while the others follow the plan."""
 
     def begin(self, city: CityArrays, n_brigades: int, seed: int) -> None:
         """Forget the run before."""
-        self._room, self._planned_at, self._plan = None, -1, ()
+        self._room, self.planned_at, self._plan = None, -1, ()
         if self._followed is not None:  # no plan knows the random draws of the run; a policy that is followed may
             self._followed.begin(city, n_brigades, seed)
 
@@ -204,11 +206,11 @@ class Planner(Policy):
         Periods follow the step number, not the age of the plan: a run that is resumed plans at the same steps.
         """
         step, brigade, interval = observation.step, observation.brigade, self.options.interval
-        if not self._plan or step // interval != self._planned_at // interval:
+        if not self._plan or step // interval != self.planned_at // interval:
             self._make_plan(observation)
         option, values, worth = self._plan[brigade], None, None
-        if step == self._planned_at:
-            own = self._values[brigade]
+        if step == self.planned_at:
+            own = self.values[brigade]
             values, worth = tuple(own[action] for action in ACTION_OPTIONS), own[option]
         if option != FOLLOW:
             return Decision(option, q_values=values)
@@ -218,7 +220,7 @@ class Planner(Policy):
     def _make_plan(self, observation: Observation) -> None:
         if self._room is None:
             self._room = copy_world(observation.world)
-        self._planned_at = observation.step
+        self.planned_at = observation.step
         n_brigades = len(observation.world.brigades.action)
         forecast = Forecast(observation, self._room, self.options, self._followed)
         starts = [(option,) * n_brigades for option in self._options]
@@ -228,7 +230,7 @@ class Planner(Policy):
         self._plan = climb(
             forecast.value, starts, self._options, lambda: self._milliseconds > 0 and time.thread_time() >= late
         )
-        self._values = tuple(
+        self.values = tuple(
             option_values(forecast.value, self._plan, brigade, self._options) for brigade in range(n_brigades)
         )
 

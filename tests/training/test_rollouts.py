@@ -200,7 +200,7 @@ def test_a_network_learns_to_prefer_what_is_worth_more(make):
 
 def test_the_gradient_is_that_of_the_mean_worth(make):
     """By differences: of each number of the network, for options of unequal number."""
-    from fireworld.training.methods.rollouts import fresh_fitting
+    from fireworld.training.decisions import fresh_fitting
 
     trainer, random = make(hidden=3), np.random.default_rng(4)
     network = trainer.network_of(random.normal(size=len(trainer.newest)))
@@ -232,7 +232,7 @@ def test_the_gradient_is_that_of_the_mean_worth(make):
 
 def test_a_move_is_adams():
     from fireworld.kernels.fitting import move
-    from fireworld.training.methods.rollouts import fresh_fitting
+    from fireworld.training.decisions import fresh_fitting
     from tests.networks import make_network
 
     network = make_network(own_targets=True).policy().network
