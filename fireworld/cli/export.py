@@ -37,8 +37,8 @@ from fireworld.cli.progress import bar
     metavar="NAMES",
     help="Of --parquet, --csv and --jsonl, only these: city, buildings, brigades, decisions, civilians, sites, events, "
     "steps; of a training episodes, steps, tables; of a search generations, candidates, fights; of an evolution "
-    "evolved, evolved_fights; of rollouts improved, improved_fights; of what a learner played played, actions. "
-    "Separated by commas.",
+    "evolved, evolved_fights; of rollouts and imitation improved, improved_fights; of what a learner played played, "
+    "actions. Separated by commas.",
 )
 @click.option(
     "--observation",

@@ -119,8 +119,9 @@ def command(
     CURRICULUM is the name of a curriculum or of a scenario, or a YAML file of either. If none is named, the method
     `paper` (SARSA in tables) trains in `paper`; `search` and `assignment` (weights of a ranking) and
     `targets` (SARSA over the features of targets: a network) train in `contested`, `evolution` (a network, by an
-    evolution strategy), `gates` (rankings and what chooses among them, by the same) and `rollouts` (a network, by
-    what rollouts of its own decisions come to) in `conditions`.
+    evolution strategy), `gates` (rankings and what chooses among them, by the same), `rollouts` (a network, by
+    what rollouts of its own decisions come to) and `imitation` (a network, by what the planner would do) in
+    `conditions`.
 
     \b
     fireworld train -o team.npz                          the paper's method, both stages

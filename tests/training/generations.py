@@ -32,6 +32,17 @@ SHORT_ROLLOUTS = {
     "n_batch": 5,
     "n_checks": 1,
 }
+SHORT_IMITATION = {
+    "n_generations": 2,
+    "n_fights": 6,
+    "n_steps_max": 25,
+    "hidden": 3,
+    "start": "best-2026",
+    "horizon": 8,
+    "n_epochs": 3,
+    "n_batch": 5,
+    "n_checks": 1,
+}
 
 
 def read(text, folder):

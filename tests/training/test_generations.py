@@ -11,15 +11,29 @@ from fireworld.training.log.reader import open_training
 from fireworld.training.log.verify import verify_training
 from fireworld.training.methods.evolution import Evolution
 from fireworld.training.methods.gates import Gates
+from fireworld.training.methods.imitation import Imitation
 from fireworld.training.methods.rollouts import Rollouts
 from fireworld.training.train import train
 from fireworld.training.training import StopTraining
-from tests.training.generations import CONDITIONS, SHORT_EVOLUTION, SHORT_GATES, SHORT_ROLLOUTS, maker, read
+from tests.training.generations import (
+    CONDITIONS,
+    SHORT_EVOLUTION,
+    SHORT_GATES,
+    SHORT_IMITATION,
+    SHORT_ROLLOUTS,
+    maker,
+    read,
+)
 
-METHODS = [Evolution(**SHORT_EVOLUTION), Gates(**SHORT_GATES), Rollouts(**SHORT_ROLLOUTS)]
-N_NUMBERS = {"evolution": 85, "gates": 40, "rollouts": 255}
-WIDTHS = {"evolution": "26-3-1", "gates": "19-15-4-1", "rollouts": "26-9-1"}
-ANOTHER = {"evolution": ({"hidden": 2}, 57), "gates": ({"n_rankings": 3}, 60), "rollouts": ({"hidden": 2}, 171)}
+METHODS = [Evolution(**SHORT_EVOLUTION), Gates(**SHORT_GATES), Imitation(**SHORT_IMITATION), Rollouts(**SHORT_ROLLOUTS)]
+N_NUMBERS = {"evolution": 85, "gates": 40, "imitation": 85, "rollouts": 255}
+WIDTHS = {"evolution": "26-3-1", "gates": "19-15-4-1", "imitation": "26-3-1", "rollouts": "26-9-1"}
+ANOTHER = {
+    "evolution": ({"hidden": 2}, 57),
+    "gates": ({"n_rankings": 3}, 60),
+    "imitation": ({"hidden": 2}, 57),
+    "rollouts": ({"hidden": 2}, 171),
+}
 """Hyperparameters of another network, and how many numbers it has."""
 
 

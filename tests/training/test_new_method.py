@@ -169,8 +169,8 @@ def test_from_the_command_line(here, fireworld, guessing):
         "fireworld: method: n_guesses: expected a whole number from 1 to 1000000, got 0\n"
     )
     assert fireworld("train", "-o", "b.npz", "--method", "gues").err == (
-        "fireworld: --method: expected one of paper, assignment, evolution, gates, rollouts, sarsa, search, targets, "
-        "guess, got 'gues'\n"
+        "fireworld: --method: expected one of paper, assignment, evolution, gates, imitation, rollouts, sarsa, search, "
+        "targets, guess, got 'gues'\n"
     )
 
 
@@ -184,6 +184,7 @@ def test_a_module_in_the_folder_is_all_it_takes(here, fireworld, monkeypatch, gu
         "assignment",
         "evolution",
         "gates",
+        "imitation",
         "rollouts",
         "sarsa",
         "search",

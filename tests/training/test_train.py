@@ -25,12 +25,14 @@ SEARCH = {"n_generations": 3, "n_candidates": 4, "n_best": 2, "n_fires": 2, "n_s
 TARGETS = {"n_lessons": 3, "n_fights": 3, "n_steps_max": 10, "hidden": 3}
 EVOLUTION = {"n_generations": 3, "n_pairs": 2, "n_fires": 2, "n_steps_max": 10, "hidden": 2}
 ROLLOUTS = {"n_generations": 3, "n_fights": 2, "n_steps_max": 10, "hidden": 3, "horizon": 5, "n_epochs": 2}
+IMITATION = {"n_generations": 2, "n_fights": 2, "n_steps_max": 10, "hidden": 0, "start": "none", "n_epochs": 2}
 SETTINGS = {
     "paper": FEW,
     "search": SEARCH,
     "assignment": SEARCH,
     "targets": TARGETS,
     "evolution": EVOLUTION,
+    "imitation": IMITATION,
     "rollouts": ROLLOUTS,
 }
 

@@ -17,12 +17,14 @@ SHORT_EVOLUTION = {"n_generations": 3, "n_pairs": 2, "n_fires": 2, "n_steps_max"
 SHORT_GATES = {"n_generations": 3, "n_pairs": 2, "n_fires": 2, "n_steps_max": 10, "check_every": 2}
 SHORT_SEARCH = {"n_generations": 3, "n_candidates": 4, "n_best": 2, "n_fires": 2, "n_steps_max": 10}
 SHORT_ROLLOUTS = {"n_generations": 3, "n_fights": 2, "n_steps_max": 10, "hidden": 2, "horizon": 5, "n_epochs": 2}
+SHORT_IMITATION = {"n_generations": 2, "n_fights": 2, "n_steps_max": 10, "hidden": 0, "start": "none", "n_epochs": 2}
 SHORT_OF = {
     "paper": SHORT,
     "search": SHORT_SEARCH,
     "targets": SHORT_TARGETS,
     "evolution": SHORT_EVOLUTION,
     "gates": SHORT_GATES,
+    "imitation": SHORT_IMITATION,
     "rollouts": SHORT_ROLLOUTS,
 }
 

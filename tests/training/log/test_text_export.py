@@ -13,7 +13,7 @@ from fireworld.training.log.export import table_arrays, tables_of
 from fireworld.training.log.reader import open_training
 
 
-@pytest.mark.parametrize("method", ["paper", "search", "targets", "evolution", "gates", "rollouts"])
+@pytest.mark.parametrize("method", ["paper", "search", "targets", "evolution", "gates", "imitation", "rollouts"])
 def test_rows_are_those_of_the_log(here, fireworld, make_log, method):
     path = make_log(method)
     log = open_training(path)
@@ -38,6 +38,7 @@ def test_rows_are_those_of_the_log(here, fireworld, make_log, method):
         "targets": "lessons,epsilon,probability,probability of exploring",
         "evolution": "evolved,score_mean,,",
         "gates": "evolved,score_mean,,",
+        "imitation": "improved,score_mean,,",
         "rollouts": "improved,score_mean,,",
     }
     assert wanted[method] in documented
@@ -57,7 +58,7 @@ def test_mistakes_of_the_command_line(here, fireworld, make_log, words):
 
 
 @pytest.mark.parametrize("library", ["pandas", "polars"])
-@pytest.mark.parametrize("method", ["paper", "search", "targets", "evolution", "gates", "rollouts"])
+@pytest.mark.parametrize("method", ["paper", "search", "targets", "evolution", "gates", "imitation", "rollouts"])
 def test_data_frames(make_log, library, method):
     pytest.importorskip(library)
     log = open_training(make_log(method))
