@@ -53,14 +53,15 @@ class _Asking(Policy):
 
     def _note(self, observation: Observation, values: dict[int, float]) -> None:
         """Note what the options' targets are worth; of options with one target, the one that is worth the most."""
+        targets, seen = seen_targets(observation)
         followed = self._over.decide(observation).target
         worth = {-1 if followed is None else followed: values[FOLLOW]}
         where = observation.city, observation.world, observation.constants
         for action in ACTION_OPTIONS:
             target = int(named_target(observation.brigade, action, *where))
-            worth[target] = max(values[action], worth.get(target, -np.inf))
+            if target in targets:  # what an action names need not burn: `observation.easiest: heated`
+                worth[target] = max(values[action], worth.get(target, -np.inf))
         if len(worth) > 1:
-            targets, seen = seen_targets(observation)
             of_options = np.array([*worth.values()])
             places = [targets.index(target) for target in worth]
             self.found.append(TriedDecision(seen[places], of_options - of_options[0]))

@@ -10,6 +10,7 @@ import pytest
 from fireworld.errors import TrainingError
 from fireworld.executors import threads
 from fireworld.planning.planner import FOLLOW, Planner
+from fireworld.policy.protocol import named_target
 from fireworld.policy.teams.team import load_team
 from fireworld.training.methods.imitation import Imitation
 from fireworld.training.plans import follow_and_plan
@@ -94,6 +95,24 @@ def test_the_worth_is_that_of_the_plan(fought, monkeypatch):
     assert len(worths) > 5
     assert worths <= differences
     assert max(worths) <= max(max(own.values()) - own[FOLLOW] for values in noted for own in values)
+
+
+def test_an_action_may_name_what_does_not_burn(make, tmp_path):
+    heated = CONDITIONS.replace("set: {brigades.n: 4}", "set: {brigades.n: 1, observation.easiest: heated}")
+    assert heated != CONDITIONS
+    trainer = maker(read(heated, tmp_path), Imitation(**SHORT_IMITATION))(lead=1.0)
+    built, named = trainer._cities.build(trainer.curriculum.scenarios[-1]), []
+
+    class Noting(Planner):
+        def decide(self, observation):
+            target = named_target(observation.brigade, 0, observation.city, observation.world, observation.constants)
+            named.append(target in observation.burning)
+            return super().decide(observation)
+
+    over = trainer.policy_of(trainer.newest)
+    planner = Noting(horizon=HORIZON, interval=INTERVAL, over=over)
+    assert len(follow_and_plan(built.world(seed=5, n_steps_max=STEPS), planner, over, None, Event())) > 5
+    assert not all(named)
 
 
 def test_a_fight_is_left(fought):
