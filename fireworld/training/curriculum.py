@@ -6,7 +6,7 @@ import hashlib
 import itertools
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -92,6 +92,20 @@ class Curriculum:
             if name not in known:
                 raise TrainingError(expected("--stages", "", f"stages of {self.name}: {', '.join(known)}", name))
         return replace(self, stages=tuple(stage for stage in self.stages if stage.name in names))
+
+    def with_values(self, values: Mapping[str, Any]) -> Curriculum:
+        """Return the curriculum with other values in all of its scenarios.
+
+        Args:
+            values: by dotted key, as in {"brigades.allocation": "free"}.
+
+        Raises:
+            ScenarioError: a key or value that a scenario file could not have either.
+        """
+        stages = (
+            replace(stage, scenarios=tuple(one.with_values(values) for one in stage.scenarios)) for stage in self.stages
+        )
+        return replace(self, stages=tuple(stages))
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything there is to learn in as plain values, scenarios as YAML."""

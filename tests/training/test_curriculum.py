@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from benchmarks.conditions import CONDITIONS
-from fireworld.errors import FireworldError, TrainingError
+from fireworld.errors import FireworldError, ScenarioError, TrainingError
 from fireworld.evaluation.suites import suites
 from fireworld.training.curriculum import curriculum_names, load_curriculum
 
@@ -33,6 +33,18 @@ def test_some_of_its_stages():
     assert paper.only(["alone"]).digest != paper.digest
     with pytest.raises(TrainingError, match=r"^--stages: expected stages of paper: alone, together, got 'toghether'$"):
         paper.only(["alone", "toghether"])
+
+
+def test_other_values_in_all_scenarios():
+    conditions = load_curriculum("conditions").only(["two-sites", "official-like"])
+    free = conditions.with_values({"brigades.allocation": "free"})
+    assert [stage.name for stage in free.stages] == [stage.name for stage in conditions.stages]
+    assert free.n_scenarios == conditions.n_scenarios
+    assert {scenario.brigades.allocation for scenario in free.scenarios} == {"free"}
+    assert free.digest != conditions.digest
+    assert free.with_values({"brigades.allocation": "fixed"}).digest == conditions.digest
+    with pytest.raises(ScenarioError, match=r"brigades\.alocation"):
+        conditions.with_values({"brigades.alocation": "free"})
 
 
 def test_the_digest_is_of_what_is_learned(here, curriculum):
