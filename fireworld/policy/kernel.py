@@ -85,15 +85,15 @@ class KernelPolicy(Policy):
         self._ready = self.for_brigades(n_brigades)
 
     def ready(self, n_brigades: int) -> PolicyArrays:
-        """Return the arrays of the run begun, or of one that begins."""
-        if self._ready is None or len(self._ready.kind) != n_brigades:
-            self._ready = self.for_brigades(n_brigades)
-        return self._ready
+        """Return the arrays of the run begun, or of one that begins; another thread may be in a run of another team."""
+        ready = self._ready
+        if ready is None or len(ready.kind) != n_brigades:
+            ready = self._ready = self.for_brigades(n_brigades)
+        return ready
 
     def decide(self, observation: Observation) -> Decision:
         """Choose as the compiled episode does."""
-        ready = self._ready
-        assert ready is not None, "begin() comes before decide()"  # noqa: S101 - a mistake of ours, not of a user
+        ready = self.ready(len(observation.known_targets))
         brigade, seed, step = observation.brigade, observation.seed, observation.step
         if ready.kind[brigade] in (RANK_NAMED, RANK_ALL):
             return _by_rank(observation, ready)

@@ -9,6 +9,10 @@ from fireworld.draws import ACTION, EXPLORE, below, uniform
 from fireworld.kernels.choice import choose, greedy, table_state
 from fireworld.policy.chief import chief_table
 from fireworld.policy.kernel import always, at_random, each_another, from_tables
+from fireworld.policy.names import find_policy
+from fireworld.policy.protocol import Policy
+from fireworld.scenario import load_scenario
+from fireworld.simulation.built import build_scenario
 from tests.simulation.town import begin, town_world
 
 
@@ -96,3 +100,32 @@ def test_the_chief_has_an_opinion_of_every_state():
     assert table.shape == (4320, 4)
     assert np.isfinite(table).all()
     assert len(set(table.argmax(axis=1))) > 1, "it does not always say the same"
+
+
+@pytest.mark.parametrize("name", ["best", "best-2026", "paper-cooperative", "chief"])
+def test_one_policy_in_two_runs_of_unequal_teams_at_a_time(name):
+    """As environments have it that share a policy: each run is as if it were alone."""
+    policy = find_policy(name).policy
+    quick = load_scenario("quick").with_values({"fires.0.n_buildings": 6})
+    built = [build_scenario(quick.with_values({"brigades.n": n})) for n in (1, 12)]
+
+    class Asking(Policy):
+        """Hands every question on: the kernels follow no class of a user."""
+
+        def decide(self, observation):
+            return policy.decide(observation)
+
+    def digests(*groups):
+        found = []
+        for group in groups:
+            worlds = [one.world(seed=3, n_steps_max=20) for one in group]
+            for world in worlds:
+                policy.begin(world.city_arrays, world.n_brigades, world.seed)
+            for _ in range(20):
+                for world in worlds:
+                    if not (world.terminated or world.truncated):
+                        world.step(Asking())
+            found += [world.digest() for world in worlds]
+        return found
+
+    assert digests(built) == digests(built[::-1])[::-1] == digests(built[:1], built[1:])
