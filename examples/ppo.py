@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from collections import deque
 
 import numpy as np
@@ -151,18 +150,18 @@ def team_of(learner: Learner, origin: dict[str, float | str]) -> fw.NetworkTeam:
     return fw.NetworkTeam.from_layers(layers, activation="tanh", provenance=origin)
 
 
-def train(minutes: float, seed: int) -> fw.NetworkTeam:
-    """Learn for that long, and return the team."""
+def train(n_updates: int, seed: int) -> fw.NetworkTeam:
+    """Learn from so many batches, and return the team."""
     torch.set_num_threads(1)
-    scenarios, best, origin = fires(), None, {"method": "PPO", "minutes": minutes, "seed": seed}
+    scenarios, best, origin = fires(), None, {"method": "PPO", "updates": n_updates, "seed": seed}
     worlds = envs.worlds(scenarios, N_WORLDS, observation="targets", autoreset="SAME_STEP", seeds=seed)
-    learner, seen, began, n = Learner(seed), seen_of(worlds.reset()), time.process_time(), 0
+    learner, seen = Learner(seed), seen_of(worlds.reset())
     recent: deque[float] = deque(maxlen=200)
-    while (progress := (time.process_time() - began) / (60.0 * minutes)) < 1.0:
+    for n in range(1, n_updates + 1):
+        progress = (n - 1) / n_updates
         batch, seen, scores = play(worlds, seen, learner)
         learner.update(batch, progress)
         recent.extend(scores)
-        n += 1
         if n % 10 == 0 and progress > 0.5:
             team = team_of(learner, origin)
             best = team if best is None else better(best, team, scenarios)
@@ -176,9 +175,9 @@ def train(minutes: float, seed: int) -> fw.NetworkTeam:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description="Learn a team by PPO.")
-    parser.add_argument("--minutes", type=float, default=3.0, help="of processor time to learn for")
+    parser.add_argument("--updates", type=int, default=250, help="batches to learn from; 80 take about a minute")
     parser.add_argument("--seed", type=int, default=1, help="of all random draws")
     parser.add_argument("-o", "--output", default="ppo.npz", help="the team file to write")
     given = parser.parse_args()
-    train(given.minutes, given.seed).save(given.output, force=True)
+    train(given.updates, given.seed).save(given.output, force=True)
     print(f"wrote {given.output}")

@@ -67,7 +67,7 @@ def test_parallel(here, fireworld):
 @pytest.mark.parametrize(
     ("name", "budget", "output"),
     [
-        ("ppo.py", ("--minutes", "0.02"), "ppo.npz"),
+        ("ppo.py", ("--updates", "2"), "ppo.npz"),
         ("stable_baselines.py", ("--decisions", "1"), "stable-baselines.npz"),
     ],
 )
