@@ -1,10 +1,12 @@
 """How a method fares over several trainings, in suites that nobody learned in: a table in Markdown for the docs.
 
     python -m benchmarks.trainings t-*.npz [--than OTHER...] [--suites contested,larger] [--seeds 20] [--first-seed 1]
+    python -m benchmarks.trainings t-*.npz --curriculum unseen
 
-A row a suite: the mean over the trainings with its 95 % interval, where trainings and fires are both drawn anew (where
-there are fewer than ten fires, trainings and seeds); the worst and the best training; and how many trainings are below
-.9. With `--than` it says how much more is saved than by other teams: as many trainings, taken in pairs, or one policy.
+A row a suite, or a stage of a curriculum: the mean over the trainings with its 95 % interval, where trainings and fires
+are both drawn anew (where there are fewer than ten fires, trainings and seeds); the worst and the best training; and
+how many trainings are below .9. With `--than` it says how much more is saved than by other teams: as many trainings,
+taken in pairs, or one policy.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from fireworld.markdown import markdown_table
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.names import find_policy
 from fireworld.simulation.built import CityCache
+from fireworld.training.curriculum import load_curriculum
 
 SUITES = "tests,contested,larger,scarce-water,two-sites,few-brigades,many-brigades"
 FEW = 10
@@ -56,6 +59,7 @@ def main() -> None:
     parser.add_argument("teams", nargs="+", metavar="TEAM", help="a policy that kernels follow, or a team file")
     parser.add_argument("--than", nargs="+", metavar="TEAM", default=[], help="as many others, or one")
     parser.add_argument("--suites", default=SUITES)
+    parser.add_argument("--curriculum", help="a row for each of its stages in place of suites: one nobody learned in")
     parser.add_argument("--seeds", type=int, default=20, help="runs of each fire")
     parser.add_argument("--first-seed", type=int, default=1)
     given = parser.parse_args()
@@ -65,15 +69,24 @@ def main() -> None:
     if odd := [name for name, policy in policies.items() if not isinstance(policy, KernelPolicy)]:
         parser.error(f"{odd[0]}: not a policy that kernels follow")
     cities, seeds, rows = CityCache(), range(given.first_seed, given.first_seed + given.seeds), []
-    names = given.suites.split(",")
-    with click.progressbar(names, label="suites", file=sys.stderr) as bar:
-        for name in bar:
-            fires = [cities.build(one) for one in suite(name).scenarios]
+    if given.curriculum is None:
+        groups = [(name, suite(name).scenarios) for name in given.suites.split(",")]
+    else:
+        groups = [(stage.name, stage.scenarios) for stage in load_curriculum(given.curriculum).stages]
+    with click.progressbar(groups, label="fires", file=sys.stderr) as bar:
+        for name, scenarios in bar:
+            fires = [cities.build(one) for one in scenarios]
             runs, others = (
                 np.array([shares(fires, policies[one], seeds) for one in some]) for some in (given.teams, given.than)
             )
             rows.append(row_of(name, runs, others if given.than else None))
-    head = ["suite (fires)", f"mean of {len(given.teams)}", "worst", "best", f"below {LOW}"]
+    head = [
+        "suite (fires)" if given.curriculum is None else "stage (fires)",
+        f"mean of {len(given.teams)}",
+        "worst",
+        "best",
+        f"below {LOW}",
+    ]
     more = [f"more than {'the others' if len(given.than) > 1 else given.than[0]}"] if given.than else []
     print(markdown_table([*head, *more], rows))
 

@@ -41,6 +41,20 @@ def test_the_table(monkeypatch, capsys):
     assert row.startswith("| tests (3) | 0.")
 
 
+def test_the_stages_of_a_curriculum(here, monkeypatch, capsys):
+    (here / "two.yaml").write_text(
+        "stages:\n"
+        "  - {name: few, cooperation: true, base: quick, each: [{fires.0.n_buildings: 2}]}\n"
+        "  - {name: many, cooperation: true, base: quick, each: [{fires.0.n_buildings: 9}, {fires.0.n_buildings: 8}]}\n"
+    )
+    monkeypatch.setattr("sys.argv", ["trainings", "chief", "random", "--curriculum", "two.yaml", "--seeds", "2"])
+    main()
+    head, _, few, many = capsys.readouterr().out.strip().splitlines()
+    assert head.startswith("| stage (fires) | mean of 2 |")
+    assert few.startswith("| few (1) | 0.")
+    assert many.startswith("| many (2) | 0.")
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
