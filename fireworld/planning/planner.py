@@ -75,8 +75,8 @@ class Forecast:
     ) -> None:
         self._observation, self._copy, self._options = observation, copy, options
         n_brigades = len(observation.world.brigades.action)
-        self._followed = (always(0) if followed is None else followed).for_brigades(n_brigades)
-        self._policy = self._followed._replace(kind=self._followed.kind.copy(), action=self._followed.action.copy())
+        self.followed = (always(0) if followed is None else followed).for_brigades(n_brigades)
+        self._policy = self.followed._replace(kind=self.followed.kind.copy(), action=self.followed.action.copy())
         city_row = np.concatenate((address_row(observation.city), address_row(observation.constants)))
         self._bound = bind(city_row, address_row(copy), copy.fire, self._policy)
         self._values: dict[Assignment, float] = {}
@@ -95,7 +95,7 @@ class Forecast:
     def _assign(self, assignment: Assignment) -> None:
         """Let each brigade of the rollouts do what an assignment says."""
         option = np.array(assignment)
-        follows, policy, followed = option == FOLLOW, self._policy, self._followed
+        follows, policy, followed = option == FOLLOW, self._policy, self.followed
         policy.kind[:] = np.where(follows, followed.kind, FIXED)
         policy.action[:] = np.where(follows, followed.action, option)
 
@@ -180,12 +180,13 @@ class Planner(Policy):
             PolicyError: there is no such policy, or kernels cannot follow it; a number is out of range.
         """
         self.options = PlannerOptions(horizon, interval, rollouts)
-        self._followed = None if over is None else _followed(over)
+        self.followed = None if over is None else _followed(over)
+        """The policy that the planner is over, None if there is none."""
         self._options = ACTION_OPTIONS if over is None else (FOLLOW, *ACTION_OPTIONS)
         self._milliseconds = checked_option("milliseconds", milliseconds, least=0, most=MILLISECONDS_MAX)
         identity: tuple[object, ...] = (astuple(self.options), BURNING_COST)
-        if self._followed is not None or self._milliseconds:
-            identity += ("" if self._followed is None else self._followed.digest, self._milliseconds)
+        if self.followed is not None or self._milliseconds:
+            identity += ("" if self.followed is None else self.followed.digest, self._milliseconds)
         self.digest = hashlib.sha256(repr(identity).encode()).hexdigest()
         self._room: WorldState | None = None
         self.planned_at = -1
@@ -197,8 +198,8 @@ class Planner(Policy):
     def begin(self, city: CityArrays, n_brigades: int, seed: int) -> None:
         """Forget the run before."""
         self._room, self.planned_at, self._plan = None, -1, ()
-        if self._followed is not None:  # no plan knows the random draws of the run; a policy that is followed may
-            self._followed.begin(city, n_brigades, seed)
+        if self.followed is not None:  # no plan knows the random draws of the run; a policy that is followed may
+            self.followed.begin(city, n_brigades, seed)
 
     def decide(self, observation: Observation) -> Decision:
         """Follow the plan; the first brigade that chooses in a period of `interval` steps makes it.
@@ -214,15 +215,15 @@ class Planner(Policy):
             values, worth = tuple(own[action] for action in ACTION_OPTIONS), own[option]
         if option != FOLLOW:
             return Decision(option, q_values=values)
-        assert self._followed is not None  # noqa: S101 - nobody else has the option
-        return replace(self._followed.decide(observation), q_values=values, value=worth)
+        assert self.followed is not None  # noqa: S101 - nobody else has the option
+        return replace(self.followed.decide(observation), q_values=values, value=worth)
 
     def _make_plan(self, observation: Observation) -> None:
         if self._room is None:
             self._room = copy_world(observation.world)
         self.planned_at = observation.step
         n_brigades = len(observation.world.brigades.action)
-        forecast = Forecast(observation, self._room, self.options, self._followed)
+        forecast = Forecast(observation, self._room, self.options, self.followed)
         starts = [(option,) * n_brigades for option in self._options]
         if self._plan:
             starts.append(self._plan)

@@ -22,6 +22,7 @@ from fireworld.policy.teams.network_layers import WIDTH_MAX, Layer, mean_of_netw
 from fireworld.policy.teams.team import Team
 from fireworld.simulation.built import CityCache
 from fireworld.simulation.state import fresh_target_learner
+from fireworld.simulation.world import World
 from fireworld.training.curriculum import Curriculum
 from fireworld.training.log.records import Improved
 from fireworld.training.method import Report
@@ -165,8 +166,8 @@ class DecisionTrainer(NetworkTrainer[AMethod, Generation]):
         self.progress = Progress(0, np.repeat(self._first[np.newaxis], method.n_averaged, axis=0))
 
     @abstractmethod
-    def _try_out(self, fire: int, seed: int, stop: Event) -> tuple[float, list[TriedDecision]]:
-        """Fight a fire and try options out on the way; return the score, as a share of the maximum, and these."""
+    def _tried_in(self, world: World, stop: Event) -> list[TriedDecision]:
+        """Fight to the end in a world, and return the decisions whose options were tried out on the way."""
 
     @property
     def generation(self) -> int:
@@ -254,6 +255,12 @@ class DecisionTrainer(NetworkTrainer[AMethod, Generation]):
         self.progress = Progress(improved.generation + 1, networks, improved.score_checked)
         named = ("generation", "score_mean", "n_decisions", "gain", "score_checked")
         return Generation(n_generations=self.method.n_generations, **{name: getattr(improved, name) for name in named})
+
+    def _try_out(self, fire: int, seed: int, stop: Event) -> tuple[float, list[TriedDecision]]:
+        """Fight a fire and try options out on the way; return the score, as a share of the maximum, and these."""
+        world = self._world(fire, seed)
+        tried = self._tried_in(world, stop)
+        return world.outcome.score_share, tried
 
     def _fire(self, fight: int) -> int:
         """Draw the fire of a fight: the conditions come in turn."""

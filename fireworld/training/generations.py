@@ -127,13 +127,16 @@ class GenerationTrainer(Trainer[AMethod, AReport]):
 
     def _fight(self, numbers: Array, fire: int, seed: int) -> float:
         """Return the score of a candidate on a fire, as a share of the maximum, after `n_steps_max` steps at most."""
-        built = self._fires[fire]
-        n_steps = min(self.method.n_steps_max, built.scenario.steps)
-        return self._score(numbers, built.world(seed=seed, n_steps_max=n_steps))
+        return self._score(numbers, self._world(fire, seed))
 
     def _fight_to_the_end(self, numbers: Array, fire: int, seed: int) -> float:
         """The same, after the last step of the scenario."""
         return self._score(numbers, self._fires[fire].world(seed=seed))
+
+    def _world(self, fire: int, seed: int) -> World:
+        """Return a fire that is fought for `n_steps_max` steps at most."""
+        built = self._fires[fire]
+        return built.world(seed=seed, n_steps_max=min(self.method.n_steps_max, built.scenario.steps))
 
     def _score(self, numbers: Array, world: World) -> float:
         world.run(self.policy_of(numbers).for_brigades(world.n_brigades))

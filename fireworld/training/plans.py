@@ -18,20 +18,17 @@ N_PLAN_OPTIONS: Final = 1 + len(ACTION_OPTIONS)
 """To follow the team that the planner is over, and the actions."""
 
 
-def follow_and_plan(
-    world: World, planner: Planner, over: KernelPolicy, team: KernelPolicy | None, stop: Event
-) -> list[TriedDecision]:
+def follow_and_plan(world: World, planner: Planner, team: KernelPolicy | None, stop: Event) -> list[TriedDecision]:
     """Let a planner plan in a fight to the end; return what it made of the brigades' options, at each of its plans.
 
     Args:
         world: at its start; it is left at its end.
-        planner: who plans.
-        over: the team that it is over, which names its own targets.
+        planner: who plans, over a team that names its own targets.
         team: what the brigades do; None: what the planner says.
         stop: set it, and the fight is left.
     """
-    asking = _Asking(planner, over, team)
-    for policy in (planner, over, *(() if team is None else (team,))):
+    asking = _Asking(planner, team)
+    for policy in (planner, *(() if team is None else (team,))):
         policy.begin(world.city_arrays, world.n_brigades, world.seed)
     while not (world.terminated or world.truncated or stop.is_set()):
         world.step(asking)
@@ -41,8 +38,8 @@ def follow_and_plan(
 class _Asking(Policy):
     """Decides as a planner or a team does, and notes what the planner makes of the options."""
 
-    def __init__(self, planner: Planner, over: KernelPolicy, team: KernelPolicy | None) -> None:
-        self._planner, self._over, self._team = planner, over, team
+    def __init__(self, planner: Planner, team: KernelPolicy | None) -> None:
+        self._planner, self._team = planner, team
         self.found: list[TriedDecision] = []
 
     def decide(self, observation: Observation) -> Decision:
@@ -53,15 +50,16 @@ class _Asking(Policy):
 
     def _note(self, observation: Observation, values: dict[int, float]) -> None:
         """Note what the options' targets are worth; of options with one target, the one that is worth the most."""
-        targets, seen = seen_targets(observation)
-        followed = self._over.decide(observation).target
+        assert self._planner.followed is not None  # noqa: S101 - it is over a team
+        followed, burning = self._planner.followed.decide(observation).target, observation.burning
         worth = {-1 if followed is None else followed: values[FOLLOW]}
         where = observation.city, observation.world, observation.constants
         for action in ACTION_OPTIONS:
             target = int(named_target(observation.brigade, action, *where))
-            if target in targets:  # what an action names need not burn: `observation.easiest: heated`
+            if target in burning:  # what an action names need not burn: `observation.easiest: heated`
                 worth[target] = max(values[action], worth.get(target, -np.inf))
         if len(worth) > 1:
+            targets, seen = seen_targets(observation)
             of_options = np.array([*worth.values()])
             places = [targets.index(target) for target in worth]
             self.found.append(TriedDecision(seen[places], of_options - of_options[0]))

@@ -35,7 +35,7 @@ def fought(make):
         over = trainer.policy_of(trainer.newest)
         planner = Planner(horizon=HORIZON, interval=INTERVAL, over=over)
         team = None if leads else load_team("paper-cooperative").policy()
-        return world, planner, follow_and_plan(world, planner, over, team, stop or Event())
+        return world, planner, follow_and_plan(world, planner, team, stop or Event())
 
     fight.built = built
     return fight
@@ -111,7 +111,7 @@ def test_an_action_may_name_what_does_not_burn(make, tmp_path):
 
     over = trainer.policy_of(trainer.newest)
     planner = Noting(horizon=HORIZON, interval=INTERVAL, over=over)
-    assert len(follow_and_plan(built.world(seed=5, n_steps_max=STEPS), planner, over, None, Event())) > 5
+    assert len(follow_and_plan(built.world(seed=5, n_steps_max=STEPS), planner, None, Event())) > 5
     assert not all(named)
 
 

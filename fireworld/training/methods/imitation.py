@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar, Final, Literal
 from fireworld.draws import MOMENT, uniform
 from fireworld.planning.planner import OPTION_MAX, Planner
 from fireworld.simulation.built import CityCache
+from fireworld.simulation.world import World
 from fireworld.training.curriculum import Curriculum
 from fireworld.training.decisions import DecisionMethod, DecisionTrainer
 from fireworld.training.method import Count, Limits, Positive, Share
@@ -69,12 +70,10 @@ METHOD: Final = Imitation()
 class ImitationTrainer(DecisionTrainer[Imitation]):
     """Improves one network by what a planner over its start plans; arguments as for `Method.trainer`."""
 
-    def _try_out(self, fire: int, seed: int, stop: Event) -> tuple[float, list[TriedDecision]]:
-        """Let the planner plan in a fight; return the score, as a share of the maximum, and what it made of options."""
-        method, built = self.method, self._fires[fire]
-        world = built.world(seed=seed, n_steps_max=min(method.n_steps_max, built.scenario.steps))
+    def _tried_in(self, world: World, stop: Event) -> list[TriedDecision]:
+        """Let the planner plan in a fight, which it or the network leads."""
+        method = self.method
         over = self.policy_of(self._first)
         planner = Planner(horizon=method.horizon, interval=method.interval, rollouts=method.n_rollouts, over=over)
-        leads = uniform(seed, MOMENT, 0, 0) < method.lead
-        tried = follow_and_plan(world, planner, over, None if leads else self.policy_of(self.newest), stop)
-        return world.outcome.score_share, tried
+        leads = uniform(world.seed, MOMENT, 0, 0) < method.lead
+        return follow_and_plan(world, planner, None if leads else self.policy_of(self.newest), stop)

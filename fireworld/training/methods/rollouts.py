@@ -7,6 +7,7 @@ from threading import Event
 from typing import ClassVar, Final, Literal
 
 from fireworld.simulation.built import CityCache
+from fireworld.simulation.world import World
 from fireworld.training.curriculum import Curriculum
 from fireworld.training.decisions import DecisionMethod, DecisionTrainer
 from fireworld.training.method import Count, CountOrNone, Positive, PositiveShare
@@ -81,9 +82,6 @@ METHOD: Final = Rollouts()
 class RolloutsTrainer(DecisionTrainer[Rollouts]):
     """Improves one network by rollouts of its own decisions; arguments as for `Method.trainer`."""
 
-    def _try_out(self, fire: int, seed: int, stop: Event) -> tuple[float, list[TriedDecision]]:
-        """Fight a fire and try options out on the way; return the score, as a share of the maximum, and these."""
-        built = self._fires[fire]
-        world = built.world(seed=seed, n_steps_max=min(self.method.n_steps_max, built.scenario.steps))
-        tried = try_options(world, self.policy_of(self.newest), self.method.trial, stop)
-        return world.outcome.score_share, tried
+    def _tried_in(self, world: World, stop: Event) -> list[TriedDecision]:
+        """Fight as the network says, and try options of its decisions out."""
+        return try_options(world, self.policy_of(self.newest), self.method.trial, stop)
