@@ -74,7 +74,7 @@ def try_options(world: World, policy: KernelPolicy, trial: Trial, stop: Event) -
         stop: set it, and the fight is left.
     """
     found = list[TriedDecision]()
-    rollouts = _Rollouts(world, policy, trial)
+    rollouts = Rollouts(world, policy, trial)
     policy.begin(world.city_arrays, world.n_brigades, world.seed)
     while not (world.terminated or world.truncated or stop.is_set()):
         step = world.step_number + 1
@@ -82,7 +82,7 @@ def try_options(world: World, policy: KernelPolicy, trial: Trial, stop: Event) -
             world.step(policy)
             continue
         order = sorted(range(world.n_brigades), key=lambda brigade: hash_key(world.seed, OPTION, brigade, step))
-        asking = _Asking(policy, order[: trial.n_brigades], trial.n_likely)
+        asking = Asking(policy, order[: trial.n_brigades], trial.n_likely)
         before = copy_world(world.state)
         world.step(asking)
         found += [rollouts.tried(before, step, asked) for asked in asking.asked if len(asked.targets) > 1]
@@ -90,7 +90,7 @@ def try_options(world: World, policy: KernelPolicy, trial: Trial, stop: Event) -
 
 
 @dataclass(frozen=True)
-class _Asked:
+class Asked:
     """What a brigade could choose from, in the order in which it is tried; the first is what it chose."""
 
     brigade: int
@@ -98,15 +98,16 @@ class _Asked:
     seen: Array
 
 
-class _Asking(Policy):
+class Asking(Policy):
     """Decides as a team does, and notes what some brigades could choose from."""
 
     def __init__(self, policy: KernelPolicy, brigades: list[int], n_likely: int) -> None:
         self._policy, self._brigades, self._n_likely = policy, brigades, n_likely
         self._work = np.zeros((2, widest(policy.network)))
-        self.asked: list[_Asked] = []
+        self.asked: list[Asked] = []
 
     def decide(self, observation: Observation) -> Decision:
+        """Decide as the team does; see `Policy.decide`."""
         decision = self._policy.decide(observation)
         if observation.brigade in self._brigades:
             targets, seen = seen_targets(observation)
@@ -116,7 +117,7 @@ class _Asking(Policy):
             likely = nlargest(self._n_likely, others, key=lambda k: self._value(seen[k]))
             rest = (k for k in others if k not in likely)
             places = [own, *likely, *sorted(rest, key=lambda k: hash_key(seed, OPTION, n + targets[k], step))]
-            self.asked.append(_Asked(observation.brigade, [targets[k] for k in places], seen[places]))
+            self.asked.append(Asked(observation.brigade, [targets[k] for k in places], seen[places]))
         return decision
 
     def _value(self, seen: Array) -> float:
@@ -124,7 +125,7 @@ class _Asking(Policy):
         return float(value_by_network(self._policy.network, seen, self._work))
 
 
-class _Rollouts:
+class Rollouts:
     """Rollouts of a team in a world, in which one brigade goes for a target of somebody's choice first."""
 
     def __init__(self, world: World, policy: KernelPolicy, trial: Trial) -> None:
@@ -136,10 +137,17 @@ class _Rollouts:
         city_row = np.concatenate((address_row(world.city_arrays), address_row(world.constants)))
         self._bound = bind(city_row, address_row(self._room), self._room.fire, self._forced)
 
-    def tried(self, before: WorldState, step: int, asked: _Asked) -> TriedDecision:
-        """Return what the options of a brigade are worth, in a step that begins in a state."""
+    def tried(self, before: WorldState, step: int, asked: Asked, *, first: int = 0) -> TriedDecision:
+        """Return what the options of a brigade are worth, in a step that begins in a state.
+
+        Args:
+            before: the state.
+            step: the step.
+            asked: the options.
+            first: number of the first rollout; rollouts of other numbers have other random draws.
+        """
         trial, seeds = self._trial, list[int]()
-        for rollout in range(trial.n_rollouts):
+        for rollout in range(first, first + trial.n_rollouts):
             seeds.append(FIRST_SEED + (hash_key(self._seed, ROLLOUT, rollout, step) >> 32))
         targets = asked.targets[: trial.n_options]
         worth = np.array(

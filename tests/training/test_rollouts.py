@@ -164,7 +164,7 @@ def test_a_target_that_is_chosen_anyway_is_worth_the_same(make, monkeypatch):
     from fireworld.training import options
 
     worths = []
-    real = options._Rollouts.tried
+    real = options.Rollouts.tried
 
     def tried(self, before, step, asked):
         found = real(self, before, step, asked)
@@ -176,7 +176,7 @@ def test_a_target_that_is_chosen_anyway_is_worth_the_same(make, monkeypatch):
         worths.append((forced, score.score / score.score_max - 0.005 * score.n_burning))
         return found
 
-    monkeypatch.setattr(options._Rollouts, "tried", tried)
+    monkeypatch.setattr(options.Rollouts, "tried", tried)
     try_options(built.world(seed=5, n_steps_max=20), trainer.policy_of(trainer.newest), trainer.method.trial, Event())
     assert len(worths) > 5
     assert all(one == other for one, other in worths)

@@ -1,0 +1,53 @@
+"""Fires that are like those of a curriculum, drawn at random in cities that no training and no suite has.
+
+Nobody looked whether they are contested, so they flatter no team, and there are as many as anybody wants.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import count, islice
+from typing import Final
+
+from fireworld.draws import PLACEMENT, below, uniform
+from fireworld.errors import ScenarioError
+from fireworld.evaluation.fire_base import FireBase, base_of
+from fireworld.scenario import Scenario
+from fireworld.scenario.document import CitySource
+from fireworld.simulation.built import BuiltScenario, CityCache
+
+FIRST_CITY: Final = 700_000
+"""Seed of the first city; curricula and suites have those below 100,000."""
+N_CITIES: Final = 20
+"""Of each kind of city in the curriculum."""
+LEAST, MOST = 0.7, 1.3
+"""So many times as many buildings burn as in the fire that one is like."""
+MODEL, CITY, PLACE, SIZE = range(4)
+"""What is drawn for a fire: which one it is like, the city, the place in it, and how large it is."""
+
+
+def drawn_fires(models: Sequence[Scenario], n: int, cities: CityCache, *, seed: int) -> list[BuiltScenario]:
+    """Draw n fires, each like one of the models: its team, conditions and kind of city, at another place elsewhere."""
+    return [*islice(_drawn(models, cities, seed), n)]
+
+
+def _drawn(models: Sequence[Scenario], cities: CityCache, seed: int) -> Iterator[BuiltScenario]:
+    """Draw fires without end; those for which a city has no room are left out."""
+    bases = dict[CitySource, FireBase]()
+    for number in count(1):
+        model = models[below(seed, PLACEMENT, number, MODEL, bound=len(models))]
+        city = FIRST_CITY + below(seed, PLACEMENT, number, CITY, bound=N_CITIES)
+        elsewhere = model.with_values({"city.generated.seed": city})
+        if elsewhere.city not in bases:
+            base = base_of(elsewhere, seed=city, brigades=None, civilians=None, values={})
+            bases[elsewhere.city] = replace(base, people_stay=False)
+        base = replace(bases[elsewhere.city], scenario=elsewhere)
+        at = below(seed, PLACEMENT, number, PLACE, bound=1 << 31)
+        place = next(base.places(at, n_places=1, n_fires=len(model.fires)))
+        times = LEAST + (MOST - LEAST) * uniform(seed, PLACEMENT, number, SIZE)
+        burning = round(times * sum(fire.n_buildings or 0 for fire in model.fires))
+        try:
+            yield cities.build(place.lit(elsewhere, max(len(model.fires), burning)))
+        except ScenarioError:
+            continue
