@@ -2,11 +2,13 @@
 
     python -m benchmarks.trainings t-*.npz [--than OTHER...] [--suites contested,larger] [--seeds 20] [--first-seed 1]
     python -m benchmarks.trainings t-*.npz --curriculum unseen
+    python -m benchmarks.trainings t-*.npz --drawn 300
 
-A row a suite, or a stage of a curriculum: the mean over the trainings with its 95 % interval, where trainings and fires
-are both drawn anew (where there are fewer than ten fires, trainings and seeds); the worst and the best training; and
-how many trainings are below .9. With `--than` it says how much more is saved than by other teams: as many trainings,
-taken in pairs, or one policy.
+A row a suite; or a stage of a curriculum; or, with `--drawn`, so many fires that are drawn like those of a stage
+(`benchmarks.drawn_fires`), each with one seed, and a row of all of them. It says: the mean over the trainings with its
+95 % interval, where trainings and fires are both drawn anew (where there are fewer than ten fires, trainings and
+seeds); the worst and the best training; and how many trainings are below .9. With `--than` it says how much more is
+saved than by other teams: as many trainings, taken in pairs, or one policy.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import sys
 import click
 import numpy as np
 
+from benchmarks.drawn_fires import drawn_fires
 from benchmarks.learning_fires import shares
 from fireworld.evaluation.statistics import Estimate, estimate, paired_difference
 from fireworld.evaluation.suites import suite
@@ -60,6 +63,7 @@ def main() -> None:
     parser.add_argument("--than", nargs="+", metavar="TEAM", default=[], help="as many others, or one")
     parser.add_argument("--suites", default=SUITES)
     parser.add_argument("--curriculum", help="a row for each of its stages in place of suites: one nobody learned in")
+    parser.add_argument("--drawn", type=int, default=0, metavar="N", help="N other fires like those of each stage")
     parser.add_argument("--seeds", type=int, default=20, help="runs of each fire")
     parser.add_argument("--first-seed", type=int, default=1)
     given = parser.parse_args()
@@ -68,20 +72,29 @@ def main() -> None:
     policies = {name: find_policy(name).policy for name in (*given.teams, *given.than)}
     if odd := [name for name, policy in policies.items() if not isinstance(policy, KernelPolicy)]:
         parser.error(f"{odd[0]}: not a policy that kernels follow")
-    cities, seeds, rows = CityCache(), range(given.first_seed, given.first_seed + given.seeds), []
-    if given.curriculum is None:
+    n_seeds, curriculum = 1 if given.drawn else given.seeds, given.curriculum or ("conditions" if given.drawn else None)
+    cities, seeds, first = CityCache(), range(given.first_seed, given.first_seed + n_seeds), given.first_seed
+    if curriculum is None:
         groups = [(name, suite(name).scenarios) for name in given.suites.split(",")]
     else:
-        groups = [(stage.name, stage.scenarios) for stage in load_curriculum(given.curriculum).stages]
-    with click.progressbar(groups, label="fires", file=sys.stderr) as bar:
-        for name, scenarios in bar:
-            fires = [cities.build(one) for one in scenarios]
+        groups = [(stage.name, stage.scenarios) for stage in load_curriculum(curriculum).stages]
+    found = dict[str, tuple[Array, Array]]()
+    with click.progressbar([*enumerate(groups)], label="fires", file=sys.stderr) as bar:
+        for place, (name, scenarios) in bar:
+            if given.drawn:
+                fires = drawn_fires(scenarios, given.drawn, cities, seed=first + place)
+            else:
+                fires = [cities.build(one) for one in scenarios]
             runs, others = (
                 np.array([shares(fires, policies[one], seeds) for one in some]) for some in (given.teams, given.than)
             )
-            rows.append(row_of(name, runs, others if given.than else None))
+            found[name] = runs, others.reshape(-1, *runs.shape[1:])
+    if given.drawn:
+        runs, others = (np.concatenate(all_of_them, axis=-2) for all_of_them in zip(*found.values(), strict=True))
+        found["all"] = runs, others
+    rows = [row_of(name, runs, others if given.than else None) for name, (runs, others) in found.items()]
     head = [
-        "suite (fires)" if given.curriculum is None else "stage (fires)",
+        "suite (fires)" if curriculum is None else "stage (fires)",
         f"mean of {len(given.teams)}",
         "worst",
         "best",

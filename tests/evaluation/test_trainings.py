@@ -55,6 +55,20 @@ def test_the_stages_of_a_curriculum(here, monkeypatch, capsys):
     assert many.startswith("| many (2) | 0.")
 
 
+def test_fires_drawn_like_those_of_a_curriculum(here, monkeypatch, capsys):
+    (here / "one.yaml").write_text(
+        "stages: [{name: few, cooperation: true, base: quick, each: [{fires.0.n_buildings: 2}, {brigades.n: 1}]}]\n"
+    )
+    for than in ([], ["--than", "easiest"]):
+        words = ["chief", "random", *than, "--curriculum", "one.yaml", "--drawn", "3"]
+        monkeypatch.setattr("sys.argv", ["trainings", *words])
+        main()
+        head, _, few, both = capsys.readouterr().out.strip().splitlines()
+        assert head.startswith("| stage (fires) | mean of 2 |")
+        assert few.startswith("| few (3) | 0.")
+        assert both == few.replace("| few", "| all"), "there is one stage"
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
