@@ -14,6 +14,7 @@ POLICIES = (
     "paper-cooperative",
     "ppo.npz",
     "best",
+    "sarsa",
     "planner",
     "planner:over=best",
 )

@@ -22,6 +22,7 @@ SHIPPED = {
     "best-2026": "042f726d665698a3",
     "paper-cooperative": "5eaa625114742317",
     "paper-noncooperative": "eb891902f38f8b04",
+    "sarsa": "034968e452eec513",
 }
 
 

@@ -19,6 +19,7 @@ from fireworld.training.curriculum import load_curriculum
 from fireworld.training.methods.rollouts import Rollouts
 from fireworld.training.methods.sarsa import PAPER
 from fireworld.training.methods.search import Search
+from fireworld.training.methods.targets import Targets
 from fireworld.training.training import check_same
 
 SHAPES = {"paper-cooperative": (4, 4320, 4), "paper-noncooperative": (1, 270, 4)}
@@ -29,18 +30,23 @@ CURRICULA = {
 
 
 def test_the_papers_teams_are_there():
-    assert {*SHAPES, "best", "best-2026"} == set(COMMANDS) <= set(team_names())
+    assert {*SHAPES, "best", "best-2026", "sarsa"} == set(COMMANDS) <= set(team_names())
 
 
 @pytest.mark.parametrize(
     ("name", "method", "curriculum", "seed"),
-    [("best", Rollouts(), "conditions", 2026), ("best-2026", Search(), "contested", 1)],
+    [
+        ("best", Rollouts(), "conditions", 2026),
+        ("best-2026", Search(), "contested", 1),
+        ("sarsa", Targets(), "contested", 1),
+    ],
 )
-def test_the_best_come_from_the_shipped_curricula(name, method, curriculum, seed):
+def test_teams_of_other_methods_come_from_the_shipped_curricula(name, method, curriculum, seed):
     team = load_team(name)
     wanted = method.trainer(load_curriculum(curriculum), seed=seed).identity
     check_same(team.provenance, wanted, team_path(name))
-    assert team.provenance["generations_done"] == method.n_generations
+    done, wanted = ("lessons_done", "n_lessons") if name == "sarsa" else ("generations_done", "n_generations")
+    assert team.provenance[done] == getattr(method, wanted)
     assert team.own_targets
 
 
@@ -69,12 +75,13 @@ def test_by_its_name(name):
 @pytest.mark.parametrize("name", COMMANDS)
 def test_it_shows_itself(name):
     team = load_team(name)
-    kinds = {"best": ("NetworkTeam", "own targets"), "best-2026": ("RankingTeam", "own targets")}
+    network = ("NetworkTeam", "own targets")
+    kinds = {"best": network, "sarsa": network, "best-2026": ("RankingTeam", "own targets")}
     kind, what = kinds.get(name, ("TableTeam", "states"))
     assert repr(team).startswith(f"<{kind}: ")
     assert what in repr(team)
     assert repr(team).endswith(f"digest {team.digest[:12]}>")
-    assert team._repr_html_().count("<table>") == (2 if name == "best" else 1)
+    assert team._repr_html_().count("<table>") == (2 if kind == "NetworkTeam" else 1)
     assert team.digest in team._repr_html_()
     assert pickle.loads(pickle.dumps(team)).policy().digest == team.policy().digest  # noqa: S301 - our own
 
