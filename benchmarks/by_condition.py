@@ -61,6 +61,8 @@ def shortened(scenarios: Sequence[Scenario], steps: int | None) -> list[Scenario
 def more_than(differences: Sequence[Array]) -> str:
     """Write the mean over all conditions of what a team saves more of each fire, and its standard error."""
     mean = math.fsum(float(one.mean()) for one in differences) / len(differences)
+    if min(map(len, differences)) < 2:  # one fire has no spread
+        return f"{mean:+.3f}"
     variance = math.fsum(float(one.var(ddof=1)) / len(one) for one in differences) / len(differences) ** 2
     return f"{mean:+.3f} ± {math.sqrt(variance):.3f}"
 

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import count, islice
+from itertools import islice
 from typing import Final
 
 from fireworld.draws import PLACEMENT, below, uniform
-from fireworld.errors import ScenarioError
+from fireworld.errors import ScenarioError, expected
 from fireworld.evaluation.fire_base import FireBase, base_of
 from fireworld.scenario import Scenario
 from fireworld.scenario.document import CitySource
@@ -23,19 +23,28 @@ N_CITIES: Final = 20
 """Of each kind of city in the curriculum."""
 LEAST, MOST = 0.7, 1.3
 """So many times as many buildings burn as in the fire that one is like."""
+TRIES: Final = 20
+"""So many times as many fires are drawn at most as are wanted."""
 MODEL, CITY, PLACE, SIZE = range(4)
 """What is drawn for a fire: which one it is like, the city, the place in it, and how large it is."""
 
 
 def drawn_fires(models: Sequence[Scenario], n: int, cities: CityCache, *, seed: int) -> list[BuiltScenario]:
-    """Draw n fires, each like one of the models: its team, conditions and kind of city, at another place elsewhere."""
-    return [*islice(_drawn(models, cities, seed), n)]
+    """Draw n fires, each like one of the models: its team, conditions and kind of city, at another place elsewhere.
+
+    Raises:
+        ScenarioError: cities of this kind have hardly anywhere room for such fires, or are not generated.
+    """
+    found = [*islice(_drawn(models, cities, seed, n_tries=TRIES * n), n)]
+    if len(found) < n:
+        raise ScenarioError(expected(models[0].name, "fires", f"room for {n} like these", f"room for {len(found)}"))
+    return found
 
 
-def _drawn(models: Sequence[Scenario], cities: CityCache, seed: int) -> Iterator[BuiltScenario]:
-    """Draw fires without end; those for which a city has no room are left out."""
+def _drawn(models: Sequence[Scenario], cities: CityCache, seed: int, *, n_tries: int) -> Iterator[BuiltScenario]:
+    """Draw so many fires; those for which a city has no room are left out."""
     bases = dict[CitySource, FireBase]()
-    for number in count(1):
+    for number in range(1, n_tries + 1):
         model = models[below(seed, PLACEMENT, number, MODEL, bound=len(models))]
         city = FIRST_CITY + below(seed, PLACEMENT, number, CITY, bound=N_CITIES)
         elsewhere = model.with_values({"city.generated.seed": city})

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from benchmarks.by_condition import main
+import numpy as np
+import pytest
+
+from benchmarks.by_condition import main, more_than
 from benchmarks.drawn_fires import FIRST_CITY, drawn_fires
+from fireworld.errors import ScenarioError
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import load_curriculum
 from tests.training.generations import CONDITIONS, read
@@ -54,3 +58,15 @@ def test_what_a_team_saves_more_than_the_first_has_its_error(tmp_path, monkeypat
         assert rows[0][2] == "+0.000 ± 0.000"
         difference = float(rows[1][1]) - float(rows[0][1])
         assert abs(float(rows[1][2].partition(" ")[0]) - difference) <= 0.0011
+
+
+def test_the_error_of_a_mean_over_conditions():
+    assert more_than([np.array([0.1, 0.3]), np.array([0.0, 0.0])]) == "+0.100 ± 0.050"
+    assert more_than([np.array([0.1, 0.3]), np.array([0.0])]) == "+0.100", "one fire has no spread"
+
+
+def test_cities_without_room_for_such_fires():
+    (model, *_) = stages_of("conditions")["few-brigades"]
+    crowded = model.with_values({"fires.0.n_buildings": 100_000})
+    with pytest.raises(ScenarioError, match="fires: expected room for 2 like these, got room for 0"):
+        drawn_fires([crowded], 2, CityCache(), seed=1)
