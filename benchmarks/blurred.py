@@ -17,23 +17,20 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from itertools import chain
 from typing import Final
 
 import numpy as np
 
-from fireworld.draws import FIRE, MOMENT, OPTION, below, hash_key
-from fireworld.executors import On, workers_for
+from benchmarks.fights import Fires, fires_by_condition, in_fights, network_of
+from fireworld.draws import MOMENT, OPTION, below
 from fireworld.kernels.arrays import Array, NetworkArrays, WorldState
 from fireworld.markdown import markdown_table
-from fireworld.policy.kernel import KernelPolicy, from_network
-from fireworld.policy.names import find_policy
-from fireworld.simulation.built import BuiltScenario, CityCache
+from fireworld.policy.kernel import from_network
+from fireworld.simulation.built import BuiltScenario
 from fireworld.simulation.state import copy_world
-from fireworld.training.curriculum import load_curriculum
 from fireworld.training.options import Asking, Rollouts, Trial
-from fireworld.training.seeds import fight_seed
 
+Worths = tuple[Array, ...]
 BLURS: Final = (0.03, 0.1, 0.3)
 FIRST_STEPS: Final = 40
 """In one of these a brigade is asked."""
@@ -50,13 +47,11 @@ def blurred(state: WorldState, blur: float, draws: np.random.Generator) -> World
     return copy
 
 
-def worths(
-    built: BuiltScenario, network: NetworkArrays, trial: Trial, *, seed: int, step: int
-) -> list[tuple[Array, ...]]:
-    """Fight up to a step, and try out the options of one brigade there, if it has any.
+def worths(built: BuiltScenario, network: NetworkArrays, trial: Trial, *, seed: int, step: int) -> Worths | None:
+    """Fight up to a step, and try out the options of one brigade there; None if it has no choice.
 
     Returns:
-        One tuple at most: what options are worth, (k,) each, the own one first; in the fire, once more, and blurred.
+        What options are worth, (k,) each, the own one first; in the fire, once more, and blurred.
     """
     policy = from_network(network, own_targets=True)
     world = built.world(seed=seed, n_steps_max=built.scenario.steps)
@@ -64,36 +59,29 @@ def worths(
     while world.step_number < step - 1 and not (world.terminated or world.truncated):
         world.step(policy)
     if world.terminated or world.truncated:
-        return []
+        return None
     rollouts, before = Rollouts(world, policy, trial), copy_world(world.state)
     asking = Asking(policy, [below(seed, OPTION, 0, step, bound=world.n_brigades)], trial.n_likely)
     world.step(asking)
     if not asking.asked or len(asking.asked[0].targets) < 2:
-        return []
+        return None
     draws = np.random.default_rng(seed)
     states = [before, before, *(blurred(before, blur, draws) for blur in BLURS)]
-    return [
-        tuple(
-            rollouts.tried(state, step, asking.asked[0], first=number * trial.n_rollouts).worth
-            for number, state in enumerate(states)
-        )
-    ]
+    return tuple(
+        rollouts.tried(state, step, asking.asked[0], first=number * trial.n_rollouts).worth
+        for number, state in enumerate(states)
+    )
 
 
-def found_in(
-    fires: Sequence[Sequence[BuiltScenario]], network: NetworkArrays, trial: Trial, n_fights: int, seed: int
-) -> list[tuple[Array, ...]]:
-    """Return what options are worth, decision by decision; the conditions come in turn."""
+def found_in(fires: Fires, network: NetworkArrays, trial: Trial, n_fights: int, seed: int) -> list[Worths]:
+    """Return what options are worth, decision by decision."""
 
-    def fight(number: int) -> list[tuple[Array, ...]]:
-        among = fires[number % len(fires)]
-        built = among[hash_key(seed, FIRE, number, 0) % len(among)]
+    def fight(built: BuiltScenario, number: int, fight_seed: int) -> list[Worths]:
         step = 1 + below(seed, MOMENT, number, 0, bound=FIRST_STEPS)
-        return worths(built, network, trial, seed=fight_seed(seed, number, 0), step=step)
+        found = worths(built, network, trial, seed=fight_seed, step=step)
+        return [] if found is None else [found]
 
-    workers = workers_for(On("threads"))
-    with workers.make_pool(workers.n) as pool:
-        return [*chain.from_iterable(pool.map(fight, range(n_fights)))]
+    return in_fights(fires, n_fights, seed, fight)
 
 
 def together(one: Sequence[Array], other: Sequence[Array]) -> float:
@@ -115,15 +103,11 @@ def main() -> None:
     parser.add_argument("--rollouts", type=int, default=6, help="of every option, in every fire")
     parser.add_argument("--seed", type=int, default=41)
     given = parser.parse_args()
-    policy = find_policy(given.team).policy
-    if not isinstance(policy, KernelPolicy) or not len(policy.network.layer):
-        parser.error(f"--team: expected a team with a network, got {given.team}")
-    cities = CityCache()
-    fires = [[cities.build(one) for one in stage.scenarios] for stage in load_curriculum("conditions").stages]
+    network = network_of(given.team, parser)
     trial = Trial(
         share=1.0, n_brigades=1, n_options=4, n_likely=2, n_rollouts=given.rollouts, commit=6, horizon=given.horizon
     )
-    found = found_in(fires, policy.network, trial, given.fights, given.seed)
+    found = found_in(fires_by_condition(), network, trial, given.fights, given.seed)
     if not found:
         parser.error("--fights: expected fights in which a brigade has a choice, got none")
     itself, again, *others = zip(*found, strict=True)

@@ -18,49 +18,38 @@ from __future__ import annotations
 import argparse
 import math
 import time
-from collections.abc import Sequence
-from itertools import chain
 from threading import Event
 
 import numpy as np
 
-from fireworld.draws import FIRE, hash_key
-from fireworld.executors import On, workers_for
+from benchmarks.fights import Fires, fires_by_condition, in_fights, network_of
 from fireworld.kernels.arrays import Array, NetworkArrays
 from fireworld.markdown import markdown_table
-from fireworld.policy.kernel import KernelPolicy, from_network
-from fireworld.policy.names import find_policy
-from fireworld.simulation.built import BuiltScenario, CityCache
-from fireworld.training.curriculum import load_curriculum
+from fireworld.policy.kernel import from_network
+from fireworld.simulation.built import BuiltScenario
 from fireworld.training.options import Trial, TriedDecision, try_options
-from fireworld.training.seeds import fight_seed
 
 STEPS_MAX = 200
 """Of a fight; rollouts look further."""
 
 
 def tried_out(
-    fires: Sequence[Sequence[BuiltScenario]], network: NetworkArrays, trial: Trial, n_fights: int, seed: int
+    fires: Fires, network: NetworkArrays, trial: Trial, n_fights: int, seed: int
 ) -> tuple[list[TriedDecision], float]:
     """Return the decisions that are tried out, the conditions in turn, and the processor time of a rollout."""
 
-    def fight(number: int) -> list[TriedDecision]:
-        among = fires[number % len(fires)]
-        built = among[hash_key(seed, FIRE, number, 0) % len(among)]
+    def fight(built: BuiltScenario, _: int, fight_seed: int) -> list[TriedDecision]:
         policy = from_network(network, own_targets=True)
-        world = built.world(seed=fight_seed(seed, number, 0), n_steps_max=min(STEPS_MAX, built.scenario.steps))
+        world = built.world(seed=fight_seed, n_steps_max=min(STEPS_MAX, built.scenario.steps))
         return try_options(world, policy, trial, Event())
 
-    workers, began = workers_for(On("threads")), time.process_time()
-    with workers.make_pool(workers.n) as pool:
-        found = [*chain.from_iterable(pool.map(fight, range(n_fights)))]
+    began = time.process_time()
+    found = in_fights(fires, n_fights, seed, fight)
     n_rollouts = trial.n_rollouts * sum(len(one.worth) for one in found)
     return found, (time.process_time() - began) / max(n_rollouts, 1)
 
 
-def two_rollouts(
-    fires: Sequence[Sequence[BuiltScenario]], network: NetworkArrays, horizon: int, n_fights: int, seed: int
-) -> tuple[Array, float]:
+def two_rollouts(fires: Fires, network: NetworkArrays, horizon: int, n_fights: int, seed: int) -> tuple[Array, float]:
     """Return what two rollouts of every option but the own one say, (options, 2), and the time of a rollout."""
     worths, seconds = list[Array](), 0.0
     for n_rollouts in (1, 2):
@@ -81,13 +70,10 @@ def main() -> None:
     parser.add_argument("--horizons", default="25,50,100,200", help="steps, rising")
     parser.add_argument("--seed", type=int, default=31)
     given = parser.parse_args()
-    policy = find_policy(given.team).policy
-    if not isinstance(policy, KernelPolicy) or not len(policy.network.layer):
-        parser.error(f"--team: expected a team with a network, got {given.team}")
+    network = network_of(given.team, parser)
     horizons = [int(word) for word in given.horizons.split(",")]
-    cities = CityCache()
-    fires = [[cities.build(one) for one in stage.scenarios] for stage in load_curriculum("conditions").stages]
-    found = [two_rollouts(fires, policy.network, horizon, given.fights, given.seed) for horizon in horizons]
+    fires = fires_by_condition()
+    found = [two_rollouts(fires, network, horizon, given.fights, given.seed) for horizon in horizons]
     longest, shortest_time = found[-1][0], found[0][1]
     meant_most = math.sqrt(max(float((longest[:, 0] * longest[:, 1]).mean()), 0.0))
     rows = []
