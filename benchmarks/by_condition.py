@@ -13,7 +13,7 @@ import argparse
 import math
 from collections.abc import Sequence
 
-from benchmarks.drawn_fires import drawn_fires
+from benchmarks.drawn_fires import fires_of
 from benchmarks.learning_fires import shares
 from fireworld.kernels.arrays import Array
 from fireworld.markdown import markdown_table
@@ -21,6 +21,20 @@ from fireworld.policy.names import find_policy
 from fireworld.scenario import Scenario
 from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import load_curriculum
+
+
+def shortened(scenarios: Sequence[Scenario], steps: int | None) -> list[Scenario]:
+    """Return scenarios that end after so many steps at most."""
+    return [one if steps is None else one.with_values({"steps": min(steps, one.steps)}) for one in scenarios]
+
+
+def more_than(differences: Sequence[Array]) -> str:
+    """Write the mean over all conditions of what a team saves more of each fire, and its standard error."""
+    mean = math.fsum(float(one.mean()) for one in differences) / len(differences)
+    if min(map(len, differences)) < 2:  # one fire has no spread
+        return f"{mean:+.3f}"
+    variance = math.fsum(float(one.var(ddof=1)) / len(one) for one in differences) / len(differences) ** 2
+    return f"{mean:+.3f} ± {math.sqrt(variance):.3f}"
 
 
 def main() -> None:
@@ -38,9 +52,7 @@ def main() -> None:
     curriculum = load_curriculum(given.curriculum)
     stages = {stage.name: shortened(stage.scenarios, given.steps) for stage in curriculum.stages}
     fires = {
-        name: drawn_fires(scenarios, given.drawn, cities, seed=given.first_seed + place)
-        if given.drawn
-        else [cities.build(one) for one in scenarios]
+        name: fires_of(scenarios, cities, drawn=given.drawn, seed=given.first_seed + place)
         for place, (name, scenarios) in enumerate(stages.items())
     }
     rows, first = [], None
@@ -51,20 +63,6 @@ def main() -> None:
         means, more = [float(one.mean()) for one in found], [one - its for one, its in zip(found, first, strict=True)]
         rows.append([name, f"{math.fsum(means) / len(means):.3f}", more_than(more), *(f"{one:.2f}" for one in means)])
     print(markdown_table(["team", "mean", f"more than {given.teams[0]}", *stages], rows))
-
-
-def shortened(scenarios: Sequence[Scenario], steps: int | None) -> list[Scenario]:
-    """Return scenarios that end after so many steps at most."""
-    return [one if steps is None else one.with_values({"steps": min(steps, one.steps)}) for one in scenarios]
-
-
-def more_than(differences: Sequence[Array]) -> str:
-    """Write the mean over all conditions of what a team saves more of each fire, and its standard error."""
-    mean = math.fsum(float(one.mean()) for one in differences) / len(differences)
-    if min(map(len, differences)) < 2:  # one fire has no spread
-        return f"{mean:+.3f}"
-    variance = math.fsum(float(one.var(ddof=1)) / len(one) for one in differences) / len(differences) ** 2
-    return f"{mean:+.3f} ± {math.sqrt(variance):.3f}"
 
 
 if __name__ == "__main__":

@@ -29,6 +29,11 @@ MODEL, CITY, PLACE, SIZE = range(4)
 """What is drawn for a fire: which one it is like, the city, the place in it, and how large it is."""
 
 
+def fires_of(models: Sequence[Scenario], cities: CityCache, *, drawn: int, seed: int) -> list[BuiltScenario]:
+    """Return the fires themselves, or, if so many are to be drawn, others like them; errors as for `drawn_fires`."""
+    return drawn_fires(models, drawn, cities, seed=seed) if drawn else [cities.build(one) for one in models]
+
+
 def drawn_fires(models: Sequence[Scenario], n: int, cities: CityCache, *, seed: int) -> list[BuiltScenario]:
     """Draw n fires, each like one of the models: its team, conditions and kind of city, at another place elsewhere.
 

@@ -19,7 +19,7 @@ import sys
 import click
 import numpy as np
 
-from benchmarks.drawn_fires import drawn_fires
+from benchmarks.drawn_fires import fires_of
 from benchmarks.learning_fires import shares
 from fireworld.evaluation.statistics import Estimate, estimate, paired_difference
 from fireworld.evaluation.suites import suite
@@ -81,10 +81,7 @@ def main() -> None:
     found = dict[str, tuple[Array, Array]]()
     with click.progressbar([*enumerate(groups)], label="fires", file=sys.stderr) as bar:
         for place, (name, scenarios) in bar:
-            if given.drawn:
-                fires = drawn_fires(scenarios, given.drawn, cities, seed=first + place)
-            else:
-                fires = [cities.build(one) for one in scenarios]
+            fires = fires_of(scenarios, cities, drawn=given.drawn, seed=first + place)
             runs, others = (
                 np.array([shares(fires, policies[one], seeds) for one in some]) for some in (given.teams, given.than)
             )

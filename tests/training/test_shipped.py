@@ -45,8 +45,8 @@ def test_teams_of_other_methods_come_from_the_shipped_curricula(name, method, cu
     team = load_team(name)
     wanted = method.trainer(load_curriculum(curriculum), seed=seed).identity
     check_same(team.provenance, wanted, team_path(name))
-    done, wanted = ("lessons_done", "n_lessons") if name == "sarsa" else ("generations_done", "n_generations")
-    assert team.provenance[done] == getattr(method, wanted)
+    parts = "lessons" if name == "sarsa" else "generations"
+    assert team.provenance[f"{parts}_done"] == getattr(method, f"n_{parts}")
     assert team.own_targets
 
 
