@@ -13,7 +13,7 @@ import argparse
 import math
 from collections.abc import Sequence
 
-from benchmarks.drawn_fires import fires_of
+from benchmarks.drawn_fires import add_drawn, fires_of
 from benchmarks.learning_fires import shares
 from fireworld.kernels.arrays import Array
 from fireworld.markdown import markdown_table
@@ -45,7 +45,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=2, help="runs of each fire")
     parser.add_argument("--first-seed", type=int, default=9001)
     parser.add_argument("--steps", type=int, help="of a run at most; all of the scenario's if left out")
-    parser.add_argument("--drawn", type=int, default=0, metavar="N", help="N other fires like those of each condition")
+    add_drawn(parser, "condition")
     given = parser.parse_args()
     n_seeds = 1 if given.drawn else given.seeds
     cities, seeds = CityCache(), range(given.first_seed, given.first_seed + n_seeds)

@@ -5,6 +5,7 @@ Nobody looked whether they are contested, so they flatter no team, and there are
 
 from __future__ import annotations
 
+from argparse import ArgumentParser, ArgumentTypeError
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import islice
@@ -27,6 +28,17 @@ TRIES: Final = 20
 """So many times as many fires are drawn at most as are wanted."""
 MODEL, CITY, PLACE, SIZE = range(4)
 """What is drawn for a fire: which one it is like, the city, the place in it, and how large it is."""
+
+
+def add_drawn(parser: ArgumentParser, like: str) -> None:
+    """Let a command take how many fires are drawn; 0 is none."""
+    parser.add_argument("--drawn", type=_count, default=0, metavar="N", help=f"N other fires like those of each {like}")
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal():
+        raise ArgumentTypeError(f"expected a number of fires, got {text}")
+    return int(text)
 
 
 def fires_of(models: Sequence[Scenario], cities: CityCache, *, drawn: int, seed: int) -> list[BuiltScenario]:

@@ -19,7 +19,7 @@ import sys
 import click
 import numpy as np
 
-from benchmarks.drawn_fires import fires_of
+from benchmarks.drawn_fires import add_drawn, fires_of
 from benchmarks.learning_fires import shares
 from fireworld.evaluation.statistics import Estimate, estimate, paired_difference
 from fireworld.evaluation.suites import suite
@@ -63,7 +63,7 @@ def main() -> None:
     parser.add_argument("--than", nargs="+", metavar="TEAM", default=[], help="as many others, or one")
     parser.add_argument("--suites", default=SUITES)
     parser.add_argument("--curriculum", help="a row for each of its stages in place of suites: one nobody learned in")
-    parser.add_argument("--drawn", type=int, default=0, metavar="N", help="N other fires like those of each stage")
+    add_drawn(parser, "stage")
     parser.add_argument("--seeds", type=int, default=20, help="runs of each fire")
     parser.add_argument("--first-seed", type=int, default=1)
     given = parser.parse_args()

@@ -70,3 +70,10 @@ def test_cities_without_room_for_such_fires():
     crowded = model.with_values({"fires.0.n_buildings": 100_000})
     with pytest.raises(ScenarioError, match="fires: expected room for 2 like these, got room for 0"):
         drawn_fires([crowded], 2, CityCache(), seed=1)
+
+
+@pytest.mark.parametrize("odd", ["-1", "many", "2.5"])
+def test_a_number_of_drawn_fires_that_is_none(monkeypatch, capsys, odd):
+    with pytest.raises(SystemExit, match="2"):
+        table(monkeypatch, capsys, "--drawn", odd)
+    assert f"--drawn: expected a number of fires, got {odd}" in capsys.readouterr().err
