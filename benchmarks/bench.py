@@ -17,6 +17,7 @@ from benchmarks.timing import Row, duration
 SECTIONS: Final = {
     "fire": "fire_rows",
     "world": "world_rows",
+    "decision": "decision_rows",
     "city": "city_rows",
     "log": "log_rows",
     "view": "view_rows",
