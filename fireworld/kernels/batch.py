@@ -224,7 +224,7 @@ def show_brigade(brigade: int, i: int, episode: Episode, batch: Batch) -> None:
 def show_target(action: int, brigade: int, has_site: bool, i: int, episode: Episode, view: View) -> None:
     """Write the features of the building that an action names for a brigade; MODEL 7."""
     city, world, constants, scratch = episode.city, episode.world, episode.constants, episode.scratch
-    shown = view.targets[i, brigade, action]
+    shown, seen = view.targets[i, brigade, action], scratch.seen[0]
     if not has_site:
         shown[:] = 0.0
         return
@@ -234,10 +234,10 @@ def show_target(action: int, brigade: int, has_site: bool, i: int, episode: Epis
         episode.clock[STEP] + 1,
         world.brigades.target,
         sight_of(city, world, constants, scratch),
-        scratch.seen,
+        seen,
     )
     for k in range(N_TARGET_FEATURES):
-        shown[k] = scratch.seen[k]
+        shown[k] = seen[k]
 
 
 @inner

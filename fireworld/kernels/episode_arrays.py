@@ -122,8 +122,8 @@ class Scratch(NamedTuple):
     shares: Shares
     assignment: Assignment
     warmth: Warmth
-    seen: Float64  # (30,)
-    work: Float64x2  # (2, w), w as `widest` says of the policy's network
+    seen: Float64x2  # (8, 30), of targets that are valued together
+    work: Float64x2  # (2, 8 w), w as `widest` says of the policy's network
 
 
 class Episode(NamedTuple):

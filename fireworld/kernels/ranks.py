@@ -12,7 +12,7 @@ from fireworld.kernels.allocation import named_range
 from fireworld.kernels.arrays import Array, GeometryArrays, NetworkArrays, SiteState
 from fireworld.kernels.episode_arrays import Ranks
 from fireworld.kernels.jit import inner, kernel
-from fireworld.kernels.network import value_by_network
+from fireworld.kernels.network import AT_ONCE, value_together
 from fireworld.kernels.observation import N_ACTIONS, find_target, site_place
 from fireworld.kernels.ranking import (
     N_OF_BUILDING,
@@ -207,12 +207,15 @@ def value_targets(
     add_up_others(brigade, len(known), first, end, ranks)
     count_in(known[brigade], -1.0, sites, ranks)
     if len(network.layer) > 0:
-        for other in range(N_ACTIONS):
-            seen[N_TARGET_FEATURES + other] = 1.0 if other == action else 0.0
+        for k in range(AT_ONCE):
+            for other in range(N_ACTIONS):
+                seen[k, N_TARGET_FEATURES + other] = 1.0 if other == action else 0.0
         around = reads_around(network)
-        for k in range(np.uint64(first), np.uint64(end)):
-            see_place(brigade, np.int64(k), around, known, sight, ranks, seen)
-            ranks.value[k] = value_by_network(network, seen, work)
+        for begin in range(first, end, AT_ONCE):
+            n = min(end - begin, AT_ONCE)
+            for k in range(n):
+                see_place(brigade, begin + k, around, known, sight, ranks, seen[k])
+            value_together(network, seen, ranks.value[begin : begin + n], work)
     else:
         extra = weights[N_TARGET_FEATURES + action] if action >= 0 else 0.0
         weigh_for(brigade, first, end, weights, extra, sight, ranks)
@@ -254,9 +257,9 @@ def rank_targets(
 
     The team has been lined up in this step, and the brigades before this one been heard. `weights` (17,) are the
     ranking's, by its number; a network with layers values targets instead of them. `known` (b,) is what the brigades
-    go for, as far as this one knows, -1 nothing. Scratch is `seen` (30,) float64 and `work` (2, w), w as `widest` says.
-    Written: `values` (5,) float64, of the one chosen and of the four targets, without the weights of the actions where
-    it may name its own; there only if they are noted.
+    go for, as far as this one knows, -1 nothing. Scratch is `seen` (8, 30) float64 and `work` (2, 8 w), w as `widest`
+    says. Written: `values` (5,) float64, of the one chosen and of the four targets, without the weights of the actions
+    where it may name its own; there only if they are noted.
     """
     best_action, best, sites = np.int64(-1), np.int64(-1), sight.sites
     site = site_place(brigade, sight.brigades.site, sites)

@@ -14,7 +14,7 @@ from fireworld.kernels.arrays import Array, FireState, Learner, PolicyArrays, Se
 from fireworld.kernels.assignment import fresh_assignment
 from fireworld.kernels.choice import ALLOCATE, ASSIGN, RANK_ALL, RANK_NAMED
 from fireworld.kernels.episode_arrays import LAST_STEP, SEED, STEP, Scratch
-from fireworld.kernels.network import widest
+from fireworld.kernels.network import AT_ONCE, widest
 from fireworld.kernels.observation import N_ACTIONS, N_FEATURES
 from fireworld.kernels.ranking import N_OF_BUILDING
 from fireworld.kernels.ranks import fresh_ranks
@@ -99,8 +99,8 @@ def fresh_scratch(policy: PolicyArrays, fire: FireState, *, describes: bool) -> 
         shares=fresh_shares(n_brigades if shares else 0, n_buildings if shares else 0),
         assignment=fresh_assignment(n_brigades if assigns else 0, n_buildings if assigns else 0),
         warmth=fresh_warmth(n_buildings, fire.air.shape),
-        seen=np.zeros(N_SEEN),
-        work=np.zeros((2, widest(policy.network))),
+        seen=np.zeros((AT_ONCE, N_SEEN)),
+        work=np.zeros((2, AT_ONCE * widest(policy.network))),
     )
 
 

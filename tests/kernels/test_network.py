@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fireworld.kernels.network import tanh, value_by_network, widest
+from fireworld.kernels.network import AT_ONCE, tanh, value_by_network, value_together, widest
 from fireworld.kernels.situation import N_SEEN
 from fireworld.policy.kernel import NO_NETWORK
 from fireworld.policy.teams.network_layers import FEATURES, SEEN, Layer, pack
@@ -65,6 +65,18 @@ def test_sums_begin_with_the_bias_and_take_the_inputs_in_their_order():
         for number, (weight,) in zip(hidden, second, strict=True):
             total += max(number, 0.0) * weight
         assert value(network, seen) == total
+
+
+@pytest.mark.parametrize("activation", ["relu", "tanh"])
+@pytest.mark.parametrize("widths", [(13, 1), (13, 4, 1), (13, 7, 1), (13, 72, 1), (13, 3, 30, 2, 9, 1)])
+def test_targets_valued_together_have_the_bits_that_they_have_alone(widths, activation):
+    network = ready(*widths, activation=activation)
+    work = np.full((2, AT_ONCE * widest(network)), np.nan)
+    for n in range(1, AT_ONCE + 1):
+        seen, values = np.random.default_rng(n).normal(size=(AT_ONCE, N_SEEN)), np.full(n, np.nan)
+        seen[n:] = np.inf  # of others, whatever it is
+        value_together(network, seen, values, work)
+        assert values.tolist() == [value(network, row) for row in seen[:n]]
 
 
 def test_a_network_without_layers_needs_no_room():

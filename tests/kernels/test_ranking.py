@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fireworld.kernels.network import AT_ONCE
 from fireworld.kernels.ranking import (
     N_OF_BUILDING,
     N_TARGET_FEATURES,
@@ -264,7 +265,7 @@ def ask(world, weighing, *, own, brigade=0, known=None, step=1, sight=None):
         NO_NETWORK,
         sight or sight_of(world),
         fresh_ranks(world.n_brigades, world.city.n_buildings),
-        np.full(N_WEIGHTS, np.nan),
+        np.full((AT_ONCE, N_WEIGHTS), np.nan),
         np.zeros((2, 0)),
         values,
     )
