@@ -253,7 +253,7 @@ def explore_and_learn(
         chosen = greedy
     of_targets = learner.of_targets
     compare_targets(
-        brigade, first, end, greedy, chosen, epsilon, known, policy.network, sight, ranks, scratch.seen[0], of_targets
+        brigade, first, end, greedy, chosen, epsilon, known, policy.network, sight, ranks, scratch.seen, of_targets
     )
     go_for_and_learn(brigade, scratch.seen[0], policy.network, learner)
     return target, choice

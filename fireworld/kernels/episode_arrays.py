@@ -43,8 +43,10 @@ class Ranks(NamedTuple):
     side: UInt8  # (n,), by building: on which side of its site it is
     side_burning: Float64x2  # (n, 4), buildings that burn on each side of each site
     side_kindling: Float64x2  # (n, 4), their kindling
-    side_others: Float64x2  # (n, 4), other brigades that go for them
-    site_needed: Float64  # (n,), steps that one brigade would have to spray a site
+    side_others: Float64x2  # (n, 4), which share of the others of the brigade that chooses goes for them
+    site_others: Float64  # (n,), by site: which share goes for one of its buildings
+    sprays_left: Float64  # (1,), how long the brigade that chooses can spray
+    around: Float64x2  # (n, 13), by building: what all see alike around it
 
 
 class Warmth(NamedTuple):

@@ -23,6 +23,8 @@ from fireworld.kernels.observation import N_ACTIONS
 
 N_OF_BUILDING, N_OF_BRIGADE, N_OF_TEAM = 7, 3, 3
 N_TARGET_FEATURES = N_OF_BUILDING + N_OF_BRIGADE + N_OF_TEAM
+BEYOND = N_OF_BUILDING + 1
+"""The feature that says how far beyond its range a brigade is."""
 N_WEIGHTS = N_TARGET_FEATURES + N_ACTIONS
 """Weights of a ranking: one for each feature of a target, then one for each of the four actions that may name it."""
 OWN_TARGET = N_ACTIONS

@@ -25,7 +25,7 @@ from fireworld.kernels.ranking import (
     know_building,
     nearness,
 )
-from fireworld.kernels.situation import describe_around, place_others, reads_around, sum_up
+from fireworld.kernels.situation import N_AROUND, describe_around, place_others, reads_around, sum_up
 
 
 def fresh_ranks(n_brigades: int, n_buildings: int) -> Ranks:
@@ -48,7 +48,9 @@ def fresh_ranks(n_brigades: int, n_buildings: int) -> Ranks:
         side_burning=np.empty((n, 4)),
         side_kindling=np.empty((n, 4)),
         side_others=np.empty((n, 4)),
-        site_needed=np.empty(n),
+        site_others=np.empty(n),
+        sprays_left=np.empty(1),
+        around=np.empty((n, N_AROUND)),
     )
 
 
@@ -170,16 +172,17 @@ def weigh_for(brigade: int, first: int, end: int, weights: Array, extra: float, 
 
 
 @inner
-def see_place(brigade: int, k: int, around: bool, known: Array, sight: Sight, ranks: Ranks, seen: Array) -> None:
-    """Write what a brigade sees of the k-th building in the row, `seen` (30,), the 13 last only where they are read.
+def see_row(brigade: int, first: int, end: int, around: bool, sight: Sight, ranks: Ranks, seen: Array) -> None:
+    """Write what a brigade sees of the buildings [first, end) in the row, (n, 30), the last 13 only if they are read.
 
     What the others go for is in `ranks`.
     """
-    b, here, near = np.int64(sight.sites.member[k]), ranks.n_here[k], ranks.near[k]
     range_square = sight.brigade_constants.range_square
-    describe_target(brigade, b, here, near, sight.described[b], sight.brigades, sight.geometry, range_square, seen)
+    for k in range(np.uint64(first), np.uint64(end)):
+        b, here, near, row = np.int64(sight.sites.member[k]), ranks.n_here[k], ranks.near[k], seen[k - np.uint64(first)]
+        describe_target(brigade, b, here, near, sight.described[b], sight.brigades, sight.geometry, range_square, row)
     if around:
-        describe_around(brigade, b, len(known), sight, ranks, seen)
+        describe_around(brigade, first, end, sight, ranks, seen)
 
 
 @inner
@@ -212,10 +215,9 @@ def value_targets(
                 seen[k, N_TARGET_FEATURES + other] = 1.0 if other == action else 0.0
         around = reads_around(network)
         for begin in range(first, end, AT_ONCE):
-            n = min(end - begin, AT_ONCE)
-            for k in range(n):
-                see_place(brigade, begin + k, around, known, sight, ranks, seen[k])
-            value_together(network, seen, ranks.value[begin : begin + n], work)
+            block_end = min(begin + AT_ONCE, end)
+            see_row(brigade, begin, block_end, around, sight, ranks, seen)
+            value_together(network, seen, ranks.value[begin:block_end], work)
     else:
         extra = weights[N_TARGET_FEATURES + action] if action >= 0 else 0.0
         weigh_for(brigade, first, end, weights, extra, sight, ranks)
@@ -266,7 +268,7 @@ def rank_targets(
     if site < 0:
         return best_action, best
     if reads_around(network):
-        sum_up(step, sight, ranks)
+        sum_up(step, len(known), sight, ranks)
         place_others(brigade, known, sight, ranks)
     place = np.int64(-1)
     n_valued = N_ACTIONS if noting or not own else 0

@@ -9,7 +9,7 @@ from fireworld.kernels.arrays import Array
 from fireworld.kernels.episode_arrays import Ranks
 from fireworld.kernels.jit import kernel
 from fireworld.kernels.ranking import Sight, know_building
-from fireworld.kernels.ranks import add_up_others, count_in, line_up_before, see_place
+from fireworld.kernels.ranks import add_up_others, count_in, line_up_before, see_row
 from fireworld.kernels.situation import place_others, sum_up
 
 
@@ -24,9 +24,8 @@ def see_targets(brigade: int, step: int, known: Array, sight: Sight, ranks: Rank
     for k in range(first, end):
         know_building(np.int64(sight.sites.member[k]), step, sight)
     add_up_others(brigade, len(known), first, end, ranks)
-    sum_up(step, sight, ranks)
+    sum_up(step, len(known), sight, ranks)
     place_others(brigade, known, sight, ranks)
     count_in(known[brigade], -1.0, sight.sites, ranks)
-    for k in range(first, end):
-        see_place(brigade, k, True, known, sight, ranks, out[k - first])
+    see_row(brigade, first, end, True, sight, ranks, out)
     count_in(known[brigade], 1.0, sight.sites, ranks)

@@ -7,7 +7,7 @@ import numpy as np
 from fireworld.kernels.arrays import Array, NetworkArrays
 from fireworld.kernels.episode_arrays import Ranks
 from fireworld.kernels.jit import inner
-from fireworld.kernels.ranking import METERS_100, N_WEIGHTS, Sight, beyond, know_building
+from fireworld.kernels.ranking import BEYOND, METERS_100, N_WEIGHTS, Sight, know_building
 
 N_AROUND = 13
 N_SEEN = N_WEIGHTS + N_AROUND
@@ -37,8 +37,8 @@ def side_at(x: float, y: float, site: int, sight: Sight) -> int:
 
 
 @inner
-def sum_up(step: int, sight: Sight, ranks: Ranks) -> None:
-    """Add up what burns on each side of every site, once a step."""
+def sum_up(step: int, n_brigades: int, sight: Sight, ranks: Ranks) -> None:
+    """Add up what burns on each side of every site, and write what all see alike around each building, once a step."""
     if ranks.summed[0] == step:
         return
     ranks.summed[0] = step
@@ -55,20 +55,7 @@ def sum_up(step: int, sight: Sight, ranks: Ranks) -> None:
             ranks.side_burning[site, side] += 1.0
             ranks.side_kindling[site, side] += sight.described[b, 5]
             needed += sight.described[b, 6] * sight.described[b, 6]
-        ranks.site_needed[site] = needed
-
-
-@inner
-def place_others(brigade: int, known: Array, sight: Sight, ranks: Ranks) -> None:
-    """Count on which side of which site the targets of the others are; `known` (b,), -1 nothing."""
-    sites = sight.sites
-    for site in range(sites.counts[0]):
-        for side in range(N_SIDES):
-            ranks.side_others[site, side] = 0.0
-    for other in range(len(known)):
-        target = known[other]
-        if other != brigade and target >= 0 and sites.place[target] >= 0:
-            ranks.side_others[sites.place[target], ranks.side[target]] += 1.0
+        around_site(site, needed, float(n_brigades), sight, ranks)
 
 
 @inner
@@ -80,38 +67,73 @@ def total(values: Array) -> float:
 @inner
 def refuge_distance(b: int, sight: Sight) -> float:
     """Return how far a building is from the nearest refuge, in hundreds of metres."""
-    geometry, least = sight.geometry, MOST_FAR
+    geometry, least = sight.geometry, np.inf
     for k in range(len(sight.streets.refuge)):
         refuge = sight.streets.refuge[k]
         dx, dy = geometry.x[b] - geometry.x[refuge], geometry.y[b] - geometry.y[refuge]
-        least = min(least, np.sqrt(dx * dx + dy * dy) / METERS_100)
-    return least
+        least = min(least, dx * dx + dy * dy)
+    return min(np.sqrt(least) / METERS_100, MOST_FAR)
 
 
 @inner
-def describe_around(brigade: int, b: int, n_brigades: int, sight: Sight, ranks: Ranks, out: Array) -> None:
-    """Write what is around a burning building for a brigade into the last 13 places of `out` (30,), float64; MODEL 7.1.
+def around_site(site: int, needed: float, team: float, sight: Sight, ranks: Ranks) -> None:
+    """Write what all see alike around the burning buildings of a site into `ranks.around`; MODEL 7.1.
 
-    In this step all has been summed up, and the others of this brigade placed.
+    `needed` is how many steps one brigade would have to spray them; `team` how many brigades there are.
     """
-    sites, geometry, brigades, constants = sight.sites, sight.geometry, sight.brigades, sight.brigade_constants
-    site, side, around = np.int64(sites.place[b]), np.int64(ranks.side[b]), out[N_WEIGHTS:]
-    team, others = float(n_brigades), max(float(n_brigades - 1), 1.0)
-    dx, dy = geometry.x[b] - brigades.x[brigade], geometry.y[b] - brigades.y[brigade]
-    far = beyond(dx * dx + dy * dy, constants.range_square) * METERS_100
-    around[0] = min(brigades.tank[brigade] / max(constants.power, 1) / TEN_STEPS, MOST)
-    around[1] = min(far / max(constants.speed, 1) / TEN_STEPS, MOST)
-    around[2] = refuge_distance(b, sight)
+    sites, geometry = sight.sites, sight.geometry
     n_burning, kindling = total(ranks.side_burning[site]), total(ranks.side_kindling[site])
-    around[3] = min(np.sqrt(n_burning / team), MOST_FAR)
-    around[4] = min(np.sqrt(ranks.site_needed[site] / team), MOST_FAR)
-    around[5] = min(np.sqrt(kindling), MOST_FAR)
-    around[6] = ranks.side_burning[site, side] / n_burning
-    around[7] = ranks.side_kindling[site, side] / kindling if kindling > 0.0 else 0.0
-    around[8] = ranks.side_others[site, side] / others
-    dx = geometry.x[b] - 0.5 * (sites.west[site] + sites.east[site])
-    dy = geometry.y[b] - 0.5 * (sites.south[site] + sites.north[site])
-    around[9] = min(np.sqrt(dx * dx + dy * dy) / METERS_100, MOST)
-    around[10] = min(float(sites.counts[0] - 1), MOST)
-    around[11] = 0.0 if sites.number[site] == brigades.site[brigade] else 1.0
-    around[12] = total(ranks.side_others[site]) / others
+    x, y = 0.5 * (sites.west[site] + sites.east[site]), 0.5 * (sites.south[site] + sites.north[site])
+    of_site = min(np.sqrt(n_burning / team), MOST_FAR), min(np.sqrt(needed / team), MOST_FAR)
+    for k in range(sites.start[site], sites.start[site + 1]):
+        b = np.int64(sites.member[k])
+        around, side = ranks.around[b], np.int64(ranks.side[b])
+        around[2] = refuge_distance(b, sight)
+        around[3], around[4] = of_site
+        around[5] = min(np.sqrt(kindling), MOST_FAR)
+        around[6] = ranks.side_burning[site, side] / n_burning
+        around[7] = ranks.side_kindling[site, side] / kindling if kindling > 0.0 else 0.0
+        dx, dy = geometry.x[b] - x, geometry.y[b] - y
+        around[9] = min(np.sqrt(dx * dx + dy * dy) / METERS_100, MOST)
+        around[10] = min(float(sites.counts[0] - 1), MOST)
+
+
+@inner
+def place_others(brigade: int, known: Array, sight: Sight, ranks: Ranks) -> None:
+    """Work out what a brigade sees alike around all buildings of a site, or of a side of it; MODEL 7.1.
+
+    Which share of the others goes for them; `known` (b,) is what they go for, -1 nothing. How long it can spray.
+    """
+    sites, brigades, others = sight.sites, sight.brigades, max(float(len(known) - 1), 1.0)
+    for site in range(sites.counts[0]):
+        for side in range(N_SIDES):
+            ranks.side_others[site, side] = 0.0
+    for other in range(len(known)):
+        target = known[other]
+        if other != brigade and target >= 0 and sites.place[target] >= 0:
+            ranks.side_others[sites.place[target], ranks.side[target]] += 1.0
+    for site in range(sites.counts[0]):
+        ranks.site_others[site] = total(ranks.side_others[site]) / others
+        for side in range(N_SIDES):
+            ranks.side_others[site, side] /= others
+    ranks.sprays_left[0] = min(brigades.tank[brigade] / max(sight.brigade_constants.power, 1) / TEN_STEPS, MOST)
+
+
+@inner
+def describe_around(brigade: int, first: int, end: int, sight: Sight, ranks: Ranks, out: Array) -> None:
+    """Write what is around the buildings [first, end) in the row for a brigade; MODEL 7.1.
+
+    In this step all has been summed up, and the others of this brigade placed. `out` (n, 30) float64 has the features
+    of these buildings in its first columns; written are the last 13.
+    """
+    sites, per_step = sight.sites, max(sight.brigade_constants.speed, 1)
+    for k in range(np.uint64(first), np.uint64(end)):
+        b, seen = np.int64(sites.member[k]), out[k - np.uint64(first)]
+        site, around, alike = np.int64(sites.place[b]), seen[N_WEIGHTS:], ranks.around[b]
+        for j in range(N_AROUND):
+            around[j] = alike[j]
+        around[0] = ranks.sprays_left[0]
+        around[1] = min(seen[BEYOND] * METERS_100 / per_step / TEN_STEPS, MOST)
+        around[8] = ranks.side_others[site, np.int64(ranks.side[b])]
+        around[11] = 0.0 if sites.number[site] == sight.brigades.site[brigade] else 1.0
+        around[12] = ranks.site_others[site]

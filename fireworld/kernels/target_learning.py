@@ -11,7 +11,7 @@ from fireworld.kernels.episode_arrays import Ranks
 from fireworld.kernels.jit import inner
 from fireworld.kernels.network import add_multiple, put_through, slope
 from fireworld.kernels.ranking import Sight
-from fireworld.kernels.ranks import count_in, see_place
+from fireworld.kernels.ranks import count_in, see_row
 from fireworld.kernels.situation import reads_around
 
 
@@ -75,7 +75,7 @@ def compare_targets(
     seen: Array,
     learner: TargetLearner,
 ) -> None:
-    """Write what a brigade's choice is compared with, and what it sees of it into `seen` (30,).
+    """Write what a brigade's choice is compared with, and what it sees of it into the first row of `seen` (8, 30).
 
     The buildings [first, end) in the row have been valued by it; `greedy` and `chosen` are among them. Written are the
     mean value and gradient of all targets, each by how probable its choice was, and the mean of what is seen of them.
@@ -86,12 +86,12 @@ def compare_targets(
     learner.mean_gradient[:] = 0.0
     learner.mean_value[0] = 0.0
     for k in range(first, end):
-        see_place(brigade, k, around, known, sight, ranks, seen)
-        add_multiple(1.0 / (end - first), seen, mean)
+        see_row(brigade, k, k + 1, around, sight, ranks, seen)
+        add_multiple(1.0 / (end - first), seen[0], mean)
         share = epsilon / (end - first) + (1.0 - epsilon if k == greedy else 0.0)
-        learner.mean_value[0] += share * value_and_gradient(network, seen, learner)
+        learner.mean_value[0] += share * value_and_gradient(network, seen[0], learner)
         add_multiple(share, learner.gradient, learner.mean_gradient)
-    see_place(brigade, chosen, around, known, sight, ranks, seen)
+    see_row(brigade, chosen, chosen + 1, around, sight, ranks, seen)
     count_in(known[brigade], 1.0, sites, ranks)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fireworld.kernels.ranking import N_WEIGHTS
-from fireworld.kernels.ranks import fresh_ranks, line_up
-from fireworld.kernels.situation import N_AROUND, N_SEEN, describe_around, place_others, sum_up
+from fireworld.kernels.ranks import fresh_ranks, line_up, see_row
+from fireworld.kernels.situation import N_AROUND, N_SEEN, place_others, sum_up
 from fireworld.policy.names import find_policy
 from fireworld.policy.teams.ranking_words import AROUND
 from fireworld.scenario import load_scenario
@@ -68,15 +68,19 @@ def test_it_is_what_the_model_says(n_steps):
     world = fought(n_steps)
     sites, known = world.state.sites, world.state.brigades.target.copy()
     assert sites.counts[0] >= 2
-    sight, ranks, seen = sight_of(world), fresh_ranks(world.n_brigades, len(sites.place)), np.full(N_SEEN, np.nan)
+    sight, ranks, seen = (
+        sight_of(world),
+        fresh_ranks(world.n_brigades, len(sites.place)),
+        np.full((len(sites.place), N_SEEN), np.nan),
+    )
     line_up(known, sight.geometry, sites, ranks)
-    sum_up(1, sight, ranks)
+    sum_up(1, len(known), sight, ranks)
     names, differing = [one.name for one in AROUND], set()
     for brigade in range(world.n_brigades):
         place_others(brigade, known, sight, ranks)
-        for b in sites.member[: sites.counts[2]].astype(int):
-            describe_around(brigade, int(b), len(known), sight, ranks, seen)
-            found = dict(zip(names, seen[N_WEIGHTS:].tolist(), strict=True))
+        see_row(brigade, 0, int(sites.counts[2]), True, sight, ranks, seen)
+        for b, row in zip(sites.member[: sites.counts[2]].astype(int), seen, strict=False):
+            found = dict(zip(names, row[N_WEIGHTS:].tolist(), strict=True))
             wanted = by_definition(world, sight, brigade, int(b), known)
             assert found == pytest.approx(wanted, rel=1e-9, abs=1e-12)
             differing |= {name for name in names if found[name]}
