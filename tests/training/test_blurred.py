@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from benchmarks.blurred import BLURS, blurred, found_in, gain, main, together
+from benchmarks.blurred_planner import BlurredPlanner
+from fireworld.planning.planner import Planner
+from fireworld.policy.names import find_policy
 from fireworld.policy.teams.team import load_team
 from fireworld.simulation.built import CityCache
 from fireworld.training.options import Trial
@@ -60,3 +63,29 @@ def test_a_team_without_a_network(monkeypatch, capsys):
     with pytest.raises(SystemExit):
         main()
     assert "--team: expected a team with a network, got chief" in capsys.readouterr().err
+
+
+def fought(built, policy):
+    world = built.world(seed=1, n_steps_max=24)
+    policy.begin(world.city_arrays, world.n_brigades, world.seed)
+    targets = []
+    while not (world.terminated or world.truncated):
+        world.step(policy)
+        targets.append(world.state.brigades.target.tolist())
+    return targets
+
+
+def test_a_planner_that_knows_the_fire_nearly_only(fires):
+    (built, *_), exact = fires[0], Planner(over="best")
+    assert fought(built, BlurredPlanner(blur=0.0)) == fought(built, exact)
+    nearly = BlurredPlanner(blur=0.5)
+    found = fought(built, nearly)
+    assert found != fought(built, exact)
+    assert found == fought(built, nearly), "the same run has the same numbers"
+
+
+def test_brigades_that_follow_the_team_see_the_fire_as_it_is(fires, monkeypatch):
+    """Where following is all that they do, it makes no difference how little the planner knows."""
+    (built, *_), best = fires[0], find_policy("best").policy
+    monkeypatch.setattr("fireworld.planning.planner.climb", lambda _, starts, *__: min(starts))
+    assert fought(built, BlurredPlanner(blur=0.5)) == fought(built, best)
