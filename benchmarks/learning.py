@@ -21,7 +21,7 @@ ROOT: Final = Path(__file__).parents[1]
 if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))  # to be called by its path
 
-from benchmarks.learning_fires import Fires, fires_by_group, shares  # noqa: E402
+from benchmarks.learning_fires import Fires, fires_by_group, shares, table_of  # noqa: E402
 from benchmarks.learning_teams import FULL, QUICK, Contestant, Trained, contestants  # noqa: E402
 from fireworld.cli.options import executor_of, on_option  # noqa: E402
 from fireworld.evaluation.statistics import Estimate, estimate, paired_difference  # noqa: E402
@@ -55,9 +55,8 @@ class Scores:
 
     @property
     def table(self) -> Array:
-        """(trainings, units): units are the fires, or the seeds where there are only three fires."""
-        per_fire = self.shares.shape[1] > 3
-        return self.shares.mean(axis=2) if per_fire else self.shares.mean(axis=1)
+        """(trainings, units): units are the fires, or the seeds where there are few fires."""
+        return table_of(self.shares)
 
 
 def measure(

@@ -19,6 +19,8 @@ from fireworld.training.curriculum import load_curriculum
 
 TESTS = ("test-1", "test-2", "test-3")
 N_THREADS = 2
+FEW = 10
+"""With fewer fires than that the seeds are drawn anew in place of the fires."""
 Fires = dict[str, list[BuiltScenario]]
 
 
@@ -52,3 +54,9 @@ def shares(
     if found is None:
         raise Interrupted("interrupted")
     return np.array([outcome.score_share for outcome in found]).reshape(len(stages), len(seeds))
+
+
+def table_of(runs: Array) -> Array:
+    """Return means as (teams, fires), or (teams, seeds) if there are few fires, of (teams, fires, seeds)."""
+    means: Array = runs.mean(axis=1) if runs.shape[1] < FEW else runs.mean(axis=2)
+    return means

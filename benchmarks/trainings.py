@@ -20,7 +20,7 @@ import click
 import numpy as np
 
 from benchmarks.drawn_fires import add_drawn, fires_of
-from benchmarks.learning_fires import shares
+from benchmarks.learning_fires import shares, table_of
 from fireworld.evaluation.statistics import Estimate, estimate, paired_difference
 from fireworld.evaluation.suites import suite
 from fireworld.kernels.arrays import Array
@@ -31,15 +31,7 @@ from fireworld.simulation.built import CityCache
 from fireworld.training.curriculum import load_curriculum
 
 SUITES = "tests,contested,larger,scarce-water,two-sites,few-brigades,many-brigades"
-FEW = 10
-"""With fewer fires than that the seeds are drawn anew in place of the fires."""
 LOW = 0.9
-
-
-def table_of(runs: Array) -> Array:
-    """Return means as (teams, fires), or (teams, seeds) if there are few fires, of (teams, fires, seeds)."""
-    means: Array = runs.mean(axis=1) if runs.shape[1] < FEW else runs.mean(axis=2)
-    return means
 
 
 def row_of(name: str, runs: Array, others: Array | None) -> list[str]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.trainings import main, row_of, table_of
+from benchmarks.learning_fires import table_of
+from benchmarks.trainings import main, row_of
 
 
 def test_fires_are_drawn_anew_or_seeds_where_fires_are_few():
