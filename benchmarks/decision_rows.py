@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
-
-import numpy as np
 
 from benchmarks.loops import decide_again
 from benchmarks.timing import Contender, Row, compare
 from fireworld.evaluation.suites import suite
-from fireworld.kernels.addresses import address_row
-from fireworld.kernels.arrays import WorldState
 from fireworld.policy.kernel import KernelPolicy
 from fireworld.policy.names import find_policy
-from fireworld.simulation.bound import Bound, bind
 from fireworld.simulation.built import CityCache
-from fireworld.simulation.state import copy_world
 from fireworld.simulation.world import World
 
 FIGHTS: Final = (
@@ -51,30 +45,26 @@ def fights(name: str, step: int, team: KernelPolicy) -> list[World]:
     return found
 
 
-def bound_to(world: World, team: KernelPolicy) -> tuple[Bound, WorldState]:
-    """Return a copy of a world bound to a team, and what must outlive that."""
-    state = copy_world(world.state)
-    city_row = np.concatenate((address_row(world.city_arrays), address_row(world.constants)))
-    return bind(city_row, address_row(state), state.fire, team.for_brigades(world.n_brigades)), state
+def contender(team: str, worlds: Sequence[World]) -> Contender:
+    """Return the decisions of a team in fights of its own: those who decide change what they go for."""
+    policy = kernel_policy(team)
+    bound = [(world, world.bound(policy.for_brigades(world.n_brigades))) for world in worlds]  # the first outlives it
+    n_decisions = sum(decide_again(one.row, world.step_number, 1) for world, one in bound)
+
+    def decide(_: object) -> None:
+        for world, one in bound:
+            decide_again(one.row, world.step_number, N_TIMES)
+
+    return Contender(team, decide, parts=N_TIMES * n_decisions)
 
 
 def decision_row(name: str, step: int, ours: str, baseline: str, *, seconds: float) -> Row:
     """Time the decisions of two teams in the same fights, those of the first one."""
-    worlds = fights(name, step, kernel_policy(ours))
-
-    def contender(team: str) -> Contender:
-        bound = [bound_to(world, kernel_policy(team)) for world in worlds]
-        n_decisions = sum(int(decide_again(one.row, step, 1)) for one, _ in bound)
-
-        def decide(_: object) -> None:
-            for one, _ in bound:
-                decide_again(one.row, step, N_TIMES)
-
-        return Contender(team, decide, parts=N_TIMES * n_decisions)
-
+    worlds, others = (fights(name, step, kernel_policy(ours)) for _ in range(2))
     burning = sum(world.outcome.n_burning for world in worlds) / len(worlds)
     label = f"{name}: {len(worlds)} fights after {step} steps, {burning:.0f} burning"
-    return compare("decision", "a decision of a brigade", label, contender(ours), contender(baseline), seconds=seconds)
+    first, second = contender(ours, worlds), contender(baseline, others)
+    return compare("decision", "a decision of a brigade", label, first, second, seconds=seconds)
 
 
 def rows(*, quick: bool) -> Iterator[Row]:

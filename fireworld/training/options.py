@@ -134,8 +134,7 @@ class Rollouts:
         kind, action, table_of = self._policy.kind, self._policy.action, self._policy.table_of
         self._forced = self._policy._replace(kind=kind.copy(), action=action.copy(), table_of=table_of.copy())
         self._room = copy_world(world.state)
-        city_row = np.concatenate((address_row(world.city_arrays), address_row(world.constants)))
-        self._bound = bind(city_row, address_row(self._room), self._room.fire, self._forced)
+        self._bound = bind(world.start.row, address_row(self._room), self._room.fire, self._forced)
 
     def tried(self, before: WorldState, step: int, asked: Asked, *, first: int = 0) -> TriedDecision:
         """Return what the options of a brigade are worth, in a step that begins in a state.
