@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.blurred import blurred
 from fireworld.kernels.arrays import CityArrays
 from fireworld.planning.planner import Planner
-from fireworld.policy.protocol import Action, Decision, Observation, Policy
+from fireworld.policy.protocol import Decision, Observation, Policy
 
 
 class BlurredPlanner(Policy):
@@ -29,7 +29,7 @@ class BlurredPlanner(Policy):
         Args:
             blur: how far the numbers around 1 spread by which heat and fuel are multiplied, from one building to the
                 next and from plan to plan; 0: the planner over that team.
-            over: a team whose brigades name targets of their own.
+            over: a policy that kernels follow.
         """
         self._blur, self._planner, self._draws = blur, Planner(over=over), np.random.default_rng(0)
 
@@ -40,11 +40,7 @@ class BlurredPlanner(Policy):
 
     def decide(self, observation: Observation) -> Decision:
         """Follow the plan; the first brigade that chooses in a period makes it, in a fire nearly like this one."""
-        planner, interval = self._planner, self._planner.options.interval
-        if planner.planned_at >= 0 and observation.step // interval == planner.planned_at // interval:
-            return planner.decide(observation)
-        nearly = replace(observation, world=blurred(observation.world, self._blur, self._draws))
-        decision = planner.decide(nearly)
-        if decision.action != Action.OWN_TARGET or planner.followed is None:
-            return decision
-        return planner.followed.decide(observation)
+        if self._planner.plans_in(observation.step):
+            nearly = replace(observation, world=blurred(observation.world, self._blur, self._draws))
+            self._planner.decide(nearly)
+        return self._planner.decide(observation)  # by the plan that there is now

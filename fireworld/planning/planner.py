@@ -206,8 +206,8 @@ class Planner(Policy):
 
         Periods follow the step number, not the age of the plan: a run that is resumed plans at the same steps.
         """
-        step, brigade, interval = observation.step, observation.brigade, self.options.interval
-        if not self._plan or step // interval != self.planned_at // interval:
+        step, brigade = observation.step, observation.brigade
+        if self.plans_in(step):
             self._make_plan(observation)
         option, values, worth = self._plan[brigade], None, None
         if step == self.planned_at:
@@ -217,6 +217,11 @@ class Planner(Policy):
             return Decision(option, q_values=values)
         assert self.followed is not None  # noqa: S101 - nobody else has the option
         return replace(self.followed.decide(observation), q_values=values, value=worth)
+
+    def plans_in(self, step: int) -> bool:
+        """Return whether the next brigade that chooses in a step makes a plan: there is none of this period."""
+        interval = self.options.interval
+        return not self._plan or step // interval != self.planned_at // interval
 
     def _make_plan(self, observation: Observation) -> None:
         if self._room is None:
