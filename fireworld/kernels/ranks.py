@@ -12,7 +12,7 @@ from fireworld.kernels.allocation import named_range
 from fireworld.kernels.arrays import Array, GeometryArrays, NetworkArrays, SiteState
 from fireworld.kernels.episode_arrays import Ranks
 from fireworld.kernels.jit import inner, kernel
-from fireworld.kernels.network import AT_ONCE, value_together
+from fireworld.kernels.network import AT_ONCE, value_together, widest
 from fireworld.kernels.observation import N_ACTIONS, find_target, site_place
 from fireworld.kernels.ranking import (
     N_OF_BUILDING,
@@ -25,7 +25,7 @@ from fireworld.kernels.ranking import (
     know_building,
     nearness,
 )
-from fireworld.kernels.situation import N_AROUND, describe_around, place_others, reads_around, sum_up
+from fireworld.kernels.situation import N_AROUND, N_SEEN, describe_around, place_others, reads_around, sum_up
 
 
 def fresh_ranks(n_brigades: int, n_buildings: int) -> Ranks:
@@ -52,6 +52,11 @@ def fresh_ranks(n_brigades: int, n_buildings: int) -> Ranks:
         sprays_left=np.empty(1),
         around=np.empty((n, N_AROUND)),
     )
+
+
+def fresh_room(network: NetworkArrays) -> tuple[Array, Array]:
+    """Return room to value targets by a network: `seen` (8, 30) and `work` (2, 8 w), w as `widest` says."""
+    return np.zeros((AT_ONCE, N_SEEN)), np.zeros((2, AT_ONCE * widest(network)))
 
 
 @inner

@@ -84,18 +84,18 @@ def around_site(site: int, needed: float, team: float, sight: Sight, ranks: Rank
     sites, geometry = sight.sites, sight.geometry
     n_burning, kindling = total(ranks.side_burning[site]), total(ranks.side_kindling[site])
     x, y = 0.5 * (sites.west[site] + sites.east[site]), 0.5 * (sites.south[site] + sites.north[site])
-    of_site = min(np.sqrt(n_burning / team), MOST_FAR), min(np.sqrt(needed / team), MOST_FAR)
+    burning_each, needed_each = min(np.sqrt(n_burning / team), MOST_FAR), min(np.sqrt(needed / team), MOST_FAR)
+    all_kindling, n_others = min(np.sqrt(kindling), MOST_FAR), min(float(sites.counts[0] - 1), MOST)
     for k in range(sites.start[site], sites.start[site + 1]):
         b = np.int64(sites.member[k])
         around, side = ranks.around[b], np.int64(ranks.side[b])
         around[2] = refuge_distance(b, sight)
-        around[3], around[4] = of_site
-        around[5] = min(np.sqrt(kindling), MOST_FAR)
+        around[3], around[4], around[5] = burning_each, needed_each, all_kindling
         around[6] = ranks.side_burning[site, side] / n_burning
         around[7] = ranks.side_kindling[site, side] / kindling if kindling > 0.0 else 0.0
         dx, dy = geometry.x[b] - x, geometry.y[b] - y
         around[9] = min(np.sqrt(dx * dx + dy * dy) / METERS_100, MOST)
-        around[10] = min(float(sites.counts[0] - 1), MOST)
+        around[10] = n_others
 
 
 @inner

@@ -26,11 +26,9 @@ from fireworld.kernels.choice import (
     table_state,
 )
 from fireworld.kernels.learning import EXPLORED, KEPT, NO_CHOICE
-from fireworld.kernels.network import AT_ONCE, widest
 from fireworld.kernels.ranking import N_WEIGHTS
-from fireworld.kernels.ranks import fresh_ranks, rank
+from fireworld.kernels.ranks import fresh_ranks, fresh_room, rank
 from fireworld.kernels.sharing import allocate, fresh_shares
-from fireworld.kernels.situation import N_SEEN
 from fireworld.policy.protocol import Action, Decision, Observation, Policy
 from fireworld.records import ACTIONS
 
@@ -172,8 +170,7 @@ def _by_rank(observation: Observation, ready: PolicyArrays) -> Decision:
         ready.network,
         observation.sight,
         fresh_ranks(len(ready.kind), len(observation.world.fire.energy)),
-        np.zeros((AT_ONCE, N_SEEN)),
-        np.zeros((2, AT_ONCE * widest(ready.network))),
+        *fresh_room(ready.network),
         values,
     )
     return _valued(int(action), int(target) if own else None, values)

@@ -14,12 +14,10 @@ from fireworld.kernels.arrays import Array, FireState, Learner, PolicyArrays, Se
 from fireworld.kernels.assignment import fresh_assignment
 from fireworld.kernels.choice import ALLOCATE, ASSIGN, RANK_ALL, RANK_NAMED
 from fireworld.kernels.episode_arrays import LAST_STEP, SEED, STEP, Scratch
-from fireworld.kernels.network import AT_ONCE, widest
 from fireworld.kernels.observation import N_ACTIONS, N_FEATURES
 from fireworld.kernels.ranking import N_OF_BUILDING
-from fireworld.kernels.ranks import fresh_ranks
+from fireworld.kernels.ranks import fresh_ranks, fresh_room
 from fireworld.kernels.sharing import fresh_shares
-from fireworld.kernels.situation import N_SEEN
 from fireworld.kernels.warmth import fresh_warmth
 from fireworld.simulation.state import NO_LEARNER
 
@@ -87,6 +85,7 @@ def fresh_scratch(policy: PolicyArrays, fire: FireState, *, describes: bool) -> 
     ranks, shares, assigns = (
         bool(np.isin(policy.kind, kinds).any()) for kinds in ((RANK_NAMED, RANK_ALL), ALLOCATE, ASSIGN)
     )
+    seen, work = fresh_room(policy.network)
     n_described = n_buildings if describes or ranks or assigns else 0
     return Scratch(
         features=np.zeros(N_FEATURES, dtype=np.int64),
@@ -99,8 +98,8 @@ def fresh_scratch(policy: PolicyArrays, fire: FireState, *, describes: bool) -> 
         shares=fresh_shares(n_brigades if shares else 0, n_buildings if shares else 0),
         assignment=fresh_assignment(n_brigades if assigns else 0, n_buildings if assigns else 0),
         warmth=fresh_warmth(n_buildings, fire.air.shape),
-        seen=np.zeros((AT_ONCE, N_SEEN)),
-        work=np.zeros((2, AT_ONCE * widest(policy.network))),
+        seen=seen,
+        work=work,
     )
 
 
